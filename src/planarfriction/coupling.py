@@ -2,8 +2,7 @@
 
 The simulator (host) integrates with a fixed time step, and knows how the twists and loads of its patches at the end of
 the step depend on the friction wrenches that act during it. `CoupledPatches.step` finds wrenches that are consistent:
-they are those of the models at the twists and loads that they cause. This is stable at any time step, whatever the
-stiffness of the bristles.
+they are those of the models at the twists and loads that they cause. This is stable at any time step and stiffness.
 """
 
 from __future__ import annotations
@@ -147,8 +146,7 @@ class CoupledPatches(ByValue):
         the interpreter's lock. `tolerance` is that of the twists [m/s], with spins multiplied by the size of the patch.
         If the iteration does not converge within `iterations`, the best result found is returned.
 
-        Raises `InvalidValueError` for input that is not finite, has the wrong shape, or is negative where it must not
-        be.
+        Raises `InvalidValueError` for input that is not finite, of the wrong shape, or negative where it must not be.
         """
         if not isinstance(host, HostStep):
             raise InvalidValueError("host", "be a HostStep", type(host).__name__)

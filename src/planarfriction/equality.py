@@ -1,7 +1,6 @@
 """Records that contain arrays: `==` and `hash` by content, and a `repr` of one line.
 
-The `==` that Python generates for dataclasses and named tuples compares arrays as a whole and raises; their `repr`
-prints every number.
+The `==` of Python's own dataclasses and named tuples raises for arrays; their `repr` prints every number.
 """
 
 from __future__ import annotations

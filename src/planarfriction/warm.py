@@ -40,8 +40,8 @@ def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float
     Code that was compiled before is read from the cache. `progress` is called with the description of each part before
     it begins; without it, a line on the terminal or in the notebook names the part. Compiled functions are kept, so
     Ctrl-C loses only the current one. Machine code is stored beside the sources, or in the user's cache if that folder
-    is not writable, or in the folder named by `NUMBA_CACHE_DIR`. If none of them is possible, a warning says so and
-    each process compiles again.
+    is not writable, or in the folder named by `NUMBA_CACHE_DIR`. If none is possible, each process compiles again, and
+    a warning says so.
     """
     times, shown = {}, progress is None and watched()
     progress = _show if shown else progress

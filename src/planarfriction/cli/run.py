@@ -173,8 +173,7 @@ def _label(scene: pf.Scene) -> str:
 def _with_models(scene: pf.Scene, kind: str, patch: pf.ContactPatch | None, parts: int | str | None) -> pf.Scene:
     """Return the scene with models of one kind on its own patches or on `patch`, laws as they are.
 
-    The kind is "" for that of the scene, "mixed" for each as it is. In `parts` where they have some, by default in as
-    many as they have.
+    The kind is "" for that of the scene, "mixed" for each as it is. In `parts` where they have some.
     """
     if not kind:
         kind = _label(scene)

@@ -18,8 +18,7 @@ from planarfriction.tensors.steps import TensorModel
 class FrictionPytree(TensorModel):
     """A friction model as a pytree; `replace` makes a changed model.
 
-    `parameters` of an evaluation, a record like `model.parameters` or an array `[P]` in the same order, replace the
-    model's own.
+    `parameters` of an evaluation, a record like `model.parameters` or an array `[P]` in its order, replace these.
     """
 
     xp = xp

@@ -60,8 +60,7 @@ class LimitSurface(ByValue):
 
     Twists `(vx, vy, omega)` [m/s, m/s, rad/s] and wrenches `(fx, fy, tau)` [1, 1, m] are about the contact frame's
     origin and act on the moving body; leading axes broadcast. If the shape of the patch depends on the load,
-    `normal_force` [N] selects the shape; leave it out otherwise. A patch with a single point has no limit surface (its
-    contact radius is zero).
+    `normal_force` [N] selects the shape; leave it out otherwise. A patch of one point has no limit surface (r = 0).
 
     With a friction metric and an asymmetry: `Phi(V) = sum w_i (|u_i| + a_i . u_i)` with `u_i = L_i v_i`. With a metric
     alone, `h(-V) = -h(V)` still holds. The asymmetric part of Phi is linear in V, and its wrench is the same for all
@@ -225,11 +224,9 @@ class LimitSurface(ByValue):
         `argmin Phi(V)` subject to `-W . V = 1`, scaled to `Phi(V) = 1`; the magnitude of `wrench` does not matter. The
         wrench of the returned twist is parallel to the given one within `CERTIFIED`. If the patch turns about a loaded
         point, the friction of that point, which is undetermined up to its limit, makes up the difference. If many
-        twists have the same wrench, any of them is returned; on a surface that is not convex, one with little
-        dissipation.
+        twists have the same wrench, any of them is returned, on a surface that is not convex one of little dissipation.
 
-        Raises `InvalidValueError` if `wrench` is zero, not finite or not of shape `[..., 3]`, and `SolverError` if no
-        twist is found.
+        Raises `InvalidValueError` if `wrench` is zero, not finite or not `[..., 3]`, `SolverError` without a twist.
         """
         wrench = _vectors("wrench", wrench)
         if wrench.ndim > 1:

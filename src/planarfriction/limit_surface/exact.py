@@ -117,11 +117,9 @@ class LimitSurfaceExact(LimitSurface):
     Integrated over the patch's outline if the pressure on it is uniform (polygons) or depends on the radius alone
     (discs and rings, `Uniform` or `SoftFinger`), otherwise over its cells, each a rectangle (on lines a segment) of
     uniform pressure. Points remain points. The wrench is continuous in the twist, and the Jacobian is exact; on lines
-    the Jacobian has a logarithmic singularity where the centre of rotation meets the line, and is cut off at 1e-15 of a
-    cell.
+    it has a logarithmic singularity where the centre of rotation meets the line, cut off at 1e-15 of a cell.
 
-    It costs more than a sum over cells, and compiled code cannot evaluate it: models store it as `LimitSurfaceTable`
-    does.
+    It costs more than a sum over cells; models, whose compiled code cannot evaluate it, store it as a table.
     """
 
     anisotropy = "uniform"

@@ -7,8 +7,7 @@ left are computed again, as near as possible to the limit surface of the weights
 
 and to the same wrench of a spin about the centre of pressure, `sum x |rho|` (the contact radius) and `sum x rho/|rho|`,
 with `Phi_k(x) = sum x |v|` the dissipation of K twists spread evenly over the sphere of directions. Cells whose weight
-comes out negative are dropped too. Tchakaloff's theorem says that as many
-cells as sums kept suffice.
+comes out negative are dropped too. As many cells as sums suffice (Tchakaloff's theorem).
 """
 
 from __future__ import annotations

@@ -46,9 +46,8 @@ class ContactPatch(Moments):
     Their `pressure` is a law (`Uniform`, `LinearGradient`, `SoftFinger`), a function `p(x, y)` of two floats [m], one
     number per cell, or None for uniform; it is evaluated at the positions of the cells.
 
-    `normal_force` [N] may be left out where the shape does not depend on it. It may have any shape `[...]`, which
-    then leads the shape of the result. A patch whose shape depends on the load has weights 0, and with them
-    moments 0, at zero load.
+    `normal_force` [N] may be left out where the shape does not depend on it. Its shape `[...]` leads that of the
+    result. A patch whose shape depends on the load has weights 0, and moments 0, at zero load.
 
     Source: Waltersson and Karayiannidis 2024, section III.
 
@@ -240,8 +239,7 @@ class ContactPatch(Moments):
         side of a cell or `(width, height)`. Only ratios of the pressures matter. Cells without pressure are dropped.
 
         For maps measured at several loads, give a mapping `{load [N]: map}`, or a list of maps (a stack `[L, rows,
-        columns]`) with their `loads` `[L]`; see `PressureMaps`. Raises FileError or InvalidValueError if this is not a
-        pressure map.
+        columns]`) with their `loads` `[L]`; see `PressureMaps`. Raises FileError or InvalidValueError otherwise.
         """
         law, (rows, columns), file = read_maps(pressure, loads)
         size = validation.numbers("cell_size", cell_size)

@@ -28,8 +28,7 @@ def friction_metric(angle: float, along: float, across: float) -> np.ndarray:
     """Return the metric `[2, 2]` of a grain: `R diag(along^2, across^2) R'` with R the rotation by `angle` [rad].
 
     `along` and `across` are the friction coefficients along and across the grain relative to those of the law, > 0;
-    `angle` is that of the grain from the contact frame's x axis. Oblique sliding in a direction `e` dissipates
-    `sqrt(e' M e)`.
+    `angle` is that of the grain from the contact frame's x axis. Sliding along `e` dissipates `sqrt(e' M e)`.
 
     Raises InvalidValueError for an angle that is not finite, and for frictions that are not > 0.
     """

@@ -110,11 +110,10 @@ class SoftFinger(Pressure):
     """Soft fingertip whose contact grows with the load: `p(s) ~ (1 - (s/R)^k)^(1/k)`, `R = min(c f_N^n, radius_max)`.
 
     s is the distance from the origin. Give exactly one of `k` and `k_per_newton` (`k = k_per_newton f_N`). With `n = 0`
-    and a constant `k` the shape is fixed. A cell is loaded if its position is inside R; if none is, the cells nearest
-    to the origin share the load.
+    and a constant `k` the shape is fixed. A cell is loaded if its position is inside R; if none is, the nearest ones
+    share the load.
 
-    Raises InvalidValueError for a parameter outside its range, and unless exactly one of `k` and `k_per_newton` is
-    given.
+    Raises InvalidValueError for a parameter out of range, and unless one of `k` and `k_per_newton` is given.
 
     Sources: Xydas and Kao 1999; Waltersson and Karayiannidis 2024.
     """

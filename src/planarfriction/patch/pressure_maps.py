@@ -89,8 +89,7 @@ class PressureMaps(ByValue, Pressure):
 def read_maps(pressure: Any, loads: Any = None) -> tuple[Any, tuple[int, int], str | None]:
     """Return the pressure law or numbers, `(rows, columns)` and the name of one map, or of several with `loads` [N].
 
-    A map is an array `[rows, columns]` or the path of a file; several are a stack or list of them, or a mapping from
-    load to map.
+    A map is an array `[rows, columns]` or the path of a file; several are a stack, a list, or a mapping by load.
     """
     if isinstance(pressure, Mapping):
         if loads is not None:

@@ -39,8 +39,7 @@ def animate_solution(
     each contact (world axes, all identical contacts) and its centre of rotation. On the right, for each contact (the
     three that are pressed hardest): its cells, from pale to blue as their bristles bend and orange where they slip, and
     its wrench inside its limit surface, for mu_c f_N = 1. Which cells slip is computed by a distributed model with the
-    contact's law on the recorded path, whatever the model of the contact; samples that are far apart make this less
-    accurate.
+    contact's law on the recorded path, whatever the model of the contact, less accurately from samples far apart.
 
     Parameters
     ----------

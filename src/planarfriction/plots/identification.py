@@ -26,8 +26,8 @@ def plot_identification(result: pf.identify.Identification) -> style.PlotFigure:
     Residuals of a good fit fill the band of two spreads of the noise and show no pattern; triangles at the rim stand
     for larger ones. With wrenches, the friction coefficient over the sliding speed is drawn below with the fitted
     Stribeck curve: where it has no samples, the data say nothing. Beside it the correlation of the residuals over time,
-    which that of noise leaves at zero. At the bottom what fits that saw neither a sample nor its block predict of it,
-    over what was measured.
+    which that of noise leaves at zero. At the bottom predictions of fits that did not see a sample or its block, over
+    what was measured.
     """
     with_speed = "speed" in result.histories[0]
     rows = len(result.channels)

@@ -46,8 +46,7 @@ def plot_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> style.Plot
     """Draw the limit surface (fx, fy, tau/r) for mu f_N = 1 about the centre of pressure, next to another one.
 
     `surface` is any limit surface; `beside` another one, "ellipsoid" for that of the same patch, or None to draw
-    `surface` alone. Both panels have the same limits and the same colours, for the height tau/r. All three axes are
-    dimensionless.
+    `surface` alone. Both panels have the same limits and colours, for the height tau/r. All axes are dimensionless.
 
     Raises InvalidValueError unless both are limit surfaces.
     """
@@ -112,8 +111,7 @@ def _sampled(surface: Any, beside: Any) -> tuple[list[str], list[tuple[np.ndarra
 def even_mesh(surface: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return the polar angles `[P, 1]` and azimuths `[1, A]` [rad] that lie close where the surface bends little.
 
-    There its points are far apart for a small turn of the twist, as where the body turns about a pad: facets of a mesh
-    of even angles would show.
+    There points are far apart for a small turn of the twist, as about a pad: facets of even angles would show.
     """
     polar = np.linspace(0.0, np.pi, POLAR_SEGMENTS + 1)
     azimuth = np.linspace(0.0, 2 * np.pi, AZIMUTH_SEGMENTS + 1)

@@ -28,8 +28,7 @@ def plot_patch(patch: pf.ContactPatch, *, normal_force: float | None = None) -> 
     patch without a grid is drawn as points coloured by the force on them, `w f_N`. Without `normal_force` [N] the
     colours show both per newton of load. Lengths in mm.
 
-    Raises InvalidValueError unless `patch` is a patch, for a load below zero, and for a missing load if the shape
-    depends on it.
+    Raises InvalidValueError unless `patch` is a patch, for a load below zero, and without a load that is needed.
     """
 
     validation.instance("patch", patch, pf.ContactPatch, "a ContactPatch")

@@ -44,8 +44,7 @@ def simulator(xp: Any, call: Callable[..., Sequence[Any]]) -> Callable[..., Scen
         knots [s], concrete numbers, and values by the name of a signal, `(times [K], values [..., K])`, for `force` and
         `velocity` `[..., K, 3]`, as in `derivatives.scene_sensitivities`. They replace the scene's own signal and are
         interpolated in the same way. `initial` gives components `[...]` of the initial state: vx, vy, omega, x, y,
-        theta. Leading axes broadcast, and each set of numbers is a separate simulation on its own thread; `vmap` adds
-        an axis in front.
+        theta. Leading axes broadcast, `vmap` adds one in front, and each set of numbers is simulated on its own thread.
 
         Gradients are those of `derivatives.scene_gradient` (in JAX they simulate once more), forward derivatives those
         of `scene_sensitivities`. First derivatives only; computed in double precision on the CPU.

@@ -1,8 +1,7 @@
 """Limit surfaces over `xp`: `kernels.surfaces` for arrays.
 
 `kind`, `size` and `data` are the numbers of a surface. Derivatives are those of `kernels.surfaces`: at rest the
-ellipsoid's, at the edge of a table's cell that of the cell that the lookup uses, and within a small angle of the spin
-axis the one at that angle.
+ellipsoid's, at the edge of a table's cell that of the cell in use, and close to the spin axis the one at `_AXIS`.
 """
 
 from __future__ import annotations

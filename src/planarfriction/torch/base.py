@@ -37,8 +37,7 @@ _BRISTLES = {False: "plain", True: "elasto-plastic"}
 class FrictionModule(TensorModel, nn.Module):
     """A friction model as a module of PyTorch, whose parameters are physical.
 
-    `parameters` of an evaluation `[..., P]`, in the order of `names`, replace the model's own, one row for each contact
-    if wanted.
+    `parameters` of an evaluation `[..., P]`, in the order of `names`, one row for each contact, replace its own.
     """
 
     xp = xp

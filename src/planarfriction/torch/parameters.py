@@ -8,12 +8,10 @@ An optimiser moves a raw number `w`; the physical value follows from it:
     breakaway in [0, 1) s = 1 - exp(-|w|)
     free                p = p_0 + r w, from w = 0          centre_x, centre_y
 
-A step of `w` is a relative change, so that one learning rate suits all. `|w|` has the slope 1 at `w = 0`: a value on
-its bound can leave it.
+A step of `w` is a relative change, so that one learning rate suits all. `|w|` has the slope 1 at 0, to leave the bound.
 
 What is not trained stays as it is. So mu_c trained beside a fixed mu_s has `mu_s = mu_c (1 + |w|)` as its rule too, the
-other way about: it cannot exceed mu_s, and a warning says when it has arrived there (on the processor, outside of
-`torch.compile` and `vmap`).
+other way about: it cannot exceed mu_s, and a warning says when it is there (where values can be read).
 """
 
 from __future__ import annotations

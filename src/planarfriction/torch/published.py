@@ -51,8 +51,7 @@ class ReducedModelPublished(FrictionModule):
     `surface` is any limit surface (None: the published table). `trainable` names the physical parameters that are
     `nn.Parameter`s, of the law or of the shape (`contact_radius`, `second_moment`, `centre_x`, `centre_y`); the limit
     surface and all other parameters are buffers. A new contact radius scales the torque and leaves the form of the
-    limit surface unchanged. The shape does not change with the load: if that of the patch does, it is fixed by the
-    `normal_force` of `surface`.
+    limit surface unchanged. A shape that depends on the load is that of the `normal_force` of `surface`.
 
     Raises InvalidValueError for a parameter that breaks its rule.
 

@@ -26,9 +26,8 @@ class ReducedModel(FrictionModule):
 
     The equations and the numbers of `planarfriction.ReducedModel`; with several parts the state has shape `[..., P,
     3]`. The patch, with its maps of steady sliding, is stored in buffers. `trainable` names the parameters of the law
-    that are `nn.Parameter`s; `gamma` cannot be one, because the maps depend on it. If the shape of the patch depends on
-    the load, the shape at `normal_force` [N] is kept; `parts`, `segments` and `speeds` as in
-    `planarfriction.ReducedModel`.
+    that are `nn.Parameter`s; `gamma` cannot be one, because the maps depend on it. A shape that depends on the load is
+    that at `normal_force` [N]; `parts`, `segments` and `speeds` as there.
 
     Raises InvalidValueError if `trainable` names gamma, or something that is not a parameter of the law.
     """

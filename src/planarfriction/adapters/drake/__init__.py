@@ -1,5 +1,4 @@
-"""Patch friction inside Drake: Drake keeps the normal contact, and this package supplies friction for chosen
-geometries.
+"""Patch friction inside Drake: Drake keeps the normal contact, this package adds friction of chosen geometries.
 
 Needs Drake: `pip install 'planarfriction[drake]'`.
 """

@@ -43,8 +43,7 @@ class Friction(LeafSystem):
     """Patch friction for a discrete plant, as a system that `AddToBuilder` adds to a diagram next to the plant.
 
     The context holds the states of the bristles, the wrenches, twists and loads; the output ports give those of the
-    last step. The plant's parameters and shapes are those at the time this system is made; later changes in a context
-    have no effect.
+    last step. The plant's parameters and shapes are those it has when this system is made.
 
     Raises `InvalidValueError` for plants that are continuous or not finalized, names that are not in the plant, and
     pairs with friction of their own.

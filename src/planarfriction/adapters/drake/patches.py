@@ -29,8 +29,7 @@ class PatchContact(Checked):
     The x axis of the patch is that of the frame, projected on the contact plane; its normal points into the frame's
     body. The twist is that of this body relative to the other one, and the wrench acts on this body.
 
-    Raises InvalidValueError unless `geometries` are two names, `centre` is one of the options and `model` is a friction
-    model.
+    Raises InvalidValueError unless `geometries` are two names, `centre` is an option and `model` a friction model.
     """
 
     model: FrictionModel
@@ -83,8 +82,7 @@ class Placed:
 def prepare(plant: Any, scene_graph: Any, patches: Iterable[PatchContact]) -> None:
     """Remove Drake's own friction from the first of the two `geometries` of each patch.
 
-    In Drake, friction belongs to geometries, not to pairs of them: the first geometry then slides without friction on
-    everything except its patch.
+    In Drake, friction belongs to geometries, not to pairs of them: the first then has only that of its patch.
 
     Raises `InvalidValueError` for geometries that are not in the plant.
     """

@@ -1,7 +1,6 @@
 """A copy of a plant that predicts what its next step would be with other forces.
 
-Discrete plants sample their forces before a step and their contacts at its end: what depends on both has to be known
-before the plant itself steps.
+Discrete plants sample their forces before a step and their contacts at its end: what depends on both is needed earlier.
 """
 
 from __future__ import annotations

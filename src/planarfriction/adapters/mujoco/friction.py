@@ -47,8 +47,7 @@ class Friction:
 
     Either call `step(d)` instead of `mj_step`, or use `with friction.install():`, which adds friction to `mj_step`
     itself, the reader and `mujoco.rollout`. States are stored in the data, in the last numbers of `userdata`: copying
-    or restoring these includes the friction. One object can be used with any number of data of its model, on any number
-    of threads.
+    or restoring these includes the friction. One object serves all data of its model, on any number of threads.
 
     Raises `InvalidValueError` for an integrator without a fixed metric, noslip iterations, sleeping, too little user
     data, names that are not in the model, pairs with friction of their own, and shapes that change with the load.
@@ -116,8 +115,7 @@ class Friction:
     def draw(self, scene: Any, d: Any) -> None:
         """Add each patch in contact to an `MjvScene`: its outline, its friction, and its centre of rotation.
 
-        Friction forces are drawn to the scale of MuJoCo's own contact forces, `vis.map.force / stat.meanmass` metres
-        per newton.
+        Friction forces have the scale of MuJoCo's contact forces, `vis.map.force / stat.meanmass` metres per newton.
 
         Raises `InvalidValueError` if the scene has no room for more geoms.
         """

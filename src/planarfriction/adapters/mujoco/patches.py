@@ -29,8 +29,7 @@ class PatchContact(Checked):
     The x axis of the patch is that of the site, projected on the contact plane; its normal points into the site's body.
     The twist is that of this body relative to the other one, and the wrench acts on this body.
 
-    Raises InvalidValueError unless `geoms` are two names, `centre` is one of the options and `model` is a friction
-    model.
+    Raises InvalidValueError unless `geoms` are two names, `centre` is an option and `model` a friction model.
     """
 
     model: FrictionModel

@@ -169,8 +169,7 @@ def _across(a, second, b):
 def _least(evaluate, surface, lean, target, guess, balanced, scratch):
     """Return the scaled twist of least dissipation in the plane of `target`, its dissipation, and the angle left.
 
-    A step is taken where the dissipation falls as it should; near the minimum, where that drowns in rounding, where the
-    balance is better.
+    A step is taken if the dissipation falls as it should; near the minimum, where rounding rules, a better balance.
     """
     first, second = plane(target)
     per = 1.0 / dot(target, guess)
