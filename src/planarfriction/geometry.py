@@ -16,9 +16,8 @@ def twist_at(twist: ArrayLike, offset: ArrayLike) -> np.ndarray:
     """
     twist, offset = np.asarray(twist, dtype=float), np.asarray(offset, dtype=float)
     omega = twist[..., 2]
-    return np.stack(
-        np.broadcast_arrays(twist[..., 0] - omega * offset[..., 1], twist[..., 1] + omega * offset[..., 0], omega), -1
-    )
+    vx, vy = twist[..., 0] - omega * offset[..., 1], twist[..., 1] + omega * offset[..., 0]
+    return np.stack(np.broadcast_arrays(vx, vy, omega), -1)
 
 
 def wrench_at(wrench: ArrayLike, offset: ArrayLike) -> np.ndarray:

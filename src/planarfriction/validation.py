@@ -237,10 +237,8 @@ def non_negative_numbers(name: str, value: Any) -> np.ndarray:
 def array(name: str, value: Any, shape: tuple[int | None, ...], *, largest: float = LARGEST) -> np.ndarray:
     """Return `value` as a new finite float array, no number beyond `largest`; None in `shape` takes any length."""
     result = numbers(name, value)
-    matches = result.ndim == len(shape) and all(
-        wanted in (None, length) for wanted, length in zip(shape, result.shape, strict=True)
-    )
-    if not matches:
+    fits = (wanted in (None, length) for wanted, length in zip(shape, result.shape, strict=False))
+    if result.ndim != len(shape) or not all(fits):
         wanted = "[" + ", ".join("any" if n is None else str(n) for n in shape) + "]"
         raise InvalidValueError(name, f"have shape {wanted}", f"shape {list(result.shape)}")
     _check_size(name, result)

@@ -36,9 +36,8 @@ class FitOrPlan(click.Command):
 
 def complete_log(ctx: click.Context, parameter: object, incomplete: str) -> list[CompletionItem]:
     """Return completions of a log: files, and the word `plan` where it may stand."""
-    words = (
-        [CompletionItem(NAME, help=SHORT_HELP)] if not ctx.params.get("logs") and NAME.startswith(incomplete) else []
-    )
+    fits = NAME.startswith(incomplete) and not ctx.params.get("logs")
+    words = [CompletionItem(NAME, help=SHORT_HELP)] if fits else []
     return [*words, CompletionItem(incomplete, type="file")]
 
 

@@ -36,9 +36,8 @@ def _check_kind(path: Path, kinds: tuple[str, ...], what: str) -> Path:
 def write_csv(path: Path, columns: Mapping[str, np.ndarray]) -> None:
     """Write columns of numbers with their names in the first line, exact to the last bit."""
     lines = [",".join(columns)]
-    lines += [
-        ",".join(map(repr, row)) for row in zip(*(np.asarray(each).tolist() for each in columns.values()), strict=True)
-    ]
+    rows = zip(*(np.asarray(each).tolist() for each in columns.values()), strict=True)
+    lines += [",".join(map(repr, row)) for row in rows]
     write_text(path, "\n".join(lines) + "\n")
 
 

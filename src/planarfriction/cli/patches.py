@@ -40,9 +40,8 @@ def find_patch(text: str | None, *, cell_size: float | None, width: float = WIDT
     makers |= {name.lower(): functools.partial(make, width=width) for name, make in PUBLISHED_PATCHES.items()}
     if make := makers.get(text.lower()):
         if cell_size is not None:
-            raise InvalidValueError(
-                "--cell-size", "be given only for a pressure map", f"{cell_size} for the patch {text}"
-            )
+            given = f"{cell_size} for the patch {text}"
+            raise InvalidValueError("--cell-size", "be given only for a pressure map", given)
         return make()
     if not (Path(text).suffix or (text and os.path.exists(text))):
         validation.choice("patch", text, [*patch_names(), "a pressure map file"])

@@ -84,9 +84,8 @@ class LimitSurfaceQuartic(LimitSurface):
         """
         wrench, twist = _rows("wrench", wrench), _rows("twist", twist)
         if wrench.ndim != 2 or wrench.shape != twist.shape or len(wrench) < 5:
-            raise InvalidValueError(
-                "twist", "have as many rows as wrench, five or more", f"{list(wrench.shape)}, {list(twist.shape)}"
-            )
+            shapes = f"{list(wrench.shape)}, {list(twist.shape)}"
+            raise InvalidValueError("twist", "have as many rows as wrench, five or more", shapes)
         for name, rows in (("wrench", wrench), ("twist", twist)):
             if not (np.abs(rows).max(axis=1) > 0.0).all():
                 raise InvalidValueError(name, "not be zero in any row", rows.tolist())

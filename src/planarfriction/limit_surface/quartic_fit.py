@@ -70,9 +70,8 @@ def certificate(coefficients: np.ndarray) -> np.ndarray:
     of_coefficients, of_matrix = _certificate_equations()
     scale = np.abs(coefficients).max()
     wanted = of_coefficients @ (coefficients / scale)
-    problem = cp.Problem(
-        cp.Maximize(least), [of_matrix @ cp.vec(matrix, order="C") == wanted, matrix - least * np.eye(9) >> 0]
-    )
+    rules = [of_matrix @ cp.vec(matrix, order="C") == wanted, matrix - least * np.eye(9) >> 0]
+    problem = cp.Problem(cp.Maximize(least), rules)
     _solve(problem)
     found = 0.5 * (matrix.value + matrix.value.T)  # pyright: ignore[reportOptionalMemberAccess, reportOptionalOperand]
     missing = wanted - of_matrix @ found.reshape(81)

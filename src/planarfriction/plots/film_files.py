@@ -113,9 +113,8 @@ def _write_gif(file: io.BytesIO, frame: Callable[[int], np.ndarray], count: int,
     ends = np.round(100.0 * np.arange(1, count + 1) / fps)  # GIF counts hundredths of a second
     durations = 10.0 * np.diff(ends, prepend=0.0)
     durations[-1] += 1e3 * LAST
-    first, *others = (
-        Image.fromarray(frame(number)).quantize(palette=palette, dither=Image.Dither.NONE) for number in range(count)
-    )
+    pictures = (Image.fromarray(frame(number)) for number in range(count))
+    first, *others = (each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures)
     first.save(file, format="GIF", save_all=True, append_images=others, duration=durations.tolist(), loop=0)
 
 

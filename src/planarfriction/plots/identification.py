@@ -127,9 +127,8 @@ def _draw_correlations(axes: Any, result: pf.identify.Identification) -> None:
 def _draw_held_out(axes: Any, result: pf.identify.Identification, i: int) -> None:
     """Draw predictions of samples that fits did not see over their measurements; a good fit keeps to the diagonal."""
     name, unit = result.channels[i]
-    measured, held_out = (
-        np.concatenate([each[key][:, i] for each in result.histories]) for key in ("measured", "held_out")
-    )
+    both = ([each[key][:, i] for each in result.histories] for key in ("measured", "held_out"))
+    measured, held_out = map(np.concatenate, both)
     seen = np.isfinite(measured) & np.isfinite(held_out)
     if not seen.any():
         axes.text(0.5, 0.5, f"{name} was not measured", ha="center", transform=axes.transAxes)

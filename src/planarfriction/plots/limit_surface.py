@@ -34,9 +34,8 @@ def sample_limit_surface(surface: Any, polar: np.ndarray, azimuth: np.ndarray) -
     results have shape `[..., 3]` [m/s, m/s, rad/s] and [1, 1, m].
     """
     z = np.cos(polar)
-    sine = np.where(
-        np.abs(z) < 1.0, np.sin(polar), 0.0
-    )  # sin(pi) is not quite 0, and a spin about a cell must be exact
+    # sin(pi) is not quite 0, and a spin about a cell must be exact
+    sine = np.where(np.abs(z) < 1.0, np.sin(polar), 0.0)
     x, y, z = np.broadcast_arrays(sine * np.cos(azimuth), sine * np.sin(azimuth), z)
     twists = geometry.twist_at(np.stack([x, y, z / surface.contact_radius], -1), -surface.centre_of_pressure)
     return twists, surface.wrench(twists)

@@ -140,9 +140,8 @@ def _remark(strobe: _Strobe) -> str:
     if length == angle == 0.0:
         return "it does not move"
     far, turn = style.unit_for("length", length), style.unit_for("angle", angle)
-    return (
-        f"moves by up to {far.factor * length:.2g} {far.label}, turns by up to {turn.factor * angle:.2g} {turn.label}"
-    )
+    moves = f"moves by up to {far.factor * length:.2g} {far.label}"
+    return f"{moves}, turns by up to {turn.factor * angle:.2g} {turn.label}"
 
 
 def _reach(solution: pf.Solution) -> float:

@@ -116,9 +116,8 @@ def _carried(contact: pf.Contact, times: np.ndarray) -> np.ndarray:
     """Return the prescribed displacement of the world's side of a contact `[T, 3]` [m, m, rad]."""
     from planarfriction.scenes.movers import displacement
 
-    return (
-        np.zeros((len(times), 3)) if contact.support_velocity is None else displacement(contact.support_velocity, times)
-    )
+    moves = contact.support_velocity
+    return np.zeros((len(times), 3)) if moves is None else displacement(moves, times)
 
 
 def _displacements(contact: pf.Contact, times: np.ndarray, poses: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -64,9 +64,8 @@ def sum_parts(xp: Any, parts: tuple[Part, ...], state: Any, one: Callable[..., A
     if len(parts) == 1:
         return one(parts[0], state)
     found = [one(part, state[..., k, :]) for k, part in enumerate(parts)]
-    return xp.stack([new for new, _ in found], -2), sum(
-        part.share * wrench for part, (_, wrench) in zip(parts, found, strict=True)
-    )
+    wrenches = (part.share * wrench for part, (_, wrench) in zip(parts, found, strict=True))
+    return xp.stack([new for new, _ in found], -2), sum(wrenches)
 
 
 def relaxed(xp: Any, equations: Any, state: Any, load: Any) -> Any:

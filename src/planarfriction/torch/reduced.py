@@ -58,9 +58,8 @@ class ReducedModel(FrictionModule):
         super().__init__(patch, law)
         trainable = tuple(trainable)
         if "gamma" in trainable:
-            raise InvalidValueError(
-                "trainable", "not contain gamma: the map of steady sliding depends on it", trainable
-            )
+            rule = "not contain gamma: the map of steady sliding depends on it"
+            raise InvalidValueError("trainable", rule, trainable)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         found = reduced.parts_of(patch, law, normal_force, parts=parts, segments=segments, speeds=speeds)
         self.sizes = found.sizes

@@ -43,9 +43,8 @@ class PatchContact(Checked):
     def __post_init__(self) -> None:
         validation.instance("model", self.model, FrictionModel, "a friction model")
         validation.text("frame", self.frame)
-        if isinstance(self.geometries, str) or not (
-            isinstance(self.geometries, Sequence) and len(self.geometries) == 2
-        ):
+        names = self.geometries
+        if isinstance(names, str) or not (isinstance(names, Sequence) and len(names) == 2):
             raise InvalidValueError("geometries", "be the names of two geometries or bodies", self.geometries)
         self._set(geometries=tuple(validation.text("geometries", name) for name in self.geometries))
         validation.choice("centre", self.centre, CENTRES)

@@ -92,9 +92,8 @@ class Shadow:
         x /= math.sqrt(x @ x)
         if self._centres[p] == "contact":
             origin = frame.CalcPoseInWorld(self._begin).inverse().multiply(self._centre(p))
-        spatial = self.plant.CalcJacobianSpatialVelocity(
-            self._begin, JacobianWrtVariable.kV, frame, origin, self._others[p], world
-        )
+        measured = JacobianWrtVariable.kV, frame, origin, self._others[p], world
+        spatial = self.plant.CalcJacobianSpatialVelocity(self._begin, *measured)
         a, b, c, d, e, f = *normal.tolist(), *x.tolist()
         y = np.array([b * f - c * e, c * d - a * f, a * e - b * d])
         return np.array([x @ spatial[3:], y @ spatial[3:], normal @ spatial[:3]]), normal
