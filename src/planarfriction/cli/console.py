@@ -42,12 +42,8 @@ def count_progress(label: str) -> Iterator[Callable[[int, int, str], None]]:
 @contextmanager
 def _bar() -> Iterator[Progress]:
     console = Console(stderr=True)
-    columns = (
-        SpinnerColumn(),
-        TextColumn("{task.description}", markup=False),
-        BarColumn(bar_width=30),
-        TimeElapsedColumn(),
-    )
+    words = TextColumn("{task.description}", markup=False)
+    columns = SpinnerColumn(), words, BarColumn(bar_width=30), TimeElapsedColumn()
     bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
     if bar.disable:  # not even begun: rich before 15 ends such a bar with an empty line
         yield bar

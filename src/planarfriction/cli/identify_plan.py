@@ -100,15 +100,9 @@ def plan(
     patch, law = _known(measured, patch, names, values, spread)
     loads = list(normal_force) or sorted({float(f"{log.normal_force.mean():.3g}") for log in measured}) or [1.0]
     motions = candidate_motions(patch, law, normal_force=loads, **motion)
-    found = design_experiment(
-        patch,
-        law,
-        logs=measured,
-        motions=motions,
-        parameters=names,
-        wanted=None if wanted is None else [name.strip() for name in wanted.split(",")],
-        noise=spread,
-    )
+    chosen = None if wanted is None else [name.strip() for name in wanted.split(",")]
+    options = {"parameters": names, "wanted": chosen, "noise": spread}
+    found = design_experiment(patch, law, logs=measured, motions=motions, **options)
     print(found.table())
     if out is not None:
         output.write_csv(out, columns_of(found.best))

@@ -138,16 +138,8 @@ class Film:
         handles: list[Any] = [Line2D([], [], color=style.PALETTE[2], linewidth=2.2, label=words), self.centre]
         if len(self.track.contacts) > 1:  # one has its colours beside its cells
             handles += [Patch(color=STICK, label="sticks"), Patch(color=SLIP, label="slips")]
-        self.figure.legend(
-            handles=handles,
-            loc="lower left",
-            bbox_to_anchor=(0.03, 0.0),
-            ncols=len(handles),
-            frameon=False,
-            fontsize="small",
-            columnspacing=1.2,
-            handlelength=1.4,
-        )
+        look = {"frameon": False, "fontsize": "small", "columnspacing": 1.2, "handlelength": 1.4}
+        self.figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.03, 0.0), ncols=len(handles), **look)
 
     def _moved(self, frame: int) -> str:
         """Return the distance that the body has moved, in units that fit the whole motion."""

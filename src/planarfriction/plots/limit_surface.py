@@ -74,16 +74,10 @@ def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any
         raise MissingExtraError("plotly", "plotly") from None
     figure = make_subplots(cols=len(names), specs=[[{"type": "scene"}] * len(names)], subplot_titles=names)
     for column, (directions, mesh) in enumerate(scaled):
-        drawn = go.Surface(
-            **dict(zip("xyz", np.moveaxis(mesh, -1, 0), strict=True)),
-            customdata=np.round(directions, 6).tolist(),  # the page reads arrays of two dimensions alone
-            hovertemplate=_UNDER_THE_POINTER,
-            colorscale="Cividis",
-            cmin=-limit,
-            cmax=limit,
-            showscale=False,
-        )
-        figure.add_trace(drawn, row=1, col=column + 1)
+        points = dict(zip("xyz", np.moveaxis(mesh, -1, 0), strict=True))
+        points["customdata"] = np.round(directions, 6).tolist()  # the page reads arrays of two dimensions alone
+        look = {"hovertemplate": _UNDER_THE_POINTER, "colorscale": "Cividis", "showscale": False}
+        figure.add_trace(go.Surface(**points, **look, cmin=-limit, cmax=limit), row=1, col=column + 1)
     scene: dict[str, Any] = {"aspectmode": "cube", "camera": {"eye": {"x": 1.5, "y": -2.2, "z": 1.0}}}
     for name, text in zip("xyz", _AXES, strict=True):
         scene[f"{name}axis"] = {"range": [-limit, limit], "title": {"text": text}}

@@ -92,15 +92,8 @@ def _draw_cells(axes, patch: pf.ContactPatch, grid: pf.Grid, pressure: np.ndarra
 def _draw_points(axes, patch: pf.ContactPatch, force: np.ndarray, normal_force: float | None):
     share = force / force.max() if force.any() else np.zeros_like(force)
     unit = style.unit_for("force", force) if normal_force is not None else style.Unit(1.0, "-")
-    points = axes.scatter(
-        *(1e3 * patch.positions.T),
-        s=30 + 170 * share,
-        c=unit.factor * force,
-        cmap=style.PRESSURE_MAP,
-        vmin=0.0,
-        edgecolor="0.3",
-        linewidth=0.6,
-    )
+    look = {"cmap": style.PRESSURE_MAP, "vmin": 0.0, "edgecolor": "0.3", "linewidth": 0.6}
+    points = axes.scatter(*(1e3 * patch.positions.T), s=30 + 170 * share, c=unit.factor * force, **look)
     axes.margins(0.2)
     name = "share of the normal force" if normal_force is None else "normal force"
     return points, f"{name} [{unit.label}]"

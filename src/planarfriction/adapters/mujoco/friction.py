@@ -174,27 +174,15 @@ class Friction:
         joints = np.flatnonzero(self.m.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE))
         free = np.array([joints, self.m.jnt_dofadr[joints]], np.int64)
         self._kept = problem, columns, free, packed
-        return row_of(
-            Host(
-                nv=self.m.nv,
-                nuserdata=self.m.nuserdata,
-                count=k,
-                states=self.coupled.state_shape[0],
-                words=packed.words,
-                scratch_words=scratch.size,
-                problem=place_of(problem),
-                patches=place_of(packed.row),
-                solve=kernels.solve_address(),
-                plan=loops.plan_address(),
-                free_count=len(joints),
-                free_joints=place_of(free),
-                free_dofs=place_of(free) + 8 * len(joints),
-                memory=self._memory,
-                scratch=scratch.offsets,
-                **dict(zip(names, (place_of(columns) + 8 * k * np.arange(6)).tolist(), strict=True)),
-                **layout(),
-            )
-        )
+        places = dict(zip(names, (place_of(columns) + 8 * k * np.arange(6)).tolist(), strict=True))
+        host = Host(
+            nv=self.m.nv, nuserdata=self.m.nuserdata, count=k, states=self.coupled.state_shape[0], words=packed.words,
+            scratch_words=scratch.size, problem=place_of(problem), patches=place_of(packed.row),
+            solve=kernels.solve_address(), plan=loops.plan_address(), free_count=len(joints),
+            free_joints=place_of(free), free_dofs=place_of(free) + 8 * len(joints),
+            memory=self._memory, scratch=scratch.offsets, **places, **layout(),
+        )  # fmt: skip
+        return row_of(host)
 
 
 @functools.cache
