@@ -15,6 +15,7 @@ from planarfriction.compiler.calls import address_of, call
 from planarfriction.coupling import CoupledPatches, CoupledStep, HostStep
 from planarfriction.kernels.steps import SLOPES, WORDS
 from planarfriction.patch import friction_metric
+from tests.support.rate_laws import BoucWen
 from tests.support.coupling_problems import random_bodies, random_patches, random_run
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
@@ -36,6 +37,8 @@ MODELS = {
     "distributed, asymmetric": pf.DistributedModel(LOPSIDED, LAW),
     "reduced": pf.ReducedModel(DISC, LAW),
     "reduced, plain": pf.ReducedModel(DISC, PLAIN),
+    "distributed, a rate of its own": pf.DistributedModel(DISC, BoucWen()),
+    "distributed, a rate of its own, grain": pf.DistributedModel(GRAINED, BoucWen()),
     "reduced, grain": pf.ReducedModel(GRAINED, LAW),
     "reduced, four parts": pf.ReducedModel(DISC, LAW, parts=4),
     "published": pf.ReducedModelPublished(DISC, LAW),

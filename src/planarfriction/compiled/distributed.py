@@ -15,6 +15,8 @@ from planarfriction.compiled.rates import linearised
 from planarfriction.compiler.memory import places_of, rows_of
 from planarfriction.kernels import cells as contacts
 from planarfriction.kernels import distributed_step as steps
+from planarfriction.kernels.contacts import ModelFunctions
+from planarfriction.kernels.steps import StepFunctions
 
 
 class CompiledDistributed(CompiledModel):
@@ -22,12 +24,20 @@ class CompiledDistributed(CompiledModel):
 
     def __init__(self, law: Any, patch: Any) -> None:
         self.law, self.patch = law, patch
-        kinds = (contacts.ISOTROPIC, steps.ISOTROPIC), (contacts.TURNED, steps.TURNED)
-        self._contact, functions = kinds[patch.anisotropic]
-        if patch.asymmetric:
-            self._contact, functions = contacts.ASYMMETRIC, steps.ASYMMETRIC
+        self._contact, functions = self._functions()
         cells = len(patch.positions)
         super().__init__(functions, (2, cells), (2, 2, cells))
+
+    def _functions(self) -> tuple[ModelFunctions, StepFunctions]:
+        if self.patch.asymmetric:
+            return contacts.ASYMMETRIC, steps.ASYMMETRIC
+        turned = self.patch.anisotropic
+        return (contacts.TURNED, steps.TURNED) if turned else (contacts.ISOTROPIC, steps.ISOTROPIC)
+
+    def _record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
+        """Return the record of a contact, and how many numbers of a linearisation each cell has."""
+        rows = contacts.LEANING if self.patch.asymmetric else contacts.STRAIGHT
+        return contacts.CellsContact(self.law.numbers, numbers.shape[1], numbers, weights), rows
 
     # ------------------------------------------------------------------ at given loads
 
@@ -47,6 +57,21 @@ class CompiledDistributed(CompiledModel):
         cells = state.shape[-1]
         lin = linearised(contact.joined, state.reshape(load.size, 2 * cells), twist.reshape(-1, 3))
         return lin.reshape(*load.shape, lin.shape[-1] // cells, cells)
+
+    def slopes(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> Any:
+        """Return the derivatives of the rates of cells, and of their tractions per unit load, by state and velocity.
+
+        Four arrays `[..., 2, 2, N]`; the velocity is that which a cell sees.
+        """
+        law, identity, lin = self.law.numbers, np.eye(2)[:, :, None], self.linearisation(state, twist, load)
+        bristle = lin[..., 7:9, :] if self.patch.asymmetric else state
+        k, k_z, k_v = lin[..., :1, None, :], lin[..., None, 1:3, :], lin[..., None, 3:5, :]
+        by_state = -k * identity - bristle[..., :, None, :] * k_z
+        by_velocity = identity - bristle[..., :, None, :] * k_v
+        if self.patch.asymmetric:
+            by_velocity = lin[..., 9:13, :].reshape(by_state.shape)
+        pull_state, pull_velocity = law.sigma_0 * identity + law.sigma_1 * by_state, law.sigma_2 * identity
+        return by_state, by_velocity, -pull_state, -(pull_velocity + law.sigma_1 * by_velocity)
 
     # ------------------------------------------------------------------ for the loops of others
 
@@ -69,13 +94,13 @@ class CompiledDistributed(CompiledModel):
         if chosen is None:
             chosen = np.ones(weights.shape[1], bool)
         weights, positions = np.ascontiguousarray(weights), self.patch.positions[chosen]
-        count, law, numbers = len(positions), self.law.numbers, self._numbers(chosen)
-        record = contacts.CellsContact(law, count, numbers, weights)
+        count, numbers = len(positions), self._numbers(chosen)
+        record, rows = self._record(numbers, weights)
         return PackedModel(
             self._contact,
             rows_of(record, len(weights), weights=places_of(weights)),
             2 * count,
-            (contacts.LEANING if self.patch.asymmetric else contacts.STRAIGHT) * count,
+            rows * count,
             np.full(2 * count, self.law.largest_deflection),
             float(np.hypot(*(positions - positions.mean(axis=0)).T).mean()),
             (weights, numbers),

@@ -9,6 +9,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.laws.base import refuse_rate_law
 from planarfriction.kernels import tangent
 from planarfriction.kernels.body import System
 from planarfriction.kernels.tangent import Drives
@@ -89,6 +90,9 @@ class SceneInputs:
             raise InvalidValueError("scene", "be a Scene", type(scene).__name__)
         self._scene, driven = scene, scene.velocity is not None
         parameters = validation.choices("parameters", parameters, SCENE_PARAMETERS)
+        if "mu" in parameters:
+            for contact in scene.contacts:
+                refuse_rate_law(contact.model.law, "derivatives by mu")
         initial = validation.choices("initial", initial, STATES[3:] if driven else STATES)
         self._knots = _knots_of(scene, parameters, signals)
         numbers = [(name, SCENE_PARAMETERS[name], 0) for name in parameters]

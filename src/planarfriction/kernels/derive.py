@@ -29,7 +29,7 @@ class NotStraightError(TypeError):
     """A function for which `derive` cannot write a derivative."""
 
 
-class _Step(NamedTuple):
+class Step(NamedTuple):
     """One step of a function, taken apart."""
 
     targets: list[str]
@@ -40,7 +40,7 @@ class _Step(NamedTuple):
     """Line of the step, written anew where it has to keep a tape."""
 
 
-class _Walk:
+class Walk:
     """A function taken apart into steps that do one thing each, every variable assigned once."""
 
     def __init__(self, function: Callable, by: Iterable[str], vectors: Iterable[str]):
@@ -51,7 +51,7 @@ class _Walk:
         self.globals = {**self.function.__globals__, **inspect.getclosurevars(self.function).nonlocals, "xp": xp}
         self.names: dict[str, Any] = dict(NAMES)
         self.lines: list[str] = []
-        self.steps: list[_Step] = []
+        self.steps: list[Step] = []
         self.results: list[str] = []
         self.count = 0
         definition = self._definition()
@@ -199,18 +199,20 @@ class _Walk:
     def _vector(self, items: list[str]) -> str:
         target = self.emit(f"({', '.join(items)},)")
         pulls = {i: f"{{b}}[{i}]" for i in range(len(items))}
-        return self._taken([target], items, Rule("v", {}, pulls))[0]
+        pushes = {i: "(" + ", ".join("{d}" if i == j else "0.0" for j in range(len(items))) + ",)" for i in pulls}
+        return self._taken([target], items, Rule("v", {}, pulls, {}, pushes))[0]
 
     def _item(self, vector: str, i: int) -> str:
         target = self.emit(f"{vector}[{i}]")
-        return self._taken([target], [vector], Rule("s", {}, {0: f"placed({{0}}, {i}, {{b}})"}))[0]
+        how = Rule("s", {}, {0: f"placed({{0}}, {i}, {{b}})"}, {}, {0: f"{{d}}[{i}]"})
+        return self._taken([target], [vector], how)[0]
 
     def _taken(self, targets: list[str], atoms: list[str], how: Rule | Derivative) -> list[str]:
         """Note a step and the kinds of its results."""
         self.vectors.update(name for name, kind in zip(targets, how.results, strict=True) if kind == "v")
         if any(self._inside(atom) for atom in atoms):
             self.active.update(targets)
-            self.steps.append(_Step(targets, atoms, how, len(self.lines) - 1))
+            self.steps.append(Step(targets, atoms, how, len(self.lines) - 1))
         return targets
 
     def _inside(self, atom: str) -> list[str]:
@@ -234,7 +236,7 @@ class _Walk:
         self.lines.append(f"{', '.join(targets)} = {path}({', '.join(atoms)})")
         return self._taken(targets, atoms, how)
 
-    def keep_tape(self, step: _Step, inner: Derivative) -> tuple[str, str]:
+    def keep_tape(self, step: Step, inner: Derivative) -> tuple[str, str]:
         """Let the step of a derived function keep its tape; return the name of that and of its way back."""
         tape = self._new("tape")
         name = f"{inner.function.__name__.strip('_')}_{self.count}"
@@ -271,7 +273,7 @@ _COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: 
 class _WayBack:
     """Cotangents through the steps of a function, last step first, which add partial derivatives to its lines."""
 
-    def __init__(self, walk: _Walk, live: tuple[int, ...]):
+    def __init__(self, walk: Walk, live: tuple[int, ...]):
         self.walk, self.lines, self.count = walk, [], 0
         self.bars: dict[str, str] = {}
         for i, result in enumerate(live):
@@ -304,7 +306,7 @@ class _WayBack:
         """Return the cotangent of a name, zero where the results do not depend on it."""
         return self.bars.get(name) or (f"zeros({name})" if name in self.walk.vectors else "0.0")
 
-    def _by_rule(self, step: _Step, rule: Rule, found: list[str]) -> None:
+    def _by_rule(self, step: Step, rule: Rule, found: list[str]) -> None:
         results = {"t": step.targets[0], **{f"t{r}": target for r, target in enumerate(step.targets)}}
         kept = {}
         for key, text in rule.slopes.items():
@@ -327,7 +329,7 @@ class _WayBack:
         """Return the name that holds a partial derivative, found on the way forth."""
         return text if text.replace(".", "_").isidentifier() else self.walk.emit(text, "slope")
 
-    def _by_derivative(self, step: _Step, inner: Derivative, found: list[str]) -> None:
+    def _by_derivative(self, step: Step, inner: Derivative, found: list[str]) -> None:
         inner = derive(inner.function, inner.by, inner.vectors, tuple(i for i, bar in enumerate(found) if bar))
         tape, name = self.walk.keep_tape(step, inner)
         pulled = self.emit(f"{name}({tape}, ({''.join(bar + ', ' for bar in found if bar)}))", "bars")
@@ -364,7 +366,7 @@ def derive(
     `live` the results that have a cotangent, unless all do.
     Raises `NotStraightError` with the line that cannot be taken apart. The text depends on nothing but the sources.
     """
-    walk = _Walk(function, by, vectors)
+    walk = Walk(function, by, vectors)
     back = _WayBack(walk, tuple(range(len(walk.results))) if live is None else live)
     wanted = [back.cotangent(walk.outer(name)) for name in by]
     lines = [*back.lines, f"return ({''.join(name + ', ' for name in wanted)})"]
@@ -373,8 +375,8 @@ def derive(
     forth = [*walk.lines, f"return ({''.join(name + ', ' for name in walk.results)}), ({tape})"]
     heads = ", ".join(walk.first[name] for name in walk.arguments)
     unpack = [f"({tape}) = tape"] if tape else []
-    source = _text(f"forth({heads})", forth) + "\n\n" + _text("back(tape, bars)", unpack + lines)
-    space = _compiled(walk.where, source, walk.names)
+    source = text_of(f"forth({heads})", forth) + "\n\n" + text_of("back(tape, bars)", unpack + lines)
+    space = run_source(walk.where, source, walk.names)
     kinds = "".join("v" if result in walk.vectors else "s" for result in walk.results)
     forward, backward = kernel(space["forth"]), kernel(space["back"])
     return Derivative(walk.function, tuple(walk.arguments), by, vectors, kinds, source, forward, backward)
@@ -384,11 +386,11 @@ def _names(text: str) -> set[str]:
     return {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
 
 
-def _text(head: str, lines: list[str]) -> str:
+def text_of(head: str, lines: list[str]) -> str:
     return "\n    ".join([f"def {head}:", *lines]) + "\n"
 
 
-def _compiled(where: str, source: str, names: dict[str, Any]) -> dict[str, Any]:
+def run_source(where: str, source: str, names: dict[str, Any]) -> dict[str, Any]:
     """Run generated source, and let tracebacks show it."""
     file = f"<derivative of {where} {hashlib.sha256(source.encode()).hexdigest()[:8]}>"
     linecache.cache[file] = len(source), None, source.splitlines(True), file

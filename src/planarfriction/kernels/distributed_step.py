@@ -61,7 +61,8 @@ class CellSlopes(NamedTuple):
 
 
 @kernel
-def _pulled(back, results, tape):
+def pulled(back, results, tape):
+    """Return `CellSlopes` from the way back of two vectors by z and u."""
     (new, traction), none, x, y = results, (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)
     (new_zx, new_ux), (new_zy, new_uy) = back(tape, (x, none)), back(tape, (y, none))
     (zx, ux), (zy, uy) = back(tape, (none, x)), back(tape, (none, y))
@@ -78,9 +79,9 @@ def _cell_slopes(lever, law, own, i, z, u, dt):
     """Return `CellSlopes` of cell i."""
     if lever.leans:
         results, tape = _forth_leaning(law, _lean(own, i), z, u, dt)
-        return _pulled(_back_leaning, results, tape)
+        return pulled(_back_leaning, results, tape)
     found, path = _forth(law, z, u, dt)
-    return _pulled(_back, found, path)
+    return pulled(_back, found, path)
 
 
 @kernel
@@ -129,13 +130,13 @@ def _slopes(lever, whole, law, own, z, twist, dt, new, out):
         total = plus(total, own.weights[i], lever.wrench(one, found.traction))
         by_twist = plus(by_twist, own.weights[i], lever.around(one, found.traction_u))
         if whole:
-            _put_cell(lever, one, own.weights[i], found, i, n, at(out, SLOPES))
+            put_cell(lever, one, own.weights[i], found, i, n, at(out, SLOPES))
     put(out, total)
     put_all(at(out, 3), by_twist)
 
 
 @kernel
-def _put_cell(lever, one, weight, found, i, n, out):
+def put_cell(lever, one, weight, found, i, n, out):
     """Write the derivatives of cell i to its places in d new/dV [2, n, 3], dW/dz [3, 2, n] and d new/dz [2, 2, n]."""
     (xx, xy, yx, yy), (ux, uy, vx, vy) = times(weight, found.traction_z), found.new_u
     put(at(out, 3 * i), lever.wrench(one, (ux, uy)))

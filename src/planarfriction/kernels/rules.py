@@ -23,8 +23,8 @@ _NONE: Mapping = MappingProxyType({})
 class Rule(NamedTuple):
     """Derivative of a function that is not taken apart.
 
-    In its texts `{0}`, `{1}` stand for the arguments, `{t}` for the result (`{t0}`, `{t1}` for several) and `{b}` for
-    its cotangent.
+    In its texts `{0}`, `{1}` stand for the arguments, `{t}` for the result (`{t0}`, `{t1}` for several), `{b}` for its
+    cotangent and `{d}` for the change of an argument.
     """
 
     results: str
@@ -35,6 +35,8 @@ class Rule(NamedTuple):
     """Cotangent of argument i, where a derivative of a vector would be a matrix."""
     names: Mapping[str, Any] = _NONE
     """Functions that the texts name, beside those of `NAMES`."""
+    pushes: Mapping[int, str] = _NONE
+    """Change of the result with argument i, where `pulls` has its cotangent."""
 
 
 @kernel
@@ -77,9 +79,14 @@ def _slip_by_breakaway(deflection, breakaway):
     return formulas.bristle_decay_by_breakaway(xp, _slip_slope(deflection, breakaway), deflection, breakaway)
 
 
+def _vectors(results: str, pulls: dict, pushes: dict) -> Rule:
+    """Return the rule of a function of vectors, from its cotangents and its changes."""
+    return Rule(results, {}, pulls, {}, pushes)
+
+
 NAMES: dict[str, Any] = {
     "dot": dot, "formulas": formulas, "log_or_0": _log, "per": per, "placed": placed, "plus": plus,
-    "power_slope": _power_slope, "slip_by_breakaway": _slip_by_breakaway, "slip_slope": _slip_slope, "times": times,
+    "power_slope": _power_slope, "ratio": ratio, "slip_by_breakaway": _slip_by_breakaway, "slip_slope": _slip_slope, "times": times,
     "xp": xp, "zeros": zeros,
 }  # fmt: skip
 """Functions that generated code and the texts of rules name."""
@@ -90,12 +97,18 @@ RULES: dict[Any, Rule] = {
     ast.Mult: Rule("s", {0: "{1}", 1: "{0}"}),
     ast.Div: Rule("s", {0: "1.0 / {1}"}),  # only the numerator: `derive` writes other quotients as products
     ast.USub: Rule("s", {0: "-1.0"}),
-    plus: Rule("v", {}, {0: "{b}", 1: "dot({b}, {2})", 2: "times({1}, {b})"}),
-    times: Rule("v", {}, {0: "dot({b}, {1})", 1: "times({0}, {b})"}),
-    dot: Rule("s", {}, {0: "times({b}, {1})", 1: "times({b}, {0})"}),
-    vectors.square: Rule("s", {}, {0: "times(2.0 * {b}, {0})"}),
+    plus: _vectors(
+        "v",
+        {0: "{b}", 1: "dot({b}, {2})", 2: "times({1}, {b})"},
+        {0: "{d}", 1: "times({d}, {2})", 2: "times({1}, {d})"},
+    ),
+    times: _vectors("v", {0: "dot({b}, {1})", 1: "times({0}, {b})"}, {0: "times({d}, {1})", 1: "times({0}, {d})"}),
+    dot: _vectors("s", {0: "times({b}, {1})", 1: "times({b}, {0})"}, {0: "dot({d}, {1})", 1: "dot({0}, {d})"}),
+    vectors.square: _vectors("s", {0: "times(2.0 * {b}, {0})"}, {0: "2.0 * dot({0}, {d})"}),
     # times the unit vector: one over a norm of 1e-160 leaves no room for another factor
-    vectors.norm: Rule("s", {"per": "per({t})"}, {0: "times({b}, times({per}, {0}))"}),
+    vectors.norm: Rule(
+        "s", {"per": "per({t})"}, {0: "times({b}, times({per}, {0}))"}, {}, {0: "ratio(dot({0}, {d}), {t})"}
+    ),
     math.sqrt: Rule("s", {0: "0.5 * per({t})"}),
     per: Rule("s", {0: "-{t} * {t}"}),
     ratio: Rule("s", {0: "per({1})", 1: "-{t} * per({1})"}),  # no square of `per`, which 1e-160 takes out of range

@@ -1,11 +1,16 @@
 """Friction laws: frozen parameters with validation (the equations are in `planarfriction.formulas`)."""
 
+from typing import TYPE_CHECKING, Any
+
 from planarfriction.families import LAWS
 from planarfriction.laws.base import FrictionLaw
 from planarfriction.laws.coulomb import Coulomb
 from planarfriction.laws.coulomb_stribeck import CoulombStribeck
 from planarfriction.laws.dahl import Dahl
 from planarfriction.laws.lugre import ElastoPlastic, LuGre
+
+if TYPE_CHECKING:
+    from planarfriction.laws.rate_law import RateLaw
 
 __all__ = [
     "LAWS",
@@ -15,10 +20,19 @@ __all__ = [
     "ElastoPlastic",
     "FrictionLaw",
     "LuGre",
+    "RateLaw",
     "register",
 ]
 
 register = LAWS.register
+
+
+def __getattr__(name: str) -> Any:
+    if name == "RateLaw":  # brings the compiler with it, which laws of numbers do not need
+        from planarfriction.laws.rate_law import RateLaw
+
+        return RateLaw
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -26,7 +26,7 @@ class FrictionLaw(Checked):
 
     @property
     def numbers(self) -> LawNumbers:
-        """The numbers that the law puts into the formulas; a new law must define only this."""
+        """The numbers that the law puts into the formulas; a new law of this form must define only this."""
         raise NotImplementedError
 
     @property
@@ -45,17 +45,17 @@ class FrictionLaw(Checked):
         share = speed / (speed + law.creep_speed) if law.creep_speed > 0.0 else 1.0
         return formulas.stribeck(np, speed, law) * share + law.sigma_2 * speed
 
-    def rate(self, state: ArrayLike, velocity: ArrayLike, *, axis: int | None = None) -> np.ndarray:
-        """Return the rate `zdot = v - k z` [m/s] of bristles with deflection `state` [m]; both broadcast.
+    @property
+    def holds_at_rest(self) -> bool:
+        """True if a bristle that is not driven keeps its deflection, so that a contact can stick under a load."""
+        return self.numbers.creep_speed == 0.0
 
-        Raises InvalidValueError for shapes that do not broadcast.
+    def rate(self, state: ArrayLike, velocity: ArrayLike, *, axis: int | None = None) -> np.ndarray:
+        """Return the rate `zdot` [m/s] of bristles with deflection `state` [m] driven at `velocity` [m/s].
+
+        Both broadcast. Raises InvalidValueError for shapes that do not broadcast.
         """
-        z, v = _bristles(state, velocity, axis)
-        law, length, speed = self.numbers, _norm(z, axis), _norm(v, axis)
-        product = z * v if axis is None else (z * v).sum(axis=axis, keepdims=True)
-        along = product / np.where(length > 0.0, length, 1.0)
-        grip = law.sigma_0 / formulas.stribeck(np, speed, law)
-        return v - formulas.bristle_decay(np, length * grip, along, speed, grip, law) * z
+        return self._bristle(*_bristles(state, velocity, axis), axis)[0]
 
     def force(
         self, state: ArrayLike, velocity: ArrayLike, normal_force: ArrayLike, *, axis: int | None = None
@@ -70,7 +70,16 @@ class FrictionLaw(Checked):
         if axis is not None:
             load = np.expand_dims(load, axis)
         validation.broadcast(state=z, velocity=v, normal_force=load)
-        return load * formulas.traction(z, self.rate(z, v, axis=axis), v, self.numbers)
+        return load * self._bristle(z, v, axis)[1]
+
+    def _bristle(self, z: np.ndarray, v: np.ndarray, axis: int | None) -> tuple[np.ndarray, np.ndarray]:
+        """Return the rates of bristles and their tractions per unit load; checked arrays that broadcast."""
+        law, length, speed = self.numbers, _norm(z, axis), _norm(v, axis)
+        product = z * v if axis is None else (z * v).sum(axis=axis, keepdims=True)
+        along = product / np.where(length > 0.0, length, 1.0)
+        grip = law.sigma_0 / formulas.stribeck(np, speed, law)
+        rate = v - formulas.bristle_decay(np, length * grip, along, speed, grip, law) * z
+        return rate, formulas.traction(z, rate, v, law)
 
 
 def _bristles(state: Any, velocity: Any, axis: int | None) -> tuple[np.ndarray, np.ndarray]:
@@ -87,8 +96,21 @@ def refuse_creep(law: Any, by: str) -> None:
     """Raise unless `law` is a law of bristles that keeps what sticks where it is."""
     if not isinstance(law, FrictionLaw):
         raise InvalidValueError("law", "be a friction law of bristles, such as LuGre", law)
-    if law.numbers.creep_speed > 0.0:
+    if not law.holds_at_rest:
         raise InvalidValueError("law", f"have no creep_speed for {by} (DistributedModel takes any law)", law)
+
+
+def is_rate_law(law: Any) -> bool:
+    """Return True for a law whose bristles follow a function of their own (`RateLaw`)."""
+    return hasattr(law, "bristle_rate")
+
+
+def refuse_rate_law(law: Any, by: str) -> None:
+    """Raise for a law whose bristles follow a function of their own, where only the formulas of bristles will do."""
+    if is_rate_law(law):
+        raise InvalidValueError(
+            "law", f"have the bristles of LuGre for {by}, not a rate of its own", type(law).__name__
+        )
 
 
 def _norm(vector: np.ndarray, axis: int | None) -> np.ndarray:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from planarfriction.compiled.distributed import CompiledDistributed
-from planarfriction.laws.base import refuse_creep
+from planarfriction.compiled.rate_cells import CompiledRateCells
+from planarfriction.laws.base import is_rate_law, refuse_creep, refuse_rate_law
 from planarfriction.models.base import FrictionModel, ModelJacobians
 
 
@@ -33,6 +34,7 @@ class DistributedModel(FrictionModel):
         super().__post_init__()
         if self.patch.asymmetric:
             refuse_creep(self.law, "patches with an asymmetry")  # at rest they would push
+            refuse_rate_law(self.law, "patches with an asymmetry")
 
     @property
     def state_shape(self) -> tuple[int, ...]:
@@ -42,7 +44,7 @@ class DistributedModel(FrictionModel):
     @functools.cached_property
     def compiled(self) -> CompiledDistributed:
         """Machine form of the model (see `FrictionModel.compiled`)."""
-        return CompiledDistributed(self.law, self.patch)
+        return (CompiledRateCells if is_rate_law(self.law) else CompiledDistributed)(self.law, self.patch)
 
     def jacobians(self, state: Any, twist: Any, normal_force: Any) -> ModelJacobians:
         """Return the analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); one-sided at kinks.
@@ -50,24 +52,14 @@ class DistributedModel(FrictionModel):
         Raises InvalidValueError as `step` does.
         """
         state, twist, load = self._inputs(state, twist, normal_force)
-        law, identity = self.law.numbers, np.eye(2)[:, :, None]
-        lin, lever = self.compiled.linearisation(state, twist, load), self.compiled.lever
-        bristle = lin[..., 7:9, :] if self.patch.asymmetric else state
-        k, k_z, k_v = lin[..., :1, None, :], lin[..., None, 1:3, :], lin[..., None, 3:5, :]
-        rate_state = -k * identity - bristle[..., :, None, :] * k_z
-        rate_velocity = identity - bristle[..., :, None, :] * k_v
-        if self.patch.asymmetric:
-            rate_velocity = lin[..., 9:13, :].reshape(rate_state.shape)
-        rate_twist = np.einsum("...abn,dbn->...and", rate_velocity, lever)
-        share = load[..., None] * self.patch.weights(load)
-        force_state = -(law.sigma_0 * identity + law.sigma_1 * rate_state) * share[..., None, None, :]
-        force_velocity = -(law.sigma_2 * identity + law.sigma_1 * rate_velocity) * share[..., None, None, :]
+        lever, share = self.compiled.lever, (load[..., None] * self.patch.weights(load))[..., None, None, :]
+        rate_state, rate_velocity, pull_state, pull_velocity = self.compiled.slopes(state, twist, load)
         return ModelJacobians(
             rate_state,
-            rate_twist,
+            np.einsum("...abn,dbn->...and", rate_velocity, lever),
             np.zeros_like(state),
-            np.einsum("dan,...abn->...dbn", lever, force_state),
-            np.einsum("dan,...abn,ebn->...de", lever, force_velocity, lever),
+            np.einsum("dan,...abn->...dbn", lever, share * pull_state),
+            np.einsum("dan,...abn,ebn->...de", lever, share * pull_velocity, lever),
             self.compiled.evaluate(state, twist, load)[1],
         )
 

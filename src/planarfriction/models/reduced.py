@@ -11,7 +11,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.compiled.reduced import REDUCED
 from planarfriction.errors import InvalidValueError
-from planarfriction.laws.base import refuse_creep
+from planarfriction.laws.base import refuse_creep, refuse_rate_law
 from planarfriction.models.part_shapes import ReducedShapes
 from planarfriction.models.reduced_map import POINT, ReducedShape, is_point
 from planarfriction.models.three_states import ThreeStateModel
@@ -70,6 +70,7 @@ class ReducedModel(ThreeStateModel):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        refuse_rate_law(self.law, "ReducedModel")
         refuse_creep(self.law, "ReducedModel")  # its stored steady state is that of bristles without creep
         object.__setattr__(self, "segments", validation.count("segments", self.segments, 4, MOST_SEGMENTS))
         object.__setattr__(self, "speeds", validation.count("speeds", self.speeds, 5, MOST_SPEEDS))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from planarfriction import validation
 from planarfriction.compiled.published import PUBLISHED
 from planarfriction.errors import InvalidValueError
+from planarfriction.laws.base import refuse_rate_law
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.models.published_shapes import PublishedShape, PublishedShapes
 from planarfriction.models.three_states import ThreeStateModel
@@ -46,6 +47,7 @@ class ReducedModelPublished(ThreeStateModel):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        refuse_rate_law(self.law, "ReducedModelPublished")
         validation.choice("on_load_change", self.on_load_change, ON_LOAD_CHANGE)
         if self.surface is None:
             object.__setattr__(self, "surface", LimitSurfaceTablePublished(self.patch))

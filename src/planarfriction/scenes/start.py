@@ -138,7 +138,7 @@ def _equilibrium(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> list[np.n
 def _held_by(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> tuple[_BristleField, list[int], np.ndarray]:
     """Return the cells of all contacts, the number of each contact's, and the load on the body that they hold."""
     for contact in scene.contacts:
-        if contact.model.law.numbers.creep_speed > 0.0:
+        if not contact.model.law.holds_at_rest:
             raise InvalidValueError("start", "be 'rest' or 'sliding' with a law that creeps", scene.start)
     applied = np.zeros(3) if scene.force is None else scene.force(0.0)
     pull = applied + scene.body.mass * np.array([*scene.body.gravity, 0.0])

@@ -11,7 +11,7 @@ from planarfriction import validation
 from planarfriction.derivatives.parameters import PARAMETERS
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws import FrictionLaw
-from planarfriction.laws.base import refuse_creep
+from planarfriction.laws.base import refuse_creep, refuse_rate_law
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors.inputs import broadcast, finite, non_negative, shaped
 from planarfriction.tensors.namespace import Namespace
@@ -99,6 +99,7 @@ class TensorModel:
     def refuse(patch: ContactPatch, law: FrictionLaw, name: str) -> None:
         """Raise InvalidValueError unless patch and law are ones that the model `name` can be made of."""
         validation.instance("patch", patch, ContactPatch, "a ContactPatch")
+        refuse_rate_law(law, name)
         refuse_creep(law, name)
 
     @property

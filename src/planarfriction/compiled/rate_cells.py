@@ -1,0 +1,51 @@
+"""Machine form of `DistributedModel` with a law that is a function of its own (`RateLaw`)."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from planarfriction.compiled.distributed import CompiledDistributed
+from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import cells
+from planarfriction.kernels.contacts import ModelFunctions
+from planarfriction.kernels.rate_cells import ROWS_OF_A_CELL
+from planarfriction.kernels.steps import StepFunctions
+
+
+class CompiledRateCells(CompiledDistributed):
+    """Machine form of a `DistributedModel` with a `RateLaw` on a patch."""
+
+    def _functions(self) -> tuple[ModelFunctions, StepFunctions]:
+        self._lever = cells.LEVERS if self.patch.anisotropic else cells.POSITIONS
+        return self.law.functions(self._lever)[1:]
+
+    def _record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
+        return self.law.contact(self._lever, numbers, weights), ROWS_OF_A_CELL
+
+    def slopes(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
+        """See `CompiledDistributed`."""
+        shape = *load.shape, state.shape[-1], ROWS_OF_A_CELL
+        rows = self.linearisation(state, twist, load).reshape(shape)[..., :16]
+        return np.moveaxis(rows.reshape(*shape[:-1], 4, 2, 2), (-4, -3), (-1, 0))
+
+
+def _finite(door: Callable) -> Callable:
+    """Return a door of steps or rates that raises where the law's functions leave the range of numbers."""
+
+    @functools.wraps(door)
+    def checked(self: CompiledRateCells, *inputs: Any) -> Any:
+        found = door(self, *inputs)
+        if found is not None and not all(np.isfinite(each).all() for each in found):
+            rule = "give finite rates and tractions at these inputs"
+            raise InvalidValueError("law", rule, type(self.law).__name__)
+        return found
+
+    return checked
+
+
+for _name in ("step_one", "step_batch", "jacobians_one", "evaluate", "step", "step_jacobians"):
+    setattr(CompiledRateCells, _name, _finite(getattr(CompiledDistributed, _name)))

@@ -1,0 +1,194 @@
+"""A contact of n cells whose law is a function of its own, `z' = f(z, u)` with the traction `t(z, u)` (`rate_law`).
+
+With `u = B V` of a cell (see `cells.Lever`) and the derivatives `A = df/dz`, `F = df/du`, `C = dt/dz`, `E = dt/du`,
+each [2, 2], `D = shift I - A` is inverted cell by cell; `W = sum w B' t`. The functions are those of
+`contacts.ModelFunctions` and `steps.StepFunctions`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from planarfriction.compiler import kernel
+from planarfriction.compiler.memory import Doubles, arrays_at, at, reader
+from planarfriction.kernels.cells import Lever
+from planarfriction.kernels.contacts import ROWS, ModelFunctions, functions_of
+from planarfriction.kernels.distributed_step import put_cell
+from planarfriction.kernels.rate_law import Bristle
+from planarfriction.kernels.steps import SLOPES, StepFunctions, step_functions
+from planarfriction.kernels.vectors import plus, put, put_all, three
+
+ROWS_OF_A_CELL = 20
+"""Numbers of a cell in a linearisation: A, F, C, E and the inverse of D, row by row."""
+
+
+@kernel
+def _matrix(m, i):
+    """Return the matrix [2, 2] whose four numbers begin at `m[i]`."""
+    return m[i], m[i + 1], m[i + 2], m[i + 3]
+
+
+@kernel
+def _applied(m, a):
+    return m[0] * a[0] + m[1] * a[1], m[2] * a[0] + m[3] * a[1]
+
+
+@kernel
+def _applied_back(m, a):
+    return m[0] * a[0] + m[2] * a[1], m[1] * a[0] + m[3] * a[1]
+
+
+@kernel
+def _product(m, n):
+    a, b = _applied(m, (n[0], n[2])), _applied(m, (n[1], n[3]))
+    return a[0], b[0], a[1], b[1]
+
+
+@kernel
+def evaluate(lever, bristle, read, contact, z, v, zdot, w):
+    """Write `z'`, and `W`."""
+    own, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
+    n = own.count
+    for i in range(n):
+        cell = lever.of(own, i)
+        rate, t = bristle.evaluate(own.law, (z[i], z[n + i]), lever.seen(cell, twist))
+        zdot[i], zdot[n + i] = rate
+        total = plus(total, own.weights[i], lever.wrench(cell, t))
+    put(w, total)
+
+
+@kernel
+def linearise(lever, bristle, read, contact, z, v, lin):
+    """Write A, F, C and E of each cell."""
+    own, twist = read(contact), three(v)
+    n = own.count
+    for i in range(n):
+        found = bristle.linearise(own.law, (z[i], z[n + i]), lever.seen(lever.of(own, i), twist))
+        put_all(at(lin, ROWS_OF_A_CELL * i), (*found.new_z, *found.new_u, *found.traction_z, *found.traction_u))
+
+
+@kernel
+def factor(lever, read, contact, z, shift, lin, stiffness):
+    """Invert D, write `sum w B' (C D^-1 F + E) B`."""
+    own, total = read(contact), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for i in range(own.count):
+        m = at(lin, ROWS_OF_A_CELL * i)
+        a, b, c, d = shift - m[0], -m[1], -m[2], shift - m[3]
+        per = 1.0 / (a * d - b * c)
+        inverse = per * d, -per * b, -per * c, per * a
+        m[16], m[17], m[18], m[19] = inverse
+        p = plus(_product(_matrix(m, 8), _product(inverse, _matrix(m, 4))), 1.0, _matrix(m, 12))
+        total = plus(total, own.weights[i], lever.around(lever.of(own, i), p))
+    put_all(stiffness, total)
+
+
+@kernel
+def eliminate(lever, read, contact, z, shift, r, lin, w):
+    """Write `sum w B' C D^-1 r`."""
+    own, total = read(contact), (0.0, 0.0, 0.0)
+    n = own.count
+    for i in range(n):
+        m = at(lin, ROWS_OF_A_CELL * i)
+        t = _applied(_matrix(m, 8), _applied(_matrix(m, 16), (r[i], r[n + i])))
+        total = plus(total, own.weights[i], lever.wrench(lever.of(own, i), t))
+    put(w, total)
+
+
+@kernel
+def back_substitute(lever, read, contact, z, r, dv, lin, out):
+    """Solve `D out = r + F B dV`."""
+    own, twist = read(contact), three(dv)
+    n = own.count
+    for i in range(n):
+        m = at(lin, ROWS_OF_A_CELL * i)
+        driven = _applied(_matrix(m, 4), lever.seen(lever.of(own, i), twist))
+        out[i], out[n + i] = _applied(_matrix(m, 16), plus(driven, 1.0, (r[i], r[n + i])))
+
+
+@kernel
+def change(lever, read, contact, z, zdot, lin, dz, dzdot, rows, friction, size):
+    """Write the changes of `z'` and of the wrench; at held friction, which has no single number here."""
+    own, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
+    n, twist = own.count, (rows.d_twist[0], rows.d_twist[1], rows.d_twist[2] + size * rows.twist[2])
+    for i in range(n):
+        m, cell, b = at(lin, ROWS_OF_A_CELL * i), lever.of(own, i), (dz[i], dz[n + i])
+        u = lever.seen(cell, twist)
+        dzdot[i], dzdot[n + i] = plus(_applied(_matrix(m, 0), b), 1.0, _applied(_matrix(m, 4), u))
+        t = plus(_applied(_matrix(m, 8), b), 1.0, _applied(_matrix(m, 12), u))
+        total = plus(total, own.weights[i], lever.wrench(cell, t))
+    put(rows.d_wrench, plus(total, size * rows.wrench[2], (0.0, 0.0, 1.0)))
+
+
+@kernel
+def solve_transposed(read, contact, z, r, lin, out):
+    """Solve `D' out = r`."""
+    n = read(contact).count
+    for i in range(n):
+        out[i], out[n + i] = _applied_back(_matrix(at(lin, ROWS_OF_A_CELL * i), 16), (r[i], r[n + i]))
+
+
+@kernel
+def pull_back(lever, read, contact, z, lin, dzdot, rows, out):
+    """Write the transpose of `change`."""
+    own, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
+    n, wrench = own.count, three(rows.d_wrench)
+    for i in range(n):
+        m, cell, rate = at(lin, ROWS_OF_A_CELL * i), lever.of(own, i), (dzdot[i], dzdot[n + i])
+        t = lever.seen(cell, wrench)
+        w = own.weights[i]
+        back = _applied_back(_matrix(m, 0), rate)
+        out[i], out[n + i] = plus(back, w, _applied_back(_matrix(m, 8), t))
+        u = plus(_applied_back(_matrix(m, 4), rate), w, _applied_back(_matrix(m, 12), t))
+        total = plus(total, 1.0, lever.wrench(cell, u))
+    put(rows.d_twist, total)
+
+
+@kernel
+def step(lever, bristle, read, contact, z, v, dt, new, out):
+    """Step the cells, and write the wrench at the end (see `steps.StepFunctions`)."""
+    own, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
+    n = own.count
+    for i in range(n):
+        cell = lever.of(own, i)
+        moved, t = bristle.step(own.law, (z[i], z[n + i]), lever.seen(cell, twist), dt)
+        new[i], new[n + i] = moved
+        total = plus(total, own.weights[i], lever.wrench(cell, t))
+    put(out, total)
+
+
+@kernel
+def slopes(lever, bristle, read, whole, contact, z, v, dt, new, out):
+    """Step with the slopes of the wrench, or with all derivatives."""
+    own, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
+    n, by_twist = own.count, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for i in range(n):
+        cell = lever.of(own, i)
+        found = bristle.linearise_step(own.law, (z[i], z[n + i]), lever.seen(cell, twist), dt)
+        new[i], new[n + i] = found.new
+        total = plus(total, own.weights[i], lever.wrench(cell, found.traction))
+        by_twist = plus(by_twist, own.weights[i], lever.around(cell, found.traction_u))
+        if whole:
+            put_cell(lever, cell, own.weights[i], found, i, n, at(out, SLOPES))
+    put(out, total)
+    put_all(at(out, 3), by_twist)
+
+
+_RATES = evaluate, linearise, factor, eliminate, back_substitute, change, solve_transposed, pull_back
+_STEPS = step, slopes
+
+
+class CellFunctions(NamedTuple):
+    """Compiled functions of contacts with a law and a kind of cells."""
+
+    record: Any
+    """Record of a contact: `law`, `count`, `cells`, `weights` as in `cells.CellsContact`."""
+    rates: ModelFunctions
+    steps: StepFunctions
+
+
+def cell_functions(name: str, law: Any, bristle: Bristle, lever: Lever) -> CellFunctions:
+    """Bind the functions of contacts to a record of numbers of a law, its bristle and a lever; compile none yet."""
+    fields = [("law", law), ("count", int), ("cells", Doubles), ("weights", Doubles)]
+    record = NamedTuple(f"{law.__name__}Cells", fields)
+    model = {"lever": lever, "bristle": bristle, "read": reader(record)}
+    return CellFunctions(record, functions_of(name, _RATES, **model), step_functions(name, _STEPS, **model))

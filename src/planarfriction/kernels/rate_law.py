@@ -1,0 +1,133 @@
+"""A bristle of a law that is a function of its own, `z' = rate(xp, law, z, u)`, with the derivatives `derive` writes.
+
+Its step is linearly implicit, of two stages (Rosenbrock; Verwer, Spee, Blom, Hundsdorfer 1999): with `A = dz'/dz` at
+the start and `g = 1 - 1/sqrt(2)`,
+
+    (I - g dt A) k = z'(z),   (I - g dt A) l = z'(p) - 2 k,   p = z + dt k,   new = z + dt (3 k + l)/2.
+
+It is of order 2 and damps what is stiff completely (L-stable). A bristle that is within its largest deflection never
+leaves it, so `p` and `new` are brought back there: bristles stay in bounds for any dt.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import inspect
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import kernel
+from planarfriction.kernels.derive import derive
+from planarfriction.kernels.distributed_step import pulled
+from planarfriction.kernels.forward import forward
+from planarfriction.kernels.vectors import norm, plus, times
+
+_SHARE = 1.0 - math.sqrt(0.5)
+"""g [-]"""
+
+_KNOWN = frozenset(("planarfriction", "math", "numpy", "numba", "builtins"))
+"""Packages whose versions and sources machine code is kept under anyway."""
+
+_LEAST = 0.1
+"""Least determinant of `I - g dt A`: that of a law whose bristles grow by themselves could vanish."""
+
+
+@kernel
+def traction(xp, law, z, zdot, u):
+    """Compute the traction per unit load, `-(sigma_0 z + sigma_1 z' + sigma_2 u)`, of a law that has none of its own."""
+    return plus(plus(times(-law.sigma_0, z), -law.sigma_1, zdot), -law.sigma_2, u)
+
+
+@kernel
+def _within(z, largest):
+    """Bring a bristle back to its largest deflection."""
+    size = norm(z)
+    return times(xp.where(size > largest, largest, 1.0) / xp.where(size > largest, size, 1.0), z)
+
+
+@kernel
+def _solved(a, b, c, d, per_determinant, r):
+    """Solve a system [2, 2] with the rows (a, b) and (c, d)."""
+    return per_determinant * (d * r[0] - b * r[1]), per_determinant * (a * r[1] - c * r[0])
+
+
+class Bristle(NamedTuple):
+    """Compiled functions of a bristle."""
+
+    evaluate: Any
+    """`(law, z, u)`: return z' and the traction."""
+    step: Any
+    """`(law, z, u, dt)`: return the bristle after dt and its traction."""
+    linearise: Any
+    """`(law, z, u)`: return z' and the traction with their derivatives, as `CellSlopes`."""
+    linearise_step: Any
+    """`(law, z, u, dt)`: return the bristle and its traction after dt with their derivatives."""
+
+
+@functools.cache
+def bristle_of(rate: Callable, pull: Callable = traction) -> Bristle:
+    """Return the functions of a bristle from `rate(xp, law, z, u)` and its traction `pull(xp, law, z, z', u)`."""
+    rate, pull = (each if hasattr(each, "py_func") else kernel(each) for each in (rate, pull))
+    z_name, u_name = list(inspect.signature(rate.py_func).parameters)[2:4]
+    pushed = forward(rate, (z_name,), (z_name, u_name))
+
+    @kernel
+    def evaluate(law, z, u):
+        zdot = rate(xp, law, z, u)
+        return zdot, pull(xp, law, z, zdot, u)
+
+    @kernel
+    def step(law, z, u, dt):
+        start, x = pushed(xp, law, z, u, (1.0, 0.0))
+        start, y = pushed(xp, law, z, u, (0.0, 1.0))
+        g = _SHARE * dt
+        a, b, c, d = 1.0 - g * x[0], -g * y[0], -g * x[1], 1.0 - g * y[1]
+        # without subtracting large numbers: the bristles of a law that dissipates have no negative determinant
+        apart = xp.maximum(g * x[0] * (g * y[1]) - g * x[1] * (g * y[0]), 0.0)
+        per = 1.0 / xp.maximum(1.0 - g * (x[0] + y[1]) + apart, _LEAST)
+        largest = xp.maximum(law.largest_deflection, norm(z))
+        k = _solved(a, b, c, d, per, start)
+        end = rate(xp, law, _within(plus(z, dt, k), largest), u)
+        l = _solved(a, b, c, d, per, plus(end, -2.0, k))
+        new = _within(plus(plus(z, 1.5 * dt, k), 0.5 * dt, l), largest)
+        return new, pull(xp, law, new, rate(xp, law, new, u), u)
+
+    return Bristle(evaluate, step, _slopes(evaluate), _slopes(step))
+
+
+def _slopes(function: Any) -> Any:
+    """Return a function that returns two vectors with their derivatives by z and u, as `CellSlopes`."""
+    written = derive(function, ("z", "u"), ("z", "u"))
+    forth, back = written.forth, written.back
+
+    @kernel
+    def slopes(*arguments):
+        found, tape = forth(*arguments)
+        return pulled(back, found, tape)
+
+    return slopes
+
+
+def fingerprint(*functions: Callable) -> str:
+    """Return a short text that changes with functions, and with what they use: other functions, modules, numbers."""
+    found: dict[Any, str] = {}
+    for function in functions:
+        _note(function, found)
+    return hashlib.sha256(repr(sorted(found.values())).encode()).hexdigest()[:12]
+
+
+def _note(value: Any, found: dict[Any, str]) -> None:
+    value = getattr(value, "py_func", value)
+    home = value.__name__ if inspect.ismodule(value) else getattr(value, "__module__", None)
+    if value in found or (home or "").split(".")[0] in _KNOWN:
+        return
+    if inspect.ismodule(value):
+        found[value] = inspect.getsource(value)
+    elif inspect.isfunction(value):
+        found[value] = inspect.getsource(value)
+        used = inspect.getclosurevars(value)
+        for name, each in {**used.globals, **used.nonlocals}.items():
+            _note(each, found) if callable(each) or inspect.ismodule(each) else found.update({name: f"{name} {each!r}"})
