@@ -15,8 +15,8 @@ from planarfriction.compiler.calls import address_of, call
 from planarfriction.coupling import CoupledPatches, CoupledStep, HostStep
 from planarfriction.kernels.steps import SLOPES, WORDS
 from planarfriction.patch import friction_metric
-from tests.support.rate_laws import BoucWen
 from tests.support.coupling_problems import random_bodies, random_patches, random_run
+from tests.support.rate_laws import BoucWen
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 PLAIN = pf.LuGre()

@@ -15,8 +15,7 @@ import planarfriction as pf
 from planarfriction.derivatives import scene_gradient, scene_sensitivities
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.rate_law import fingerprint
-from planarfriction.laws import LAWS
-from planarfriction.laws.rate_law import RateLaw, norm, plus
+from planarfriction.laws.rate_law import norm, plus
 from planarfriction.patch import friction_metric
 from planarfriction.scenes import SolverOptions
 from tests.support.rate_laws import BoucWen, Gum, Written
@@ -229,7 +228,7 @@ def test_what_needs_the_bristles_of_lugre_refuses_it_in_one_line():
 @pytest.mark.torch
 def test_tensors_refuse_it():
     torch = pytest.importorskip("planarfriction.torch")
-    with pytest.raises(InvalidValueError, match="for .*not a rate of its own"):
+    with pytest.raises(InvalidValueError, match=r"for .*not a rate of its own"):
         torch.DistributedModel(DISC, BoucWen())
 
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.laws.base import refuse_rate_law
 from planarfriction.kernels import tangent
 from planarfriction.kernels.body import System
 from planarfriction.kernels.tangent import Drives
+from planarfriction.laws.base import refuse_rate_law
 from planarfriction.scenes.packing import SegmentBatches
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.signal import SAME_TIME, Signal

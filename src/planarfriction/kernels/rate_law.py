@@ -37,7 +37,7 @@ _LEAST = 0.1
 
 @kernel
 def traction(xp, law, z, zdot, u):
-    """Compute the traction per unit load, `-(sigma_0 z + sigma_1 z' + sigma_2 u)`, of a law that has none of its own."""
+    """Compute `-(sigma_0 z + sigma_1 z' + sigma_2 u)`, the traction per unit load of a law without one."""
     return plus(plus(times(-law.sigma_0, z), -law.sigma_1, zdot), -law.sigma_2, u)
 
 
@@ -89,10 +89,10 @@ def bristle_of(rate: Callable, pull: Callable = traction) -> Bristle:
         apart = xp.maximum(g * x[0] * (g * y[1]) - g * x[1] * (g * y[0]), 0.0)
         per = 1.0 / xp.maximum(1.0 - g * (x[0] + y[1]) + apart, _LEAST)
         largest = xp.maximum(law.largest_deflection, norm(z))
-        k = _solved(a, b, c, d, per, start)
-        end = rate(xp, law, _within(plus(z, dt, k), largest), u)
-        l = _solved(a, b, c, d, per, plus(end, -2.0, k))
-        new = _within(plus(plus(z, 1.5 * dt, k), 0.5 * dt, l), largest)
+        first = _solved(a, b, c, d, per, start)
+        end = rate(xp, law, _within(plus(z, dt, first), largest), u)
+        second = _solved(a, b, c, d, per, plus(end, -2.0, first))
+        new = _within(plus(plus(z, 1.5 * dt, first), 0.5 * dt, second), largest)
         return new, pull(xp, law, new, rate(xp, law, new, u), u)
 
     return Bristle(evaluate, step, _slopes(evaluate), _slopes(step))

@@ -86,8 +86,8 @@ def _vectors(results: str, pulls: dict, pushes: dict) -> Rule:
 
 NAMES: dict[str, Any] = {
     "dot": dot, "formulas": formulas, "log_or_0": _log, "per": per, "placed": placed, "plus": plus,
-    "power_slope": _power_slope, "ratio": ratio, "slip_by_breakaway": _slip_by_breakaway, "slip_slope": _slip_slope, "times": times,
-    "xp": xp, "zeros": zeros,
+    "power_slope": _power_slope, "ratio": ratio, "slip_by_breakaway": _slip_by_breakaway, "slip_slope": _slip_slope,
+    "times": times, "xp": xp, "zeros": zeros,
 }  # fmt: skip
 """Functions that generated code and the texts of rules name."""
 

@@ -1,0 +1,85 @@
+"""Changes of functions along a direction: the same derivatives as in reverse, once and twice."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numba import njit
+
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import kernel
+from planarfriction.formulas import LawNumbers
+from planarfriction.kernels.derive import NotStraightError, derive
+from planarfriction.kernels.distributed_step import cell
+from planarfriction.kernels.forward import forward
+from planarfriction.kernels.vectors import dot, norm, plus, square, times
+
+LAW = LawNumbers(1e5, 300.0, 0.4, 0.5, 0.8, 1e-3, 1.7, 1.0, 0.3, 0.0)
+
+_pushed = forward(cell, ("z", "u"), ("z", "u"))
+_forth, _back = derive(cell, ("z", "u"), ("z", "u"))[-2:]
+
+
+@njit
+def _both(law, z, u, dt, dz, du, bar_new, bar_pull):
+    new, pull, d_new, d_pull = _pushed(law, z, u, dt, dz, du)
+    found, tape = _forth(law, z, u, dt)
+    by_z, by_u = _back(tape, (bar_new, bar_pull))
+    same = new == found[0] and pull == found[1]
+    return same, dot(bar_new, d_new) + dot(bar_pull, d_pull), dot(by_z, dz) + dot(by_u, du)
+
+
+def test_forwards_and_reverse_agree_on_the_step_of_a_bristle():
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        z, u, dz, du = (tuple(scale * rng.normal(size=2)) for scale in (3e-6, 5e-3, 1e-6, 1e-3))
+        same, forwards, reverse = _both(LAW, z, u, 10.0 ** rng.uniform(-6.0, -2.0), dz, du, (1e6, -2e6), (1.0, 0.5))
+        assert same
+        assert forwards == pytest.approx(reverse, rel=1e-9, abs=1e-9)
+
+
+@kernel
+def _curved(z, k):
+    x, y = z
+    return times(xp.exp(-x / k) / norm(z), (square(z), x * xp.sin(y))), -xp.power(y, k) + xp.log(y) * xp.cos(x)
+
+
+_once = forward(_curved, ("z",), ("z",))
+
+
+@kernel
+def _slopes(z, k, d):
+    _, _, d_first, d_second = _once(z, k, d)
+    return d_first, d_second
+
+
+_TWICE = derive(_slopes, ("z",), ("z", "d"))
+_forth_twice, _back_twice = _TWICE.forth, _TWICE.back
+
+
+@njit
+def _curvature(z, k, d, a, b):
+    """a' d^2f_1 d and b d^2f_2 d, as a gradient, and the change along d itself."""
+    found, tape = _forth_twice(z, k, d)
+    return found, _back_twice(tape, (a, b))[0]
+
+
+def test_a_change_is_differentiated_once_more():
+    z, k, d, a, b, h = np.array([0.4, 0.9]), 1.5, (0.3, -0.7), (0.6, 1.1), -0.8, 1e-5
+
+    def cost(x) -> float:
+        (one, other), _ = _curvature(tuple(x), k, d, a, b)
+        return a[0] * one[0] + a[1] * one[1] + b * other
+
+    expected = [(cost(z + h * e) - cost(z - h * e)) / (2.0 * h) for e in np.eye(2)]
+    assert _curvature(tuple(z), k, d, a, b)[1] == pytest.approx(expected, rel=1e-8)
+
+
+def test_what_is_no_straight_line_is_named():
+    def loops(z):
+        for _ in range(3):
+            z = plus(z, 1.0, z)
+        return z
+
+    with pytest.raises(NotStraightError, match="is no assignment and no return"):
+        forward(loops, ("z",), ("z",))
