@@ -118,6 +118,13 @@ def test_no_step_stores_more_than_the_work_done(size, angle, distance, speed, sh
     assert np.hypot(*after) <= largest * (1.0 + 1e-12)
 
 
+def test_what_is_stiff_is_damped_in_one_step():
+    """Bristles that flow within 1 us follow at once: `z = v T`."""
+    law = Gum(time=1e-6)
+    _, wrench = pf.DistributedModel(POINT, law).step([[2e-6], [0.0]], (0.1, 0.0, 0.0), 1.0, 1e-3)
+    assert -wrench[0] == pytest.approx(law.sigma_0 * 0.1 * 1e-6, rel=0.01)
+
+
 def test_without_load_bristles_are_forgotten():
     model = pf.DistributedModel(DISC, BoucWen())
     state, wrench = model.step(1e-6 + model.rest(), (0.01, 0.0, 0.0), [0.0, 1.0], 1e-3)
@@ -153,9 +160,9 @@ def test_derivatives_of_steps_are_differences(patch):
     assert load * found.wrench_load == pytest.approx(model.step(state, twist, load, dt)[1], rel=1e-12)
 
 
-@pytest.mark.parametrize("patch", [DISC, directional()], ids=["isotropic", "directional"])
-def test_derivatives_of_scenes_are_differences_and_each_other_s_transpose(patch):
-    model = pf.DistributedModel(patch, BoucWen())
+@pytest.mark.parametrize(("patch", "law"), [(DISC, Written()), (directional(), BoucWen())], ids=["viscous", "yielding"])
+def test_derivatives_of_scenes_are_differences_and_each_other_s_transpose(patch, law):
+    model = pf.DistributedModel(patch, law)
     load = pf.Signal([0.0, 0.02], [3.0, 2.0], "linear")
     contact = pf.Contact(model, load, mounted_on="body", name="own")
     force = pf.Signal([0.0, 0.02], [[0.2, 0.0, 1e-3], [0.0, 0.1, -1e-3]], "linear")
