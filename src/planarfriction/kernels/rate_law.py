@@ -6,7 +6,8 @@ the start and `g = 1 - 1/sqrt(2)`,
     (I - g dt A) k = z'(z),   (I - g dt A) l = z'(p) - 2 k,   p = z + dt k,   new = z + dt (3 k + l)/2.
 
 It is of order 2 and damps what is stiff completely (L-stable). A bristle that is within its largest deflection never
-leaves it, so `p` and `new` are brought back there: bristles stay in bounds for any dt.
+leaves it, so `p` and `new` are brought back there: bristles stay in bounds for any dt. That also keeps long steps of
+laws that dissipate passive: a bristle stores no more than the work done on it.
 """
 
 from __future__ import annotations
