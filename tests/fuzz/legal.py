@@ -40,14 +40,14 @@ RECORDS = """
     Rollout RolloutVJP RolloutJacobian RolloutStates RolloutTangent RolloutJVP SceneGradient SceneSensitivities
     Identification Verdict MotionPlan GripPlan GripReport Push PushPlan PushReport Solution Progress
     SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration
-    LimitSurface FrictionLaw FrictionModel Pressure HostStep
+    LimitSurface FrictionLaw RateLaw FrictionModel Pressure HostStep
 """
 """Classes that the library makes itself, bases of families, and `HostStep`, which is checked where it is used."""
 
 
 PROTOCOL = """
     direction direction_slope sums lever_coordinates packed relative ever_loaded only repeated shape_at shapes_at
-    parts_at pieces check_non_negative step_function jacobian_function packed_steps plan
+    parts_at pieces check_non_negative step_function jacobian_function packed_steps plan bristle_traction functions contact
 """
 """Methods that the library calls, with what it has checked."""
 

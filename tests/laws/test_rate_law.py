@@ -266,7 +266,7 @@ def test_wrong_laws_are_refused_in_one_line():
 
 
 def test_machine_code_goes_by_all_that_a_law_uses(tmp_path):
-    """What a law's functions call, and the numbers that they name, are in the name of its machine code."""
+    """Functions that a law calls, and the numbers that they name, are in the name of its machine code."""
     text = "from planarfriction.laws.rate_law import plus\nK = {k}\ndef more(x):\n    return {f} * x\n"
     text += "def rate(xp, law, z, v):\n    return plus(v, -more(K), z)\n"
     prints = set()

@@ -82,7 +82,7 @@ class RateLaw(FrictionLaw):
     def holds_at_rest(self) -> bool:
         """True if a bristle that is not driven keeps its deflection, and pulls by its stiffness alone."""
         z = np.array([[0.5 * self.largest_deflection, 0.0]])
-        rate, pull = self._bristle(z, np.zeros((1, 2)), 1)
+        rate, pull = self._evaluated(z, np.zeros((1, 2)))
         return not rate.any() and np.allclose(pull, -self.sigma_0 * z, rtol=1e-12, atol=0.0)
 
     def steady_friction(self, speed: ArrayLike) -> np.ndarray:
@@ -111,14 +111,20 @@ class RateLaw(FrictionLaw):
         if size > 2:
             raise InvalidValueError("axis", f"be that of one or two components for {type(self).__name__}", size)
         count = z.size // size
-        state, twist = np.zeros((count, 2)), np.zeros((count, 3))
-        state[:, :size], twist[:, :size] = z.reshape(count, size), v.reshape(count, size)
+        found = (
+            each[:, :size].reshape(shape) for each in self._evaluated(z.reshape(count, size), v.reshape(count, size))
+        )
+        rate, pull = (each[..., 0] if axis is None else np.moveaxis(each, -1, axis) for each in found)
+        return rate, pull
+
+    def _evaluated(self, z: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return rates and tractions `[B, 2]` of bristles of one or two components `[B, 1 or 2]`."""
+        state, twist = np.zeros((len(z), 2)), np.zeros((len(z), 3))
+        state[:, : z.shape[1]], twist[:, : v.shape[1]] = z, v
         rate, pull = np.empty_like(state), np.empty_like(twist)
         function = address_of(self.functions(cells.POSITIONS).rates.evaluate, contacts.WORDS[0])
         batched_rates.evaluate(function, self._single, state, twist, rate, pull)
-        found = (each[:, :size].reshape(shape) for each in (rate, pull))
-        rate, pull = (each[..., 0] if axis is None else np.moveaxis(each, -1, axis) for each in found)
-        return rate, pull
+        return rate, pull[:, :2]
 
     # ------------------------------------------------------------------ machine form
 
