@@ -47,7 +47,7 @@ RECORDS = """
 
 PROTOCOL = """
     direction direction_slope sums lever_coordinates packed relative ever_loaded only repeated shape_at shapes_at
-    parts_at pieces check_non_negative step_function jacobian_function packed_steps plan bristle_traction functions
+    parts_at pieces check_non_negative packed_parts plan bristle_traction functions
     contact
 """
 """Methods that the library calls, with what it has checked."""

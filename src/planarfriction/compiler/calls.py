@@ -74,19 +74,6 @@ def call(typingctx, address, arguments):
 
 
 @intrinsic
-def address(typingctx, array, i):
-    """Return the address of number i of a contiguous array."""
-    if not (isinstance(array, types.Array) and array.layout == "C" and isinstance(i, types.Integer)):
-        return None
-
-    def generate(context, builder, signature, args):
-        first = context.make_array(signature.args[0])(context, builder, args[0]).data
-        return builder.ptrtoint(builder.gep(first, [args[1]]), ir.IntType(64))
-
-    return types.int64(array, types.int64), generate
-
-
-@intrinsic
 def pointer(typingctx, array):
     """Return the pointer to the first number of a contiguous array."""
     if not (isinstance(array, types.Array) and array.layout == "C"):

@@ -52,11 +52,6 @@ def _is_integer(kind: Any) -> bool:
     return kind in (int, bool) or _number_of(kind) is not None
 
 
-def addresses_in(*records: Any) -> list[str]:
-    """Return the names of the fields that hold arrays, which compiled code reads by their addresses."""
-    return [name for record in records for name, kind in _fields(record) if kind is np.ndarray]
-
-
 def place_of(array: np.ndarray) -> int:
     """Return the address of the first number of a contiguous array, which the caller keeps alive."""
     assert array.dtype in _DTYPES and array.flags.c_contiguous

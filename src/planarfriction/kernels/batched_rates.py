@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from planarfriction.compiler import jit
-from planarfriction.compiler.calls import address, call
+from planarfriction.compiler.calls import call, pointer
+from planarfriction.compiler.memory import at
 
 
 @jit
@@ -13,7 +14,7 @@ def evaluate(function, records, state, twist, rate, wrench):
     `function` is its address; `records` [B or 1, words] has a row for each contact, or the one that all share.
     """
     for b in range(state.shape[0]):
-        own = address(records, b * records.shape[1] if records.shape[0] > 1 else 0)
+        own = at(pointer(records), b * records.shape[1] if records.shape[0] > 1 else 0)
         call(function, (own, state[b], twist[b], rate[b], wrench[b]))
 
 
@@ -21,5 +22,5 @@ def evaluate(function, records, state, twist, rate, wrench):
 def linearise(function, records, state, twist, lin):
     """Call `ModelFunctions.linearise` of B contacts into `lin` [B, workspace]; the rest as in `evaluate`."""
     for b in range(state.shape[0]):
-        own = address(records, b * records.shape[1] if records.shape[0] > 1 else 0)
+        own = at(pointer(records), b * records.shape[1] if records.shape[0] > 1 else 0)
         call(function, (own, state[b], twist[b], lin[b]))

@@ -20,7 +20,7 @@ import math
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
-from planarfriction.compiler.calls import address, address_of, call
+from planarfriction.compiler.calls import address_of, call, pointer
 from planarfriction.compiler.memory import arrays_at, at, doubles
 from planarfriction.kernels.coupling_rows import INVALID, read
 from planarfriction.kernels.small_matrices import leave_out_rising, solved
@@ -276,4 +276,4 @@ def solve_batch(patches, problems, first, last):
     """Solve the problems [E, words] from `first` to `last`; `patches` is the row of their `Patches`."""
     own = read(patches)
     for e in range(first, last):
-        call(own.solve, (address(patches, 0), address(problems, problems.shape[1] * e)))
+        call(own.solve, (pointer(patches), at(pointer(problems), problems.shape[1] * e)))

@@ -54,10 +54,10 @@ class LinearMoments(NamedTuple):
     inverse: Doubles
     """D^-1"""
     scratch: Doubles
-    """Numbers that `ThreeStates.slopes` may use, [15]."""
+    """Numbers that `ThreeStates.slopes` may use, [9]."""
 
 
-LINEAR = Layout(LinearMoments, by_z=9, by_u=9, inverse=9, scratch=15)
+LINEAR = Layout(LinearMoments, by_z=9, by_u=9, inverse=9, scratch=9)
 _LINEAR = LINEAR.offsets
 
 
