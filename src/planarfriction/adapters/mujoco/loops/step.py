@@ -16,7 +16,7 @@ from planarfriction.adapters.mujoco.loops.records import Host, Remembered, Scrat
 from planarfriction.adapters.mujoco.loops.responses import is_sparse, leaves_range, respond
 from planarfriction.compiler import callback, entry, jit, kernel
 from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler.calls import address, address_of, c_address_of, call, call_c, shared_word
+from planarfriction.compiler.calls import address_of, c_address_of, call, call_c, pointer, shared_word
 from planarfriction.compiler.memory import arrays_at, doubles, integers, integers32
 from planarfriction.kernels.coupling import step_all
 from planarfriction.kernels.coupling_rows import Problem
@@ -255,7 +255,7 @@ def control(m, d):
 @jit
 def plan_step(host, m, d):
     """Call `plan` from Python with the row of a `Host` and the addresses of model and data."""
-    call(read(host).plan, (address(host, 0), m, d))
+    call(read(host).plan, (pointer(host), m, d))
 
 
 def plan_address() -> int:
