@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import bristle_step, distributed_step, published_step, reduced_step
+from planarfriction.kernels import bristle_step, distributed_step, leaning_cells, published_step, reduced_step
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.published_contact import PublishedPatch
 from planarfriction.kernels.reduced import Quartic, rate
@@ -24,7 +24,7 @@ GRIP = LAW.sigma_0 / 0.6
 
 BRISTLE = derive(bristle_step.step, ("z", "u", "v", "per_h", "q", "law.breakaway_ratio"), ("z", "u"))
 CELL = derive(distributed_step.cell, ("z", "u"), ("z", "u"))
-LEANING = derive(distributed_step.leaning_cell, ("z", "u"), ("a", "z", "u"))
+LEANING = derive(leaning_cells.step, ("z", "u"), ("lean.a", "z", "u"))
 RATE = derive(rate, ("z", "u", "q"), ("z", "u", "q"))
 
 TURNS = 0.0, 1e-8, 1e-4, 0.5, 1.0, 0.5 * math.pi, 3.0, math.pi - 1e-8
@@ -67,7 +67,8 @@ def test_derivatives_of_a_cell(law):
         v, direction = 10.0 ** rng.uniform(-6.0, 1.0), rng.uniform(0.0, 2.0 * math.pi)
         z, u = _turned(_deflection(rng) / GRIP, direction), _turned(v, direction + rng.choice(TURNS))
         return max(
-            misfit(CELL, (law, z, u, dt := _far(rng) / (v * GRIP))), misfit(LEANING, (law, (0.2, 0.1), z, u, dt))
+            misfit(CELL, (law, z, u, dt := _far(rng) / (v * GRIP))),
+            misfit(LEANING, (leaning_cells.Leaning(law, (0.2, 0.1)), z, u, dt)),
         )
 
     assert _worst(draw) < 1e-8

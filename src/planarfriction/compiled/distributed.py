@@ -16,6 +16,8 @@ from planarfriction.compiler.memory import places_of, rows_of
 from planarfriction.kernels import cells as contacts
 from planarfriction.kernels import distributed_step as steps
 from planarfriction.kernels.contacts import ModelFunctions
+from planarfriction.kernels.general_cells import ROWS_OF_A_CELL
+from planarfriction.kernels.leaning_cells import RATES_OF_LEANING, STEPS_OF_LEANING
 from planarfriction.kernels.steps import StepFunctions
 
 
@@ -30,13 +32,13 @@ class CompiledDistributed(CompiledModel):
 
     def _functions(self) -> tuple[ModelFunctions, StepFunctions]:
         if self.patch.asymmetric:
-            return contacts.ASYMMETRIC, steps.ASYMMETRIC
+            return RATES_OF_LEANING, STEPS_OF_LEANING
         turned = self.patch.anisotropic
         return (contacts.TURNED, steps.TURNED) if turned else (contacts.ISOTROPIC, steps.ISOTROPIC)
 
     def _record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         """Return the record of a contact, and how many numbers of a linearisation each cell has."""
-        rows = contacts.LEANING if self.patch.asymmetric else contacts.STRAIGHT
+        rows = ROWS_OF_A_CELL if self.patch.asymmetric else contacts.LINEAR_ROWS
         return contacts.CellsContact(self.law.numbers, numbers.shape[1], numbers, weights), rows
 
     # ------------------------------------------------------------------ at given loads
@@ -52,7 +54,7 @@ class CompiledDistributed(CompiledModel):
         yield slice(None), self.fixed or _alone(self._packed(weights))
 
     def linearisation(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
-        """Return linearisations cell by cell `[..., L, N]` (see `kernels.cells.LinearCells`)."""
+        """Return linearisations `[..., L, N]` as `kernels.cells.LinearCells`, or those of `kernels.general_cells`."""
         ((_, contact),) = self.at_each_load(load)
         cells = state.shape[-1]
         lin = linearised(contact.joined, state.reshape(load.size, 2 * cells), twist.reshape(-1, 3))
@@ -64,12 +66,12 @@ class CompiledDistributed(CompiledModel):
         Four arrays `[..., 2, 2, N]`; the velocity is that which a cell sees.
         """
         law, identity, lin = self.law.numbers, np.eye(2)[:, :, None], self.linearisation(state, twist, load)
-        bristle = lin[..., 7:9, :] if self.patch.asymmetric else state
+        if lin.shape[-2] == ROWS_OF_A_CELL:
+            rows = lin.reshape(*load.shape, -1, ROWS_OF_A_CELL)[..., :16]
+            return np.moveaxis(rows.reshape(*rows.shape[:-1], 4, 2, 2), (-4, -3), (-1, 0))
         k, k_z, k_v = lin[..., :1, None, :], lin[..., None, 1:3, :], lin[..., None, 3:5, :]
-        by_state = -k * identity - bristle[..., :, None, :] * k_z
-        by_velocity = identity - bristle[..., :, None, :] * k_v
-        if self.patch.asymmetric:
-            by_velocity = lin[..., 9:13, :].reshape(by_state.shape)
+        by_state = -k * identity - state[..., :, None, :] * k_z
+        by_velocity = identity - state[..., :, None, :] * k_v
         pull_state, pull_velocity = law.sigma_0 * identity + law.sigma_1 * by_state, law.sigma_2 * identity
         return by_state, by_velocity, -pull_state, -(pull_velocity + law.sigma_1 * by_velocity)
 

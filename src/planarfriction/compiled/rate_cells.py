@@ -12,7 +12,7 @@ from planarfriction.compiled.distributed import CompiledDistributed
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import cells
 from planarfriction.kernels.contacts import ModelFunctions
-from planarfriction.kernels.rate_cells import ROWS_OF_A_CELL
+from planarfriction.kernels.general_cells import ROWS_OF_A_CELL
 from planarfriction.kernels.steps import StepFunctions
 
 
@@ -25,12 +25,6 @@ class CompiledRateCells(CompiledDistributed):
 
     def _record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         return self.law.contact(self._lever, numbers, weights), ROWS_OF_A_CELL
-
-    def slopes(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
-        """See `CompiledDistributed`."""
-        shape = *load.shape, state.shape[-1], ROWS_OF_A_CELL
-        rows = self.linearisation(state, twist, load).reshape(shape)[..., :16]
-        return np.moveaxis(rows.reshape(*shape[:-1], 4, 2, 2), (-4, -3), (-1, 0))
 
 
 def _finite(door: Callable) -> Callable:

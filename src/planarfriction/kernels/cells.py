@@ -1,14 +1,13 @@
 """A contact of n cells as the solver sees it, isotropic or not (see `contacts.ModelFunctions`).
 
 The state is `z = [z_x (n), z_y (n)]`. A cell sees `u = B V` of the twist and adds `w B' t` to the wrench, with the
-traction `t = -(sigma_0 z + sigma_1 z' + sigma_2 u)`; `B` is its lever (see `Lever`). The bristle decays towards
-`c = a g(|u|)/sigma_0`, which is zero but for asymmetric friction. With `h = z - c` and `k = bristle_decay`
+traction `t = -(sigma_0 z + sigma_1 z' + sigma_2 u)`; `B` is its lever (see `Lever`). With `k = bristle_decay`
 (docs/physics.md, docs/solver.md),
 
-    z' = u - k h,      dz'/dz = -k I - h (x) k_h,      dz'/du = I - h (x) k_u + dz'/dh dh/du
+    z' = u - k z,      dz'/dz = -k I - z (x) k_z,      dz'/du = I - z (x) k_u.
 
-where the last term is 0 unless the centre c moves. So `D = shift I - dz'/dz` is a multiple of the identity plus a
-rank-one term and has a closed inverse, and every function is linear in the number of cells.
+So `D = shift I - dz'/dz` is a multiple of the identity plus a rank-one term and has a closed inverse, and every
+function is linear in the number of cells. Cells whose bristles do something else: `general_cells`.
 """
 
 from __future__ import annotations
@@ -22,8 +21,8 @@ from planarfriction.compiler.memory import Doubles, arrays_at, at, reader
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.contacts import ROWS, functions_of, traction
 from planarfriction.kernels.derive import derive
-from planarfriction.kernels.law import grip, grip_slope, squared
-from planarfriction.kernels.rules import per, ratio
+from planarfriction.kernels.law import grip, squared
+from planarfriction.kernels.rules import ratio
 from planarfriction.kernels.vectors import dot, norm, plus, put, put_all, three, times
 
 
@@ -52,8 +51,8 @@ class Lever(NamedTuple):
     """`(cell, t)`: return `B' t`."""
     around: Any
     """`(cell, P)`: return `B' P B` of a matrix [2, 2], nine numbers."""
-    leans: bool
-    """True if bristles decay towards a centre other than zero."""
+    law: Any
+    """`(own, i)`: return the law of the cell."""
 
 
 class LinearCells(NamedTuple):
@@ -61,40 +60,24 @@ class LinearCells(NamedTuple):
 
     k: Doubles
     by_x: Doubles
-    """k_h"""
+    """k_z"""
     by_y: Doubles
     by_ux: Doubles
-    """k_u; not where bristles lean."""
+    """k_u"""
     by_uy: Doubles
     diagonal: Doubles
     """One over the diagonal of D, and over its rank-one part."""
     rank: Doubles
-    x: Doubles
-    """h; this and all that follows only where bristles lean."""
-    y: Doubles
-    xx: Doubles
-    """dz'/du, row by row."""
-    xy: Doubles
-    yx: Doubles
-    yy: Doubles
 
 
-STRAIGHT, LEANING = 7, len(LinearCells._fields)
-"""Rows of a linearisation where bristles decay towards zero, and where they lean."""
+LINEAR_ROWS = len(LinearCells._fields)
 
 
 @kernel
 def _linear(lin, n):
     return LinearCells(
-        lin, at(lin, n), at(lin, 2 * n), at(lin, 3 * n), at(lin, 4 * n), at(lin, 5 * n), at(lin, 6 * n), at(lin, 7 * n),
-        at(lin, 8 * n), at(lin, 9 * n), at(lin, 10 * n), at(lin, 11 * n), at(lin, 12 * n),
+        lin, at(lin, n), at(lin, 2 * n), at(lin, 3 * n), at(lin, 4 * n), at(lin, 5 * n), at(lin, 6 * n)
     )  # fmt: skip
-
-
-@kernel
-def _bristle(lever, m, z, i, n):
-    """Return h."""
-    return (m.x[i], m.y[i]) if lever.leans else (z[i], z[n + i])
 
 
 @kernel
@@ -104,17 +87,9 @@ def _solved(m, i, h, a):
 
 
 @kernel
-def _driven(lever, m, i, h, u):
+def _driven(m, i, h, u):
     """Return `dz'/du u`."""
-    if lever.leans:
-        return m.xx[i] * u[0] + m.xy[i] * u[1], m.yx[i] * u[0] + m.yy[i] * u[1]
     return plus(u, -(m.by_ux[i] * u[0] + m.by_uy[i] * u[1]), h)
-
-
-@kernel
-def _centre(own, i, q):
-    """Return `a/q`, the state that the bristle of cell i decays towards."""
-    return own.cells[5 * own.count + i] / q, own.cells[6 * own.count + i] / q
 
 
 @kernel
@@ -134,15 +109,13 @@ def _evaluate(lever, law, own, z, v, zdot, w):
     n, twist, total = own.count, three(v), (0.0, 0.0, 0.0)
     for i in range(n):
         cell = lever.of(own, i)
-        u, b = lever.seen(cell, twist), (z[i], z[n + i])
-        speed = norm(u)
+        u, h = lever.seen(cell, twist), (z[i], z[n + i])
+        speed, size = norm(u), norm(h)
         q = grip(law, speed)
-        h = plus(b, -1.0, _centre(own, i, q)) if lever.leans else b
-        size = norm(h)
         along = dot(h, u) / xp.where(size > 0.0, size, 1.0)
         rate = plus(u, -formulas.bristle_decay(xp, size * q, along, speed, q, law), h)
         zdot[i], zdot[n + i] = rate
-        total = plus(total, own.weights[i], lever.wrench(cell, traction(law, b, rate, u)))
+        total = plus(total, own.weights[i], lever.wrench(cell, traction(law, h, rate, u)))
     put(w, total)
 
 
@@ -160,30 +133,14 @@ def evaluate(lever, contact, z, v, zdot, w):
 def _linearise(lever, law, own, z, v, m):
     n, twist = own.count, three(v)
     for i in range(n):
-        u, h = lever.seen(lever.of(own, i), twist), (z[i], z[n + i])
-        if lever.leans:
-            speed = norm(u)
-            q = grip(law, speed)
-            centre = _centre(own, i, q)
-            h = plus(h, -1.0, centre)
-        (k,), tape = _forth(law, h, u)
-        by_h, by_u = _back(tape, (1.0,))
-        if lever.leans:
-            # dh/du = s u/|u|; of dz' = k s + h (k_h . s) the second part goes along h, with k_u
-            heading, s = times(per(speed), u), times(grip_slope(law, speed, q) / q, centre)
-            by_u = plus(by_u, dot(by_h, s), heading)
-            m.x[i], m.y[i] = h
-            m.xx[i], m.xy[i] = plus(plus((1.0, 0.0), -h[0], by_u), -k * s[0], heading)
-            m.yx[i], m.yy[i] = plus(plus((0.0, 1.0), -h[1], by_u), -k * s[1], heading)
-        else:
-            m.by_ux[i], m.by_uy[i] = by_u
+        (k,), tape = _forth(law, (z[i], z[n + i]), lever.seen(lever.of(own, i), twist))
+        (m.by_x[i], m.by_y[i]), (m.by_ux[i], m.by_uy[i]) = _back(tape, (1.0,))
         m.k[i] = k
-        m.by_x[i], m.by_y[i] = by_h
 
 
 @kernel
 def linearise(lever, contact, z, v, lin):
-    """Write k, k_h and k_u of each cell, and what leaning bristles add."""
+    """Write k, k_z and k_u of each cell."""
     own = read(contact)
     m = _linear(lin, own.count)
     if own.law.gamma == 2.0:
@@ -202,17 +159,13 @@ def factor(lever, contact, z, shift, lin, stiffness):
     n, law, m = own.count, own.law, _linear(lin, own.count)
     pull, total = law.sigma_0 + law.sigma_1 * shift, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for i in range(n):
-        h, by_h = _bristle(lever, m, z, i, n), (m.by_x[i], m.by_y[i])
+        h, by_h = (z[i], z[n + i]), (m.by_x[i], m.by_y[i])
         diagonal = shift + m.k[i]
         m.diagonal[i], rank = 1.0 / diagonal, 1.0 / (diagonal + dot(by_h, h))
         m.rank[i] = rank
         c, d = -pull * m.diagonal[i], -law.sigma_2
-        if lever.leans:
-            a, b = _solved(m, i, h, (m.xx[i], m.yx[i])), _solved(m, i, h, (m.xy[i], m.yy[i]))
-            p = d - pull * a[0], -pull * b[0], -pull * a[1], d - pull * b[1]
-        else:
-            x, y = times(rank, plus(times(diagonal, (m.by_ux[i], m.by_uy[i])), 1.0, by_h))
-            p = c * (1.0 - h[0] * x) + d, -c * h[0] * y, -c * h[1] * x, c * (1.0 - h[1] * y) + d
+        x, y = times(rank, plus(times(diagonal, (m.by_ux[i], m.by_uy[i])), 1.0, by_h))
+        p = c * (1.0 - h[0] * x) + d, -c * h[0] * y, -c * h[1] * x, c * (1.0 - h[1] * y) + d
         total = plus(total, own.weights[i], lever.around(lever.of(own, i), p))
     put_all(stiffness, total)
 
@@ -225,7 +178,7 @@ def eliminate(lever, contact, z, shift, r, lin, w):
     pull, total = law.sigma_0 + law.sigma_1 * shift, (0.0, 0.0, 0.0)
     for i in range(n):
         a = r[i], r[n + i]
-        t = plus(times(law.sigma_1, a), -pull, _solved(m, i, _bristle(lever, m, z, i, n), a))
+        t = plus(times(law.sigma_1, a), -pull, _solved(m, i, (z[i], z[n + i]), a))
         total = plus(total, own.weights[i], lever.wrench(lever.of(own, i), t))
     put(w, total)
 
@@ -236,22 +189,22 @@ def back_substitute(lever, contact, z, r, dv, lin, out):
     own = read(contact)
     n, m, twist = own.count, _linear(lin, own.count), three(dv)
     for i in range(n):
-        h = _bristle(lever, m, z, i, n)
-        driven = _driven(lever, m, i, h, lever.seen(lever.of(own, i), twist))
+        h = (z[i], z[n + i])
+        driven = _driven(m, i, h, lever.seen(lever.of(own, i), twist))
         out[i], out[n + i] = _solved(m, i, h, plus(driven, 1.0, (r[i], r[n + i])))
 
 
 @kernel
 def change(lever, contact, z, zdot, lin, dz, dzdot, rows, friction, size):
-    """Write the changes of `z'` and of the wrench; the centre c grows with friction as z does."""
+    """Write the changes of `z'` and of the wrench."""
     own, rows = read(contact), arrays_at(ROWS, rows)
     n, law, m = own.count, own.law, _linear(lin, own.count)
     twist, total = (rows.d_twist[0], rows.d_twist[1], rows.d_twist[2] + size * rows.twist[2]), (0.0, 0.0, 0.0)
     for i in range(n):
-        cell, h = lever.of(own, i), _bristle(lever, m, z, i, n)
+        cell, h = lever.of(own, i), (z[i], z[n + i])
         u, b = lever.seen(cell, twist), (dz[i], dz[n + i])
         a = plus(b, -friction, (z[i], z[n + i]))
-        rate = plus(_driven(lever, m, i, h, u), -m.k[i], a)
+        rate = plus(_driven(m, i, h, u), -m.k[i], a)
         rate = plus(rate, -(m.by_x[i] * a[0] + m.by_y[i] * a[1]), h)
         dzdot[i], dzdot[n + i] = rate
         total = plus(total, own.weights[i], lever.wrench(cell, traction(law, b, rate, u)))
@@ -265,7 +218,7 @@ def solve_transposed(lever, contact, z, r, lin, out):
     n, m = own.count, _linear(lin, own.count)
     for i in range(n):
         a = r[i], r[n + i]
-        c = dot(_bristle(lever, m, z, i, n), a) * m.rank[i]
+        c = dot((z[i], z[n + i]), a) * m.rank[i]
         out[i], out[n + i] = times(m.diagonal[i], plus(a, -c, (m.by_x[i], m.by_y[i])))
 
 
@@ -276,15 +229,12 @@ def pull_back(lever, contact, z, lin, dzdot, rows, out):
     n, law, m = own.count, own.law, _linear(lin, own.count)
     wrench, total = three(rows.d_wrench), (0.0, 0.0, 0.0)
     for i in range(n):
-        cell, h = lever.of(own, i), _bristle(lever, m, z, i, n)
+        cell, h = lever.of(own, i), (z[i], z[n + i])
         t = times(own.weights[i], lever.seen(cell, wrench))
         rate = plus((dzdot[i], dzdot[n + i]), -law.sigma_1, t)
         c = dot(h, rate)
         out[i], out[n + i] = plus(plus(times(-m.k[i], rate), -c, (m.by_x[i], m.by_y[i])), -law.sigma_0, t)
-        if lever.leans:
-            u = m.xx[i] * rate[0] + m.yx[i] * rate[1], m.xy[i] * rate[0] + m.yy[i] * rate[1]
-        else:
-            u = plus(rate, -c, (m.by_ux[i], m.by_uy[i]))
+        u = plus(rate, -c, (m.by_ux[i], m.by_uy[i]))
         total = plus(total, 1.0, lever.wrench(cell, plus(u, -law.sigma_2, t)))
     put(rows.d_twist, total)
 
@@ -346,10 +296,13 @@ def _around_by_map(cell, p):
     return dot(a, pa), dot(a, pb), dot(a, pc), dot(b, pa), dot(b, pb), dot(b, pc), dot(c, pa), dot(c, pb), dot(c, pc)
 
 
-POSITIONS = Lever(_place, _seen, _wrench, _around, False)
-LEVERS = Lever(_map, _seen_by_map, _wrench_by_map, _around_by_map, False)
-LEANING_LEVERS = LEVERS._replace(leans=True)
+@kernel
+def _same(own, i):
+    return own.law
+
+
+POSITIONS = Lever(_place, _seen, _wrench, _around, _same)
+LEVERS = Lever(_map, _seen_by_map, _wrench_by_map, _around_by_map, _same)
 
 ISOTROPIC = functions_of("isotropic", TEMPLATES, lever=POSITIONS)
 TURNED = functions_of("turned", TEMPLATES, lever=LEVERS)
-ASYMMETRIC = functions_of("asymmetric", TEMPLATES, lever=LEANING_LEVERS)

@@ -1,17 +1,13 @@
 """The step of the distributed model and its derivatives, cell by cell (see `steps.StepFunctions`).
 
-A cell sees the velocity `u = B V` of its lever B (see `cells.Lever`). Where friction depends on the direction a bristle
-may decay towards `c = a g(|u|)/sigma_0`, which the twist holds: `z - c` steps as the bristle of a cell without c does,
-and the traction is that of one less `sigma_0 c`. See `bristle_step` for the step of a bristle and docs/physics.md,
-"Distributed model".
+A cell sees the velocity `u = B V` of its lever B (see `cells.Lever`); see `bristle_step` for the step of a bristle and
+docs/physics.md, "Distributed model".
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from planarfriction import formulas
-from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import at
 from planarfriction.kernels import bristle_step, cells
@@ -35,17 +31,8 @@ def cell(law, z, u, dt):
     return new, _traction(law, new, k, u)
 
 
-@kernel
-def leaning_cell(law, a, z, u, dt):
-    """Return the new bristle and the traction of a cell whose bristle decays towards `a g/sigma_0`."""
-    c = times(formulas.stribeck(xp, norm(u), law) / law.sigma_0, a)
-    new, traction = cell(law, plus(z, -1.0, c), u, dt)
-    return plus(new, 1.0, c), plus(traction, -law.sigma_0, c)
-
-
 _CELL = derive(cell, ("z", "u"), ("z", "u"))
-_LEANING = derive(leaning_cell, ("z", "u"), ("a", "z", "u"))
-_forth, _back, _forth_leaning, _back_leaning = _CELL.forth, _CELL.back, _LEANING.forth, _LEANING.back
+_forth, _back = _CELL.forth, _CELL.back
 
 
 class CellSlopes(NamedTuple):
@@ -70,31 +57,8 @@ def pulled(back, results, tape):
 
 
 @kernel
-def _lean(own, i):
-    return own.cells[5 * own.count + i], own.cells[6 * own.count + i]
-
-
-@kernel
-def _cell_slopes(lever, law, own, i, z, u, dt):
-    """Return `CellSlopes` of cell i."""
-    if lever.leans:
-        results, tape = _forth_leaning(law, _lean(own, i), z, u, dt)
-        return pulled(_back_leaning, results, tape)
-    found, path = _forth(law, z, u, dt)
-    return pulled(_back, found, path)
-
-
-@kernel
 def _step(lever, law, own, z, twist, dt, new, out):
     n, total = own.count, (0.0, 0.0, 0.0)
-    if lever.leans:
-        for i in range(n):
-            one = lever.of(own, i)
-            moved, traction = leaning_cell(law, _lean(own, i), (z[i], z[n + i]), lever.seen(one, twist), dt)
-            new[i], new[n + i] = moved
-            total = plus(total, own.weights[i], lever.wrench(one, traction))
-        put(out, total)
-        return
     for i in range(n):  # apart: in one loop the vectors do not fit into the processor's registers
         u = lever.seen(lever.of(own, i), twist)
         speed = norm(u)
@@ -125,7 +89,8 @@ def _slopes(lever, whole, law, own, z, twist, dt, new, out):
     n, total, by_twist = own.count, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for i in range(n):
         one = lever.of(own, i)
-        found = _cell_slopes(lever, law, own, i, (z[i], z[n + i]), lever.seen(one, twist), dt)
+        results, tape = _forth(law, (z[i], z[n + i]), lever.seen(one, twist), dt)
+        found = pulled(_back, results, tape)
         new[i], new[n + i] = found.new
         total = plus(total, own.weights[i], lever.wrench(one, found.traction))
         by_twist = plus(by_twist, own.weights[i], lever.around(one, found.traction_u))
@@ -152,7 +117,7 @@ def put_cell(lever, one, weight, found, i, n, out):
 def slopes(lever, whole, contact, z, v, dt, new, out):
     """Step with the slopes of the wrench, or with all derivatives."""
     own = cells.read(contact)
-    if own.law.gamma == 2.0 and not (whole or lever.leans):
+    if own.law.gamma == 2.0 and not whole:
         _slopes(lever, whole, squared(own.law), own, z, three(v), dt, new, out)
     else:
         _slopes(lever, whole, own.law, own, z, three(v), dt, new, out)
@@ -161,4 +126,3 @@ def slopes(lever, whole, contact, z, v, dt, new, out):
 TEMPLATES = step, slopes
 ISOTROPIC = step_functions("isotropic", TEMPLATES, lever=cells.POSITIONS)
 TURNED = step_functions("turned", TEMPLATES, lever=cells.LEVERS)
-ASYMMETRIC = step_functions("asymmetric", TEMPLATES, lever=cells.LEANING_LEVERS)

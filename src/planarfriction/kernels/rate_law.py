@@ -21,9 +21,12 @@ from typing import Any, NamedTuple
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.kernels.derive import derive
-from planarfriction.kernels.distributed_step import pulled
+from planarfriction.compiler.memory import Doubles, reader
+from planarfriction.kernels.cells import Lever
+from planarfriction.kernels.contacts import ModelFunctions, functions_of
 from planarfriction.kernels.forward import forward
+from planarfriction.kernels.general_cells import RATES, STEPS, Bristle, bristle
+from planarfriction.kernels.steps import StepFunctions, step_functions
 from planarfriction.kernels.vectors import norm, plus, times
 
 _SHARE = 1.0 - math.sqrt(0.5)
@@ -55,19 +58,6 @@ def _solved(a, b, c, d, per_determinant, r):
     return per_determinant * (d * r[0] - b * r[1]), per_determinant * (a * r[1] - c * r[0])
 
 
-class Bristle(NamedTuple):
-    """Compiled functions of a bristle."""
-
-    evaluate: Any
-    """`(law, z, u)`: return z' and the traction."""
-    step: Any
-    """`(law, z, u, dt)`: return the bristle after dt and its traction."""
-    linearise: Any
-    """`(law, z, u)`: return z' and the traction with their derivatives, as `CellSlopes`."""
-    linearise_step: Any
-    """`(law, z, u, dt)`: return the bristle and its traction after dt with their derivatives."""
-
-
 @functools.cache
 def bristle_of(rate: Callable, pull: Callable = traction) -> Bristle:
     """Return the functions of a bristle from `rate(xp, law, z, u)` and its traction `pull(xp, law, z, z', u)`."""
@@ -96,20 +86,24 @@ def bristle_of(rate: Callable, pull: Callable = traction) -> Bristle:
         new = _within(plus(plus(z, 1.5 * dt, first), 0.5 * dt, second), largest)
         return new, pull(xp, law, new, rate(xp, law, new, u), u)
 
-    return Bristle(evaluate, step, _slopes(evaluate), _slopes(step))
+    return bristle(evaluate, step)
 
 
-def _slopes(function: Any) -> Any:
-    """Return a function that returns two vectors with their derivatives by z and u, as `CellSlopes`."""
-    written = derive(function, ("z", "u"), ("z", "u"))
-    forth, back = written.forth, written.back
+class CellFunctions(NamedTuple):
+    """Compiled functions of contacts with a law and a kind of cells."""
 
-    @kernel
-    def slopes(*arguments):
-        found, tape = forth(*arguments)
-        return pulled(back, found, tape)
+    record: Any
+    """Record of a contact: `law`, `count`, `cells`, `weights` as in `cells.CellsContact`."""
+    rates: ModelFunctions
+    steps: StepFunctions
 
-    return slopes
+
+def cell_functions(name: str, law: Any, bristle_: Bristle, lever: Lever) -> CellFunctions:
+    """Bind the functions of contacts to a record of numbers of a law, its bristle and a lever; compile none yet."""
+    fields = [("law", law), ("count", int), ("cells", Doubles), ("weights", Doubles)]
+    record = NamedTuple(f"{law.__name__}Cells", fields)
+    model = {"lever": lever, "bristle": bristle_, "read": reader(record)}
+    return CellFunctions(record, functions_of(name, RATES, **model), step_functions(name, STEPS, **model))
 
 
 def fingerprint(*functions: Callable) -> str:

@@ -15,7 +15,7 @@ from planarfriction.compiler.calls import address_of
 from planarfriction.compiler.memory import place_of, row_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import batched_rates, cells, contacts, rate_cells, rate_law, steps
+from planarfriction.kernels import batched_rates, cells, contacts, rate_law, steps
 from planarfriction.kernels.rules import ratio
 from planarfriction.kernels.vectors import dot, norm, plus, times
 from planarfriction.laws.base import FrictionLaw
@@ -130,7 +130,7 @@ class RateLaw(FrictionLaw):
 
     @classmethod
     @functools.cache
-    def functions(cls, lever: cells.Lever) -> rate_cells.CellFunctions:
+    def functions(cls, lever: cells.Lever) -> rate_law.CellFunctions:
         """Return the compiled functions of contacts with this law whose cells have a lever.
 
         Raises `NotStraightError`, a TypeError, for functions that are no straight lines.
@@ -141,7 +141,7 @@ class RateLaw(FrictionLaw):
         bristle = rate_law.bristle_of(cls.bristle_rate, cls.bristle_traction)
         kind = "" if lever is cells.POSITIONS else "_turned"
         name = f"{cls.__name__}_{rate_law.fingerprint(cls.bristle_rate, cls.bristle_traction)}{kind}"
-        return rate_cells.cell_functions(name, record, bristle, lever)
+        return rate_law.cell_functions(name, record, bristle, lever)
 
     def contact(self, lever: cells.Lever, numbers: np.ndarray, weights: np.ndarray) -> Any:
         """Return the record of a contact of n cells with these `numbers` and `weights` `[n]`, which compiled code

@@ -1,4 +1,4 @@
-"""A contact of n cells whose law is a function of its own, `z' = f(z, u)` with the traction `t(z, u)` (`rate_law`).
+"""A contact of n cells whose bristles follow any law, `z' = f(z, u)` with the traction `t(z, u)` (see `Bristle`).
 
 With `u = B V` of a cell (see `cells.Lever`) and the derivatives `A = df/dz`, `F = df/du`, `C = dt/dz`, `E = dt/du`,
 each [2, 2], `D = shift I - A` is inverted cell by cell; `W = sum w B' t`. The functions are those of
@@ -10,16 +10,45 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import Doubles, arrays_at, at, reader
-from planarfriction.kernels.cells import Lever
-from planarfriction.kernels.contacts import ROWS, ModelFunctions, functions_of
-from planarfriction.kernels.distributed_step import put_cell
-from planarfriction.kernels.rate_law import Bristle
-from planarfriction.kernels.steps import SLOPES, StepFunctions, step_functions
+from planarfriction.compiler.memory import arrays_at, at
+from planarfriction.kernels.contacts import ROWS
+from planarfriction.kernels.derive import derive
+from planarfriction.kernels.distributed_step import pulled, put_cell
+from planarfriction.kernels.steps import SLOPES
 from planarfriction.kernels.vectors import plus, put, put_all, three
 
 ROWS_OF_A_CELL = 20
 """Numbers of a cell in a linearisation: A, F, C, E and the inverse of D, row by row."""
+
+
+class Bristle(NamedTuple):
+    """Compiled functions of a bristle; `law` is what `Lever.law` returns."""
+
+    evaluate: Any
+    """`(law, z, u)`: return z' and the traction."""
+    step: Any
+    """`(law, z, u, dt)`: return the bristle after dt and its traction."""
+    linearise: Any
+    """`(law, z, u)`: return z' and the traction with their derivatives, as `CellSlopes`."""
+    linearise_step: Any
+    """`(law, z, u, dt)`: return the bristle and its traction after dt with their derivatives."""
+
+
+def bristle(evaluate: Any, step: Any) -> Bristle:
+    """Return the functions of a bristle, with the derivatives that `derive` writes."""
+    return Bristle(evaluate, step, _slopes(evaluate), _slopes(step))
+
+
+def _slopes(function: Any) -> Any:
+    written = derive(function, ("z", "u"), ("z", "u"))
+    forth, back = written.forth, written.back
+
+    @kernel
+    def slopes(*arguments):
+        found, tape = forth(*arguments)
+        return pulled(back, found, tape)
+
+    return slopes
 
 
 @kernel
@@ -51,7 +80,7 @@ def evaluate(lever, bristle, read, contact, z, v, zdot, w):
     n = own.count
     for i in range(n):
         cell = lever.of(own, i)
-        rate, t = bristle.evaluate(own.law, (z[i], z[n + i]), lever.seen(cell, twist))
+        rate, t = bristle.evaluate(lever.law(own, i), (z[i], z[n + i]), lever.seen(cell, twist))
         zdot[i], zdot[n + i] = rate
         total = plus(total, own.weights[i], lever.wrench(cell, t))
     put(w, total)
@@ -63,7 +92,7 @@ def linearise(lever, bristle, read, contact, z, v, lin):
     own, twist = read(contact), three(v)
     n = own.count
     for i in range(n):
-        found = bristle.linearise(own.law, (z[i], z[n + i]), lever.seen(lever.of(own, i), twist))
+        found = bristle.linearise(lever.law(own, i), (z[i], z[n + i]), lever.seen(lever.of(own, i), twist))
         put_all(at(lin, ROWS_OF_A_CELL * i), (*found.new_z, *found.new_u, *found.traction_z, *found.traction_u))
 
 
@@ -107,15 +136,15 @@ def back_substitute(lever, read, contact, z, r, dv, lin, out):
 
 @kernel
 def change(lever, read, contact, z, zdot, lin, dz, dzdot, rows, friction, size):
-    """Write the changes of `z'` and of the wrench; at held friction, which has no single number here."""
+    """Write the changes of `z'` and of the wrench; bristles grow with friction, and with them what they tend to."""
     own, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
     n, twist = own.count, (rows.d_twist[0], rows.d_twist[1], rows.d_twist[2] + size * rows.twist[2])
     for i in range(n):
-        m, cell, b = at(lin, ROWS_OF_A_CELL * i), lever.of(own, i), (dz[i], dz[n + i])
-        u = lever.seen(cell, twist)
-        dzdot[i], dzdot[n + i] = plus(_applied(_matrix(m, 0), b), 1.0, _applied(_matrix(m, 4), u))
-        t = plus(_applied(_matrix(m, 8), b), 1.0, _applied(_matrix(m, 12), u))
-        total = plus(total, own.weights[i], lever.wrench(cell, t))
+        m, cell, b = at(lin, ROWS_OF_A_CELL * i), lever.of(own, i), (z[i], z[n + i])
+        u, a = lever.seen(cell, twist), plus((dz[i], dz[n + i]), -friction, b)
+        dzdot[i], dzdot[n + i] = plus(_applied(_matrix(m, 0), a), 1.0, _applied(_matrix(m, 4), u))
+        t = plus(_applied(_matrix(m, 8), a), 1.0, _applied(_matrix(m, 12), u))
+        total = plus(total, own.weights[i], lever.wrench(cell, plus(t, -friction * own.law.sigma_0, b)))
     put(rows.d_wrench, plus(total, size * rows.wrench[2], (0.0, 0.0, 1.0)))
 
 
@@ -150,7 +179,7 @@ def step(lever, bristle, read, contact, z, v, dt, new, out):
     n = own.count
     for i in range(n):
         cell = lever.of(own, i)
-        moved, t = bristle.step(own.law, (z[i], z[n + i]), lever.seen(cell, twist), dt)
+        moved, t = bristle.step(lever.law(own, i), (z[i], z[n + i]), lever.seen(cell, twist), dt)
         new[i], new[n + i] = moved
         total = plus(total, own.weights[i], lever.wrench(cell, t))
     put(out, total)
@@ -163,7 +192,7 @@ def slopes(lever, bristle, read, whole, contact, z, v, dt, new, out):
     n, by_twist = own.count, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for i in range(n):
         cell = lever.of(own, i)
-        found = bristle.linearise_step(own.law, (z[i], z[n + i]), lever.seen(cell, twist), dt)
+        found = bristle.linearise_step(lever.law(own, i), (z[i], z[n + i]), lever.seen(cell, twist), dt)
         new[i], new[n + i] = found.new
         total = plus(total, own.weights[i], lever.wrench(cell, found.traction))
         by_twist = plus(by_twist, own.weights[i], lever.around(cell, found.traction_u))
@@ -173,22 +202,5 @@ def slopes(lever, bristle, read, whole, contact, z, v, dt, new, out):
     put_all(at(out, 3), by_twist)
 
 
-_RATES = evaluate, linearise, factor, eliminate, back_substitute, change, solve_transposed, pull_back
-_STEPS = step, slopes
-
-
-class CellFunctions(NamedTuple):
-    """Compiled functions of contacts with a law and a kind of cells."""
-
-    record: Any
-    """Record of a contact: `law`, `count`, `cells`, `weights` as in `cells.CellsContact`."""
-    rates: ModelFunctions
-    steps: StepFunctions
-
-
-def cell_functions(name: str, law: Any, bristle: Bristle, lever: Lever) -> CellFunctions:
-    """Bind the functions of contacts to a record of numbers of a law, its bristle and a lever; compile none yet."""
-    fields = [("law", law), ("count", int), ("cells", Doubles), ("weights", Doubles)]
-    record = NamedTuple(f"{law.__name__}Cells", fields)
-    model = {"lever": lever, "bristle": bristle, "read": reader(record)}
-    return CellFunctions(record, functions_of(name, _RATES, **model), step_functions(name, _STEPS, **model))
+RATES = evaluate, linearise, factor, eliminate, back_substitute, change, solve_transposed, pull_back
+STEPS = step, slopes
