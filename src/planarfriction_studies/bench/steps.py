@@ -48,7 +48,8 @@ def distributed_loop(full: bool) -> Measurement:
     from planarfriction.kernels.steps import step_sequence
 
     model, twists = DistributedModel(disc(), law()), mixed_twists(1000)
-    z, table = model.rest().reshape(-1), model.compiled.step_table(model.compiled.fixed)
+    fixed: Any = model.compiled.fixed
+    z, table = model.rest().reshape(-1), model.compiled.step_table(fixed)
     arguments = np.ones(len(twists)), 1e-4, np.empty_like(twists), np.empty(z.size + 3)
     loop = median(lambda: step_sequence(table, z, twists, *arguments), 9)
     call = _python_step(model, 100)

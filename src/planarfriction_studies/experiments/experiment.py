@@ -132,7 +132,7 @@ def compare_columns(
     `before` stands before the names of the columns. Columns whose unit has no `allowance` are left out.
     """
     compare = compare_curve if reference == "published" else compare_converged
-    allowances = dict.fromkeys(UNITS.values(), allowance) if isinstance(allowance, float) else allowance
+    allowances = allowance if isinstance(allowance, Mapping) else dict.fromkeys(UNITS.values(), allowance)
     return [
         compare(f"{before}{name}", run["time"], run[name], f"{solution}/{name}", allowances[UNITS[name]], cause)
         for name in columns
@@ -151,7 +151,7 @@ def compare(
 
 def compare_all(reference: Reference, rows: Iterable[tuple[str, Any, Any, float, str, str]]) -> list[Comparison]:
     """Compare rows of quantity, ours, theirs, tolerance, unit and cause."""
-    return [compare(words, ours, theirs, reference, *rest) for words, ours, theirs, *rest in rows]
+    return [compare(*row[:3], reference, *row[3:]) for row in rows]
 
 
 class Picture(NamedTuple):

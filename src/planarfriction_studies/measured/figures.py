@@ -16,7 +16,7 @@ from planarfriction_studies.measured.tasks import TASKS
 DRAWN = ("uncoupled", "ellipsoid", "exact surface", "toss by toss")
 """Models of an example, where they took part, besides those of the user."""
 
-COLOURS = dict(zip(DRAWN, (style.OTHER, style.ELLIPSOID, style.EXACT, style.PARTS), strict=True))
+COLOURS: dict[str, str] = dict(zip(DRAWN, (style.OTHER, style.ELLIPSOID, style.EXACT, style.PARTS), strict=True))
 """Model -> its colour; the others take what is left, one after the other."""
 
 

@@ -56,7 +56,7 @@ QUICK, TIGHT = (1e-6, 3e-6, 2e-4), (1e-8, 3e-8, 5e-6)
 AT = 100
 """The last sample before the normal force begins to oscillate."""
 
-Runs = dict[tuple[Load, str], Arrays]
+Runs = dict[tuple[str, str], Arrays]
 """Load, model ("d", "r", "e", with the ending of its law) -> columns of the run [SI]."""
 
 
