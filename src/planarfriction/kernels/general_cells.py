@@ -13,12 +13,32 @@ from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import arrays_at, at
 from planarfriction.kernels.contacts import ROWS
 from planarfriction.kernels.derive import derive
-from planarfriction.kernels.distributed_step import pulled, put_cell
 from planarfriction.kernels.steps import SLOPES
-from planarfriction.kernels.vectors import plus, put, put_all, three
+from planarfriction.kernels.vectors import plus, put, put_all, three, times
 
 ROWS_OF_A_CELL = 20
 """Numbers of a cell in a linearisation: A, F, C, E and the inverse of D, row by row."""
+
+
+class CellSlopes(NamedTuple):
+    """A step of a cell with its derivatives by the bristle and by the velocity of the cell, [2, 2] row by row."""
+
+    new: tuple
+    traction: tuple
+    """Per unit load."""
+    new_z: tuple
+    new_u: tuple
+    traction_z: tuple
+    traction_u: tuple
+
+
+@kernel
+def _pulled(back, results, tape):
+    """Return `CellSlopes` from the way back of two vectors by z and u."""
+    (new, traction), none, x, y = results, (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)
+    (new_zx, new_ux), (new_zy, new_uy) = back(tape, (x, none)), back(tape, (y, none))
+    (zx, ux), (zy, uy) = back(tape, (none, x)), back(tape, (none, y))
+    return CellSlopes(new, traction, (*new_zx, *new_zy), (*new_ux, *new_uy), (*zx, *zy), (*ux, *uy))
 
 
 class Bristle(NamedTuple):
@@ -36,17 +56,18 @@ class Bristle(NamedTuple):
 
 def bristle(evaluate: Any, step: Any) -> Bristle:
     """Return the functions of a bristle, with the derivatives that `derive` writes."""
-    return Bristle(evaluate, step, _slopes(evaluate), _slopes(step))
+    return Bristle(evaluate, step, slopes_of(evaluate), slopes_of(step))
 
 
-def _slopes(function: Any) -> Any:
+def slopes_of(function: Any) -> Any:
+    """Return a function that returns two vectors with their derivatives by z and u, as `CellSlopes`."""
     written = derive(function, ("z", "u"), ("z", "u"))
     forth, back = written.forth, written.back
 
     @kernel
     def slopes(*arguments):
         found, tape = forth(*arguments)
-        return pulled(back, found, tape)
+        return _pulled(back, found, tape)
 
     return slopes
 
@@ -186,6 +207,19 @@ def step(lever, bristle, read, contact, z, v, dt, new, out):
 
 
 @kernel
+def _put_cell(lever, one, weight, found, i, n, out):
+    """Write the derivatives of cell i to its places in d new/dV [2, n, 3], dW/dz [3, 2, n] and d new/dz [2, 2, n]."""
+    (xx, xy, yx, yy), (ux, uy, vx, vy) = times(weight, found.traction_z), found.new_u
+    put(at(out, 3 * i), lever.wrench(one, (ux, uy)))
+    put(at(out, 3 * (n + i)), lever.wrench(one, (vx, vy)))
+    by_x, by_y = lever.wrench(one, (xx, yx)), lever.wrench(one, (xy, yy))
+    for m in range(3):
+        out[(6 + 2 * m) * n + i], out[(7 + 2 * m) * n + i] = by_x[m], by_y[m]
+    for m in range(4):
+        out[(12 + m) * n + i] = found.new_z[m]
+
+
+@kernel
 def slopes(lever, bristle, read, whole, contact, z, v, dt, new, out):
     """Step with the slopes of the wrench, or with all derivatives."""
     own, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
@@ -197,7 +231,7 @@ def slopes(lever, bristle, read, whole, contact, z, v, dt, new, out):
         total = plus(total, own.weights[i], lever.wrench(cell, found.traction))
         by_twist = plus(by_twist, own.weights[i], lever.around(cell, found.traction_u))
         if whole:
-            put_cell(lever, cell, own.weights[i], found, i, n, at(out, SLOPES))
+            _put_cell(lever, cell, own.weights[i], found, i, n, at(out, SLOPES))
     put(out, total)
     put_all(at(out, 3), by_twist)
 
