@@ -41,7 +41,7 @@ def cell_slopes(levers: np.ndarray, weights: np.ndarray, units: np.ndarray) -> n
 
 def _parts(units: np.ndarray, levers: np.ndarray) -> list[np.ndarray]:
     rows = max(1, _AT_ONCE // len(levers))
-    return [units[start : start + rows] for start in range(0, len(units), rows)]
+    return [units[start : start + rows] for start in range(0, max(len(units), 1), rows)]
 
 
 def _direction(levers: np.ndarray, weights: np.ndarray, heading: np.ndarray) -> np.ndarray:
