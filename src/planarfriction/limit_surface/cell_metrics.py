@@ -47,7 +47,7 @@ def _parts(units: np.ndarray, levers: np.ndarray) -> list[np.ndarray]:
 def _direction(levers: np.ndarray, weights: np.ndarray, heading: np.ndarray) -> np.ndarray:
     """Return `h` `[m, 3]` of `u_i/|u_i|` `[m, n, 2]`: sums that run over the cells alike for one twist and for many."""
     pull = np.ascontiguousarray((weights[:, None, None] * levers).reshape(-1, 3).T)
-    return np.einsum("mk,dk->md", heading.reshape(len(heading), -1), pull)
+    return np.einsum("mk,dk->md", heading.reshape(-1, pull.shape[1]), pull)
 
 
 def _headings(levers: np.ndarray, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
