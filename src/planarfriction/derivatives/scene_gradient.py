@@ -58,4 +58,4 @@ def scene_gradient(
         else validation.array(f"{name} of the cost", function(motion.time, values), values.shape)
         for (name, function), values in zip(functions.items(), motion.recorded, strict=True)
     ]
-    return SceneGradient(*motion.head, motion.gradient(*bars))
+    return SceneGradient(*motion.head, gradient=motion.gradient(*bars))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -39,7 +40,8 @@ Report = Callable[[str], None]
 class Fit:
     """Problem with its best values."""
 
-    problem: Problem
+    problem: Any
+    """`Problem` that was solved."""
     coordinates: Coordinates
     x: np.ndarray
     """Coordinates `[F + K]`."""

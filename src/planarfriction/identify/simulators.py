@@ -58,6 +58,9 @@ class Simulator:
     own_radius = False
     """True if the contact radius is a number of its own, not that of the cells; the patch may then change with load."""
 
+    def __init__(self, patch: ContactPatch, law: LuGre, surface: type[LimitSurface] = LimitSurfaceTablePublished):
+        """Prepare the simulation of a patch of fixed shape."""
+
     @classmethod
     def model(cls, patch: ContactPatch, law: LuGre, surface: type[LimitSurface]) -> Any:
         """Make the friction model of a patch and a law."""

@@ -8,7 +8,7 @@ slides, each counts as one observation.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -70,7 +70,7 @@ class Uncertainty:
 
 def uncertainty(fit: Fit) -> Uncertainty:
     """Compute the uncertainty of a fit of logs."""
-    problem: Any = fit.problem
+    problem = fit.problem
     count = len(problem.names)
     residual, jacobian = problem.linearised(fit.values, fit.sigma)
     pull = _pull(fit)
@@ -114,7 +114,7 @@ def uncertainty_over_slides(fit: Fit) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 def _pull(fit: Fit) -> np.ndarray:
     """Compute the derivatives `[F + K, F + K]` of the pull of contact and rig to their starts."""
-    problem: Any = fit.problem
+    problem = fit.problem
     count = len(problem.names)
     result = np.linalg.solve(fit.coordinates.slopes(fit.x).T, fit.coordinates.prior(fit.x)[1]).T
     result[count:, count:] = np.diag(1.0 / problem.rig.with_drift(fit.values[count:]))

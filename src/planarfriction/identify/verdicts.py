@@ -114,7 +114,7 @@ class Candidate:
     @property
     def score(self) -> ModelScore:
         """Measures of how well the model explains the data."""
-        problem: Any = self.fit.problem
+        problem = self.fit.problem
         u = self.uncertainty
         error = float(np.std(u.held_out) / np.sqrt(max(len(u.held_out) - 1, 1)))
         return ModelScore(problem.model, u.score, error, u.reduced_chi2, u.rejected, problem.by_name(self.fit.values))

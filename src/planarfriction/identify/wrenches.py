@@ -158,7 +158,7 @@ def _identification(
 ) -> Identification:
     """Make the result from the best of several models: errors, verdicts, histories, the fitted law and model."""
     fit, u = best.fit, best.uncertainty
-    problem: Any = fit.problem
+    problem = fit.problem
     count = len(problem.names)
     values, rig = problem.split(fit.values)
     errors = np.sqrt(np.diag(u.covariance))
@@ -186,7 +186,7 @@ def _identification(
 def _evidence(best: Candidate, errors: np.ndarray, histories: Sequence[Mapping[str, Any]]) -> Evidence:
     """Collect the evidence for verdicts on estimates with `errors` `[F]`."""
     fit, u = best.fit, best.uncertainty
-    problem: Any = fit.problem
+    problem = fit.problem
     count = len(problem.names)
     values, _ = problem.split(fit.values)
     still = fit.values.copy()
@@ -212,7 +212,7 @@ def _evidence(best: Candidate, errors: np.ndarray, histories: Sequence[Mapping[s
 def _histories(best: Candidate) -> list[dict[str, Any]]:
     """Return measured and predicted wrenches of each log, held-out predictions, and sliding speeds."""
     fit = best.fit
-    problem: Any = fit.problem
+    problem = fit.problem
     values, _ = problem.split(fit.values)
     shown, sliding, coefficients = problem.shown(fit.values), problem.sliding(values), problem.coefficients(values)
     unseen = problem.by_log(best.uncertainty.unseen[:, None])

@@ -168,7 +168,7 @@ class ZarrBookkeeper(Bookkeeper):
         for line in lines:
             try:
                 index, key, *outcome = json.loads(line)
-                self._listed[tuple(index)] = key, Record(*outcome, {})
+                self._listed[tuple(index)] = key, Record(*outcome, variables={})
             except (ValueError, TypeError):
                 continue
 
