@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import importlib.util
+import pickle
 from dataclasses import dataclass
 
 import numpy as np
@@ -216,6 +217,16 @@ def test_a_contact_sticks_where_bristles_keep_their_deflection():
         pf.simulate(dataclasses.replace(scene, contacts=[contact]))
 
 
+def test_a_law_that_was_used_goes_to_another_process():
+    law = BoucWen()
+    rate, steady = law.rate(1e-6, 0.1), law.steady_friction(0.1)
+    assert not any(isinstance(each, np.ndarray) for each in vars(law).values())  # no address of this process
+    again = pickle.loads(pickle.dumps(law))
+    assert again == law
+    assert again.rate(1e-6, 0.1) == rate
+    assert again.steady_friction(0.1) == steady
+
+
 # ---------------------------------------------------------------------- refusals
 
 
@@ -276,5 +287,6 @@ def test_machine_code_goes_by_all_that_a_law_uses(tmp_path):
         spec = importlib.util.spec_from_file_location("own", path)
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
-        prints |= {fingerprint(module.rate), fingerprint(module.rate)}
+        prints |= {fingerprint(["a", "b"], module.rate), fingerprint(["a", "b"], module.rate)}
     assert len(prints) == 3
+    assert fingerprint(["b", "a"], module.rate) not in prints

@@ -16,7 +16,7 @@ import functools
 import hashlib
 import inspect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from planarfriction.compiler import compiled_math as xp
@@ -106,9 +106,12 @@ def cell_functions(name: str, law: Any, bristle_: Bristle, lever: Lever) -> Cell
     return CellFunctions(record, functions_of(name, RATES, **model), step_functions(name, STEPS, **model))
 
 
-def fingerprint(*functions: Callable) -> str:
-    """Return a short text that changes with functions, and with what they use: other functions, modules, numbers."""
-    found: dict[Any, str] = {}
+def fingerprint(names: Sequence[str], *functions: Callable) -> str:
+    """Return a short text that changes with the names of a law's numbers, with functions, and with what these use.
+
+    That is other functions, modules and numbers.
+    """
+    found: dict[Any, str] = {None: " ".join(names)}
     for function in functions:
         _note(function, found)
     return hashlib.sha256(repr(sorted(found.values())).encode()).hexdigest()[:12]

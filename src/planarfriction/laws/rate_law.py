@@ -96,7 +96,8 @@ class RateLaw(FrictionLaw):
         twist = np.zeros((speed.size, 3))
         twist[:, 0] = speed.reshape(-1)
         dt = 0.25 * self.largest_deflection / np.where(twist[:, 0] > 0.0, twist[:, 0], 1.0)
-        step, place = self.functions(cells.POSITIONS).steps.step, np.array([place_of(self._single)])
+        step, single = self.functions(cells.POSITIONS).steps.step, self._single()
+        place = np.array([place_of(single)])
         table = row_of(steps.Parts(address_of(step, steps.WORDS), 1, 2, 4, 1, place, _ALONE))
         z, new, pull = np.zeros((speed.size, 2)), np.empty((speed.size, 2)), np.empty((speed.size, 3))
         for _ in range(400):
@@ -123,7 +124,7 @@ class RateLaw(FrictionLaw):
         state[:, : z.shape[1]], twist[:, : v.shape[1]] = z, v
         rate, pull = np.empty_like(state), np.empty_like(twist)
         function = address_of(self.functions(cells.POSITIONS).rates.evaluate, contacts.WORDS[0])
-        batched_rates.evaluate(function, self._single, state, twist, rate, pull)
+        batched_rates.evaluate(function, self._single(), state, twist, rate, pull)
         return rate, pull[:, :2]
 
     # ------------------------------------------------------------------ machine form
@@ -140,8 +141,8 @@ class RateLaw(FrictionLaw):
         record = NamedTuple(f"{cls.__name__}Numbers", [(name, float) for name in names])
         bristle = rate_law.bristle_of(cls.bristle_rate, cls.bristle_traction)
         kind = "" if lever is cells.POSITIONS else "_turned"
-        name = f"{cls.__name__}_{rate_law.fingerprint(cls.bristle_rate, cls.bristle_traction)}{kind}"
-        return rate_law.cell_functions(name, record, bristle, lever)
+        mark = rate_law.fingerprint(names, cls.bristle_rate, cls.bristle_traction)
+        return rate_law.cell_functions(f"{cls.__name__}_{mark}{kind}", record, bristle, lever)
 
     def contact(self, lever: cells.Lever, numbers: np.ndarray, weights: np.ndarray) -> Any:
         """Return the record of a contact of n cells with these `numbers` and `weights` `[n]`, which compiled code
@@ -150,7 +151,6 @@ class RateLaw(FrictionLaw):
         law = record.__annotations__["law"]
         return record(law(*(float(getattr(self, name)) for name in law._fields)), numbers.shape[1], numbers, weights)
 
-    @functools.cached_property
     def _single(self) -> np.ndarray:
-        """The words of a contact of one cell."""
+        """Return the words of a contact of one cell; they hold addresses of this process, so no law keeps them."""
         return row_of(self.contact(cells.POSITIONS, _POINT, _ALONE))[None]
