@@ -48,10 +48,6 @@ kernel: Any = functools.partial(njit, forceinline=True, **_INNER, **_OPTIONS)
 """Compile an inner function into each of its callers: no allocation, no array assignments that might need a copy."""
 
 
-template: Any = functools.partial(njit, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)
-"""Compile a function into the entry points that `kernels.bind` makes of it; it allocates the scratch of its kernels."""
-
-
 def entry(function: Any) -> Any:
     """Compile a function that compiled code calls by its address (see `compiler.calls`), and keep it on disk."""
     return kept(njit(**_INNER, **_OPTIONS)(function), SOURCES)

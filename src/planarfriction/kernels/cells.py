@@ -119,7 +119,6 @@ def _evaluate(lever, law, own, z, v, zdot, w):
     put(w, total)
 
 
-@kernel
 def evaluate(lever, contact, z, v, zdot, w):
     """Write `z'`, and `W = sum w B' t`."""
     own = read(contact)
@@ -138,7 +137,6 @@ def _linearise(lever, law, own, z, v, m):
         m.k[i] = k
 
 
-@kernel
 def linearise(lever, contact, z, v, lin):
     """Write k, k_z and k_u of each cell."""
     own = read(contact)
@@ -149,7 +147,6 @@ def linearise(lever, contact, z, v, lin):
         _linearise(lever, own.law, own, z, v, m)
 
 
-@kernel
 def factor(lever, contact, z, shift, lin, stiffness):
     """Prepare D, write `sum w B' [-(sigma_0 + sigma_1 shift) D^-1 dz'/du - sigma_2 I] B`.
 
@@ -170,7 +167,6 @@ def factor(lever, contact, z, shift, lin, stiffness):
     put_all(stiffness, total)
 
 
-@kernel
 def eliminate(lever, contact, z, shift, r, lin, w):
     """Write `sum w B' [-(sigma_0 + sigma_1 shift) D^-1 r + sigma_1 r]`."""
     own = read(contact)
@@ -183,7 +179,6 @@ def eliminate(lever, contact, z, shift, r, lin, w):
     put(w, total)
 
 
-@kernel
 def back_substitute(lever, contact, z, r, dv, lin, out):
     """Solve `D out = r + dz'/du B dV`."""
     own = read(contact)
@@ -194,7 +189,6 @@ def back_substitute(lever, contact, z, r, dv, lin, out):
         out[i], out[n + i] = _solved(m, i, h, plus(driven, 1.0, (r[i], r[n + i])))
 
 
-@kernel
 def change(lever, contact, z, zdot, lin, dz, dzdot, rows, friction, size):
     """Write the changes of `z'` and of the wrench."""
     own, rows = read(contact), arrays_at(ROWS, rows)
@@ -211,7 +205,6 @@ def change(lever, contact, z, zdot, lin, dz, dzdot, rows, friction, size):
     put(rows.d_wrench, plus(total, size * rows.wrench[2], (0.0, 0.0, 1.0)))
 
 
-@kernel
 def solve_transposed(lever, contact, z, r, lin, out):
     """Solve `D' out = r`."""
     own = read(contact)
@@ -222,7 +215,6 @@ def solve_transposed(lever, contact, z, r, lin, out):
         out[i], out[n + i] = times(m.diagonal[i], plus(a, -c, (m.by_x[i], m.by_y[i])))
 
 
-@kernel
 def pull_back(lever, contact, z, lin, dzdot, rows, out):
     """Write the transpose of `change`; with the share t of a cell in the wrench its `z'` gets `l - sigma_1 t`."""
     own, rows = read(contact), arrays_at(ROWS, rows)

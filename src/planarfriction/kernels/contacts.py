@@ -80,7 +80,7 @@ WORDS = ("pdddd", "pddd", "pdfdd", "pdfddd", "pddddd", "pddddddff", "pdddd", "pd
 def functions_of(name: str, templates: tuple, **model: Any) -> ModelFunctions:
     """Return the functions of a model, entry points `<name>_<template>`: templates that are bound to its argument."""
     own = namedtuple("Own", model)(**model)
-    return ModelFunctions(*(bind(each, own, f"{name}_{each.py_func.__name__}", entry) for each in templates))
+    return ModelFunctions(*(bind(each, own, f"{name}_{each.__name__}", entry) for each in templates))
 
 
 def calls_of(functions: ModelFunctions, *, change: bool = False) -> np.ndarray:

@@ -46,7 +46,6 @@ def _step(lever, law, own, z, twist, dt, new, out):
     put(out, total)
 
 
-@kernel
 def step(lever, contact, z, v, dt, new, out):
     """Advance the bristles by `dt` at a held twist (see `formulas.relaxation`), and write the wrench at the end."""
     own = cells.read(contact)

@@ -94,7 +94,6 @@ def _product(m, n):
     return a[0], b[0], a[1], b[1]
 
 
-@kernel
 def evaluate(lever, bristle, read, contact, z, v, zdot, w):
     """Write `z'`, and `W`."""
     own, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
@@ -107,7 +106,6 @@ def evaluate(lever, bristle, read, contact, z, v, zdot, w):
     put(w, total)
 
 
-@kernel
 def linearise(lever, bristle, read, contact, z, v, lin):
     """Write A, F, C and E of each cell."""
     own, twist = read(contact), three(v)
@@ -117,7 +115,6 @@ def linearise(lever, bristle, read, contact, z, v, lin):
         put_all(at(lin, ROWS_OF_A_CELL * i), (*found.new_z, *found.new_u, *found.traction_z, *found.traction_u))
 
 
-@kernel
 def factor(lever, read, contact, z, shift, lin, stiffness):
     """Invert D, write `sum w B' (C D^-1 F + E) B`."""
     own, total = read(contact), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -132,7 +129,6 @@ def factor(lever, read, contact, z, shift, lin, stiffness):
     put_all(stiffness, total)
 
 
-@kernel
 def eliminate(lever, read, contact, z, shift, r, lin, w):
     """Write `sum w B' C D^-1 r`."""
     own, total = read(contact), (0.0, 0.0, 0.0)
@@ -144,7 +140,6 @@ def eliminate(lever, read, contact, z, shift, r, lin, w):
     put(w, total)
 
 
-@kernel
 def back_substitute(lever, read, contact, z, r, dv, lin, out):
     """Solve `D out = r + F B dV`."""
     own, twist = read(contact), three(dv)
@@ -155,7 +150,6 @@ def back_substitute(lever, read, contact, z, r, dv, lin, out):
         out[i], out[n + i] = _applied(_matrix(m, 16), plus(driven, 1.0, (r[i], r[n + i])))
 
 
-@kernel
 def change(lever, read, contact, z, zdot, lin, dz, dzdot, rows, friction, size):
     """Write the changes of `z'` and of the wrench; bristles grow with friction, and with them what they tend to."""
     own, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
@@ -169,7 +163,6 @@ def change(lever, read, contact, z, zdot, lin, dz, dzdot, rows, friction, size):
     put(rows.d_wrench, plus(total, size * rows.wrench[2], (0.0, 0.0, 1.0)))
 
 
-@kernel
 def solve_transposed(read, contact, z, r, lin, out):
     """Solve `D' out = r`."""
     n = read(contact).count
@@ -177,7 +170,6 @@ def solve_transposed(read, contact, z, r, lin, out):
         out[i], out[n + i] = _applied_back(_matrix(at(lin, ROWS_OF_A_CELL * i), 16), (r[i], r[n + i]))
 
 
-@kernel
 def pull_back(lever, read, contact, z, lin, dzdot, rows, out):
     """Write the transpose of `change`."""
     own, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
@@ -193,7 +185,6 @@ def pull_back(lever, read, contact, z, lin, dzdot, rows, out):
     put(rows.d_twist, total)
 
 
-@kernel
 def step(lever, bristle, read, contact, z, v, dt, new, out):
     """Step the cells, and write the wrench at the end (see `steps.StepFunctions`)."""
     own, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
@@ -219,7 +210,6 @@ def _put_cell(lever, one, weight, found, i, n, out):
         out[(12 + m) * n + i] = found.new_z[m]
 
 
-@kernel
 def slopes(lever, bristle, read, whole, contact, z, v, dt, new, out):
     """Step with the slopes of the wrench, or with all derivatives."""
     own, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)

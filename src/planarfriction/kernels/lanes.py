@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import kernel, template
+from planarfriction.compiler import kernel
 from planarfriction.kernels.rollouts import row_of
 from planarfriction.kernels.vectors import accumulate, dot, three, times
 
@@ -250,14 +250,12 @@ class LaneModel(NamedTuple):
     own_numbers: int
 
 
-@template
 def rollout(begin, scaled, prepare, advance, numbers, own_numbers, inputs, span, z, wrench, states):
     """Allocate the scratch of `_rollout` and run it."""
     w, own = np.empty(numbers), np.empty(own_numbers)
     _rollout(begin, scaled, prepare, advance, inputs, span, z, wrench, states, w, own)
 
 
-@template
 def gradient(begin, scaled, prepare, retreat, numbers, own_numbers, inputs, states, wrench_bar, span, bars):
     """Allocate the scratch of `_gradient` and run it."""
     w, own = np.empty(numbers), np.empty(own_numbers)

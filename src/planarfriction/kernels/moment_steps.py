@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import at
 from planarfriction.kernels.vectors import plus, put, three, times
 
@@ -59,7 +58,6 @@ class Framed(NamedTuple):
     """`(own)`: return 1; 0 of a point, whose third state takes no part and keeps its value."""
 
 
-@kernel
 def step(frame, hold, taped_step, contact, z, v, dt, new, out):
     """Step a part (see `steps.StepFunctions`)."""
     (own, part), z = frame.read(contact), three(z)
@@ -69,7 +67,6 @@ def step(frame, hold, taped_step, contact, z, v, dt, new, out):
     put(out, frame.wrench(own, done.wrench))
 
 
-@kernel
 def slopes(frame, hold_slopes, taped_step, pull_back, whole, contact, z, v, dt, new, out):
     """Step a part with the slopes of the wrench, or with all derivatives, the rows of the wrench first."""
     (own, part), z = frame.read(contact), three(z)

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, Layout, arrays_at
 from planarfriction.kernels.contacts import ROWS, traction
 from planarfriction.kernels.small_matrices import applied, inverse
@@ -67,7 +66,6 @@ def slopes_in(lin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return by_z, by_u
 
 
-@kernel
 def evaluate(model, contact, z, v, zdot, w):
     """Write `z'` and the wrench."""
     own, v = model.read(contact), three(v)
@@ -77,14 +75,12 @@ def evaluate(model, contact, z, v, zdot, w):
     put(w, model.wrench(own, traction(own.law, z, rate, model.viscous(own, v))))
 
 
-@kernel
 def linearise(model, contact, z, v, lin):
     """Write `f_z` and `f_u`."""
     own = model.read(contact)
     model.slopes(own, model.scaled(own, three(z)), model.seen(own, three(v)), arrays_at(_LINEAR, lin))
 
 
-@kernel
 def factor(model, contact, z, shift, lin, stiffness):
     """Prepare `D^-1`, write `-G' ((sigma_0 + sigma_1 shift) D^-1 f_u G + sigma_2 G)`."""
     own, m = model.read(contact), arrays_at(_LINEAR, lin)
@@ -97,7 +93,6 @@ def factor(model, contact, z, shift, lin, stiffness):
         stiffness[k], stiffness[3 + k], stiffness[6 + k] = model.wrench(own, t)
 
 
-@kernel
 def eliminate(model, contact, z, shift, r, lin, w):
     """Write `G' (sigma_1 - (sigma_0 + sigma_1 shift) D^-1) r`."""
     own, m = model.read(contact), arrays_at(_LINEAR, lin)
@@ -105,7 +100,6 @@ def eliminate(model, contact, z, shift, r, lin, w):
     put(w, model.wrench(own, plus(times(own.law.sigma_1, r), -pull, applied(m.inverse, r))))
 
 
-@kernel
 def back_substitute(model, contact, z, r, dv, lin, out):
     """Solve `D out = r + f_u G dV`."""
     own, m = model.read(contact), arrays_at(_LINEAR, lin)
@@ -113,7 +107,6 @@ def back_substitute(model, contact, z, r, dv, lin, out):
     put(out, model.raw(own, applied(m.inverse, plus(model.scaled(own, three(r)), 1.0, driven))))
 
 
-@kernel
 def change(model, contact, z, zdot, lin, dz, dzdot, rows, friction, size):
     """Write the changes of `z'` and of the wrench."""
     own, m, rows = model.read(contact), arrays_at(_LINEAR, lin), arrays_at(ROWS, rows)
@@ -126,14 +119,12 @@ def change(model, contact, z, zdot, lin, dz, dzdot, rows, friction, size):
     put(rows.d_wrench, plus(w, size * rows.wrench[2], turns))
 
 
-@kernel
 def solve_transposed(model, contact, z, r, lin, out):
     """Solve `D' out = r`; a cotangent is scaled as a state is made raw."""
     own, m = model.read(contact), arrays_at(_LINEAR, lin)
     put(out, model.scaled(own, applied_back(m.inverse, model.raw(own, three(r)))))
 
 
-@kernel
 def pull_back(model, contact, z, lin, dzdot, rows, out):
     """Write the transpose of `change`; that of `G' t` is G."""
     own, m, rows = model.read(contact), arrays_at(_LINEAR, lin), arrays_at(ROWS, rows)

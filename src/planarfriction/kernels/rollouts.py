@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.compiler import kernel, template
+from planarfriction.compiler import kernel
 from planarfriction.kernels.law import LAW, law_of
 from planarfriction.kernels.moment_steps import Contact
 from planarfriction.kernels.vectors import accumulate, dot, plus, put, three, times
@@ -134,7 +134,6 @@ def _gradient(shape_of, hold_slopes, taped_step, pull_back, inputs, states, wren
             put(bars.state[p, b], own)
 
 
-@template
 def gradient(shape_of, hold_slopes, taped_step, pull_back, inputs, states, wrench_bar, span, bars):
     """Allocate the scratch of `_gradient` and run it."""
     work = np.empty(SCRATCH)
@@ -227,7 +226,6 @@ def _forward(shape_of, hold_slopes, taped_step, pull_back, seed, inputs, span, z
             put(z[p, b], own)
 
 
-@template
 def sensitivities(shape_of, hold_slopes, taped_step, pull_back, inputs, span, z, columns, wrenches, slopes):
     """Roll-outs with the derivatives of the wrenches by the numbers `columns` [D]; see `_forward`."""
     work = np.empty(SCRATCH), np.empty((6, 7 + inputs.rows.shape[2]))
@@ -236,7 +234,6 @@ def sensitivities(shape_of, hold_slopes, taped_step, pull_back, inputs, span, z,
     _forward(shape_of, hold_slopes, taped_step, pull_back, _by_number, inputs, span, z, columns, moved, results, work)
 
 
-@template
 def tangent(shape_of, hold_slopes, taped_step, pull_back, inputs, span, z, changes, wrenches, slopes):
     """Roll-outs with their change along given ones of the inputs; see `_forward`.
 
