@@ -91,7 +91,7 @@ def _weighed(wrench, load):
 
 
 @kernel
-def rollout(shape_of, hold, taped_step, inputs, span, z, wrench, states):
+def _rollout(shape_of, hold, taped_step, inputs, span, z, wrench, states):
     """Roll out contacts as `lanes.rollout` does, but add the wrenches to what is in `wrench`."""
     steps, kept = inputs.dt.shape[0], states.shape[2] > 0
     for b in range(span[0], span[1]):
@@ -108,6 +108,11 @@ def rollout(shape_of, hold, taped_step, inputs, span, z, wrench, states):
                 own = step.new if load != 0.0 else (0.0, 0.0, 0.0)
                 _add(wrench[b, t], _weighed(step.wrench, inputs.shares[p, which[t]] * load))
             put(z[p, b], own)
+
+
+def rollout(shape_of, hold, taped_step, inputs, span, z, wrench, states):
+    """Run `_rollout`."""
+    _rollout(shape_of, hold, taped_step, inputs, span, z, wrench, states)
 
 
 @kernel
