@@ -50,8 +50,7 @@ class CompiledDistributed(CompiledModel):
 
     def at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, PackedParts]]:
         """See `CompiledModel`; all rows at once, each with its own weights."""
-        weights = None if self.fixed else self.patch.weights(load.reshape(-1))
-        yield slice(None), self.fixed or _alone(self._packed(weights))
+        yield slice(None), self.fixed or _alone(self._packed(self.patch.weights(load.reshape(-1))))
 
     def linearisation(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
         """Return linearisations `[..., L, N]` as `kernels.cells.LinearCells`, or those of `kernels.general_cells`."""
@@ -93,8 +92,7 @@ class CompiledDistributed(CompiledModel):
 
     def _packed(self, weights: np.ndarray, chosen: np.ndarray | None = None) -> PackedModel:
         """Pack the chosen cells, or all, with R rows of their weights `[R, n]`."""
-        if chosen is None:
-            chosen = np.ones(weights.shape[1], bool)
+        chosen = np.ones(weights.shape[1], bool) if chosen is None else chosen
         weights, positions = np.ascontiguousarray(weights), self.patch.positions[chosen]
         count, numbers = len(positions), self._numbers(chosen)
         record, rows = self._record(numbers, weights)

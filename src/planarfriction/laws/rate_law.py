@@ -138,7 +138,7 @@ class RateLaw(FrictionLaw):
         """
         names = [each.name for each in dataclasses.fields(cls)]  # pyright: ignore[reportArgumentType]
         names += [name for name in _COMMON if name not in names]
-        record = NamedTuple(f"{cls.__name__}Numbers", [(name, float) for name in names])
+        record = NamedTuple(f"{cls.__name__}Numbers", [(name, float) for name in names])  # pyright: ignore
         bristle = rate_law.bristle_of(cls.bristle_rate, cls.bristle_traction)
         kind = "" if lever is cells.POSITIONS else "_turned"
         mark = rate_law.fingerprint(names, cls.bristle_rate, cls.bristle_traction)

@@ -49,7 +49,7 @@ def name_of(measure: Any, kept: bool) -> str:
         rule = "be a function with a name, and without values from around it, if out is given: runs are found by it"
         raise InvalidValueError("measure", rule, measure)
     try:
-        source = inspect.getsource(measure)
+        source = inspect.getsource(measure)  # pyright: ignore[reportArgumentType]
     except (OSError, TypeError):  # typed into a prompt, or no function
         source = ""
     name = getattr(measure, "__qualname__", type(measure).__name__)
