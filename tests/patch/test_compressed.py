@@ -15,7 +15,7 @@ from planarfriction.patch import PUBLISHED_PATCHES, surface_error
 from planarfriction.patch.compressed import number_of_moments
 from planarfriction.scenes.ready import in_hand, in_hand_load
 from planarfriction_studies.experiments.in_hand.runs import CENTRES_OF_MASS, TIGHT, Case, distance
-from planarfriction_studies.experiments.runs import LAW, columns
+from planarfriction_studies.experiments.runs import LAW, simulated
 
 SQUARE = pf.ContactPatch.rectangle(0.02)
 SOFT = pf.ContactPatch.disc(0.01, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k_per_newton=2.0, radius_max=0.01))
@@ -156,13 +156,9 @@ def end_error(case):
     patch = PUBLISHED_PATCHES[case.shape]()
     load = in_hand_load(case.load, placement=case.placement)
     runs = [
-        columns(
-            pf.simulate(
-                in_hand(
-                    pf.DistributedModel(each, LAW), normal_force=load, centre_of_mass=CENTRES_OF_MASS[case.placement]
-                ),
-                **TIGHT,
-            )
+        simulated(
+            in_hand(pf.DistributedModel(each, LAW), normal_force=load, centre_of_mass=CENTRES_OF_MASS[case.placement]),
+            **TIGHT,
         )
         for each in (patch, patch.compressed())
     ]

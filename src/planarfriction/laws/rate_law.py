@@ -15,12 +15,21 @@ from planarfriction.compiler.calls import address_of
 from planarfriction.compiler.memory import place_of, row_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import batched_rates, cells, contacts, rate_law, steps
-from planarfriction.kernels.rules import ratio
-from planarfriction.kernels.vectors import dot, norm, plus, times
+from planarfriction.kernels import batched_rates, cells, contacts, rate_law, rules, steps, vectors
 from planarfriction.laws.base import FrictionLaw
 
 __all__ = ["RateLaw", "dot", "norm", "plus", "ratio", "times"]
+
+dot: Callable[[Any, Any], Any] = vectors.dot
+"""Return `a . b` (`dot(a, b)`)."""
+norm: Callable[[Any], Any] = vectors.norm
+"""Return `|a|`, whose slope at zero is zero."""
+plus: Callable[[Any, Any, Any], Any] = vectors.plus
+"""Return `a + c b` (`plus(a, c, b)`)."""
+times: Callable[[Any, Any], Any] = vectors.times
+"""Return `c a` (`times(c, a)`)."""
+ratio: Callable[[Any, Any], Any] = rules.ratio
+"""Return `x/y` for y > 0; 0 at 0 (`ratio(x, y)`)."""
 
 _SPEED = 1e-3
 """Speed [m/s] that solvers measure errors against, where no Stribeck speed is known."""
