@@ -74,7 +74,7 @@ def arguments(name: str, draw: random.Random) -> list[str]:
     return result
 
 
-@attack("commands", 120)
+@attack("commands", 60)
 def test_commands(draw: random.Random) -> None:
     name = draw.choice([*app.commands, "run", "limit-surface", "identify", PLAN])
     given = [*name.split(), *arguments(name, draw)]
