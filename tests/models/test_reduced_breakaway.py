@@ -24,7 +24,7 @@ def _evenness(model: pf.ReducedModel, z: np.ndarray) -> np.ndarray:
 
 def _breakaway(model: pf.ReducedModel, twist: np.ndarray, z: np.ndarray) -> float:
     """The share of `z` [3], as long as the steady state, from which the rates are not the scaled twist any more."""
-    elastic = model.shape_at(None).factor @ twist
+    elastic = model.rate(np.zeros(3), twist, 1.0)  # to the last bit, on any processor
     low, high = 0.0, 1.0
     for _ in range(60):
         middle = 0.5 * (low + high)
