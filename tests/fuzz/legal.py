@@ -94,7 +94,7 @@ def objects() -> dict[str, Any]:
         "cell_size": 0.001, "offset": 2.0, "amplitude": 1.0, "frequency": 2.0, "count": 2, "degree": 2, "parts": 2,
         "x_min": 0.0, "y_min": 0.0, "cell_width": 0.001, "cell_height": 0.001, "columns": 5, "rows": 5,
         "load": 1, "speed": 0.01, "spin": 1.0, "segments": 5, "samples": 20, "save_every": 0.01, "stop_speed": 1e-4,
-        "start": "rest", "margin": 0.5,
+        "start": "rest", "margin": 0.5, "ramp": 0.01, "fall": 2.0,
         "rtol": 1e-4, "atol": 1e-3, "t": 0.05, "elasto_plastic": 0.9, "creep_speed": 1e-5, "relaxation_time": 0.01,
         "breakaway_ratio": 0.5, "k_per_newton": None, "radius_max": 0.02, "error": None, "speeds": 6,
         "load_error": 0.01,

@@ -2,7 +2,7 @@
 
 from planarfriction.planning.contact_modes import motion_cone
 from planarfriction.planning.grip import GripPlan, plan_grip
-from planarfriction.planning.holding import holding_load
+from planarfriction.planning.holding import dynamic_holding_load, holding_load
 from planarfriction.planning.push_plans import PushPlan, PushReport, plan_push
 from planarfriction.planning.pushing import Push, push
 from planarfriction.planning.report import GripReport
@@ -16,6 +16,7 @@ __all__ = [
     "PushReport",
     "Pusher",
     "Slider",
+    "dynamic_holding_load",
     "holding_load",
     "motion_cone",
     "plan_grip",

@@ -13,8 +13,8 @@ from planarfriction import validation
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.pictures import picture
-from planarfriction.planning.holding import holding_load
-from planarfriction.planning.motions import ROUGH, Aim, Grips, load_on
+from planarfriction.planning.holding import dynamic_holding_load, holding_load
+from planarfriction.planning.motions import ROUGH, Aim, Grips, grip_position, load_on
 from planarfriction.planning.report import GripReport, report_of
 from planarfriction.scenes import Scene, Signal
 
@@ -91,8 +91,9 @@ def plan_grip(
     bounds
         Least and largest normal force [N]; None for 0.02 and 4 times the load that holds the body.
     margin
-        Share by which the last knot, and all knots in the last quarter of the duration, must exceed the `holding_load`
-        with mu_c at the goal.
+        Share by which the last knot, and all knots in the last quarter of the duration, must exceed the load that holds
+        the body at the goal: the `holding_load` with mu_c, or the `dynamic_holding_load` of the scene's model after a
+        fall in one step, whichever is larger.
     friction
         Uncertainty of mu_c and mu_s, as a share; the report shows its effect.
     aim
@@ -116,7 +117,7 @@ def plan_grip(
     at_start = holding_load(load_on(scene, index, 0.0, np.zeros(2), 0.0), patch, law.mu_c)
     if at_start == 0.0:
         raise InvalidValueError("scene", "have a load that moves the body", "no gravity and no force")
-    at_end = holding_load(load_on(scene, index, angle or 0.0, slide, scene.t_end), patch, law.mu_c)
+    at_end = _holding_at(scene, index, load_on(scene, index, angle or 0.0, slide, scene.t_end))
     low, high = _bounds(bounds, at_start)
     least = (1.0 + validation.non_negative("margin", margin)) * at_end
     if least > high:
@@ -256,6 +257,20 @@ def _contact_of(scene: Any, name: str | None) -> int:
     if name is None and len(names) > 1:
         raise InvalidValueError("contact", f"be given if there are several ({', '.join(names)})", name)
     return 0 if name is None else names.index(validation.choice("contact", name, names))
+
+
+def _holding_at(scene: Scene, contact: int, load: np.ndarray) -> float:
+    """Return the normal force [N] that stops and holds a load `[3]` on a contact, however quickly the grip falls to it.
+
+    Laws that creep, and models whose bristles cannot start in equilibrium, have that of mu_c alone.
+    """
+    body, chosen = scene.body, scene.contacts[contact]
+    model, apart = chosen.model, np.subtract(body.position, grip_position(scene, contact))
+    stops = holding_load(load, model.patch, model.law.numbers.mu_c)
+    if not (model.law.holds_at_rest and hasattr(model, "state_of")):
+        return stops
+    mass, inertia = body.mass / chosen.count, (body.inertia + body.mass * float(apart @ apart)) / chosen.count
+    return max(stops, dynamic_holding_load(load, model, mass=mass, inertia=inertia))
 
 
 def _goal(goal: Any) -> tuple[float | None, np.ndarray]:

@@ -1,0 +1,86 @@
+"""The grip that holds while it falls: brackets of simulations, its order in the time of the fall, refusals."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction.errors import InvalidValueError
+from planarfriction.patch import PUBLISHED_PATCHES
+from planarfriction.planning import dynamic_holding_load, holding_load, plan_grip
+
+LAW = pf.LuGre(mu_c=1.0, mu_s=1.2, v_s=1e-3, sigma_0=1e6, sigma_1=8e2, sigma_2=0.2, elasto_plastic=0.9)
+PADS = PUBLISHED_PATCHES["NonConvex1"]()
+DISC = pf.ContactPatch.disc(0.01, cells=11)
+LEVER, WEIGHT = 0.025, 0.5 * 0.2 * 9.81
+LOAD = np.array([0.0, -WEIGHT, -LEVER * WEIGHT])
+PLATE = {"mass": 0.1, "inertia": 0.1 * ((0.15**2 + 0.08**2) / 12 + LEVER**2)}
+
+
+def moved(model, grip: pf.Signal) -> float:
+    """Distance [m] that the plate of the published runs moves as its grip changes."""
+    scene = pf.scenes.in_hand(model, centre_of_mass=(LEVER, 0.0), normal_force=grip, t_end=0.6)
+    data = pf.simulate(dataclasses.replace(scene, start="equilibrium")).data
+    return float(np.hypot(data.x[-1] - data.x[0], data.y[-1] - data.y[0]))
+
+
+@pytest.mark.parametrize("patch", [PADS, DISC], ids=["pads", "disc"])
+def test_a_grip_that_drops_to_it_holds_the_plate_and_one_below_drops_it(patch):
+    """In a scene of its own: 1 % above, partial slip of micrometres at 25 mm from the pads; 2 % below, millimetres."""
+    model = pf.DistributedModel(patch, LAW)
+    least = dynamic_holding_load(LOAD, model, **PLATE)
+    high = 1.5 * holding_load(LOAD, patch, LAW.mu_s)
+    assert moved(model, pf.Signal.sampled([0.0, 0.02], [high, 1.01 * least])) < 1e-4
+    assert moved(model, pf.Signal.sampled([0.0, 0.02], [high, 0.98 * least])) > 1e-3
+
+
+def test_cells_that_break_first_weaken_so_that_a_quick_fall_needs_more():
+    """Two narrow pads: +5.4 %, +4.5 %, +3.3 % of a fall in one step, in 10 ms, in 1 s (0.1 % of search, 0.5 % room)."""
+    model, slow = pf.DistributedModel(PADS, LAW), holding_load(LOAD, PADS, LAW.mu_s)
+    shares = [dynamic_holding_load(LOAD, model, ramp=ramp, **PLATE) / slow for ramp in (0.0, 0.01, 1.0)]
+    assert shares == pytest.approx([1.054, 1.045, 1.033], abs=5e-3)
+    assert shares[0] > shares[1] > shares[2] > 1.0
+    assert shares[0] < LAW.mu_s / LAW.mu_c  # what slides is held by mu_c
+
+
+def test_a_central_force_without_stribeck_needs_what_statics_says():
+    """All cells break together; the search and the approach to the limit within 10 um take less than 1 %."""
+    model = pf.DistributedModel(DISC, dataclasses.replace(LAW, mu_s=1.0))
+    force = (0.0, -WEIGHT, 0.0)
+    least = dynamic_holding_load(force, model, ramp=0.01, fall=2.0)
+    assert least == pytest.approx(WEIGHT, rel=1e-2)
+    assert dynamic_holding_load(force, model, ramp=0.01, fall=2.0, margin=0.5) == pytest.approx(1.5 * least, rel=1e-12)
+    assert dynamic_holding_load(np.zeros(3), model) == 0.0
+
+
+def test_a_plan_ends_above_what_holds_the_cells_of_the_model():
+    """Of 5 x 5 cells, whose radius is 2.7 % short, with mu_s = mu_c; bounds below that were found out by a slip."""
+    law = pf.LuGre(mu_c=1.0, elasto_plastic=0.9)
+    coarse = pf.DistributedModel(pf.ContactPatch.disc(0.01, cells=5), law)
+    scene = pf.scenes.in_hand(coarse, centre_of_mass=(LEVER, 0.0), normal_force=4.0, t_end=1.0)
+    with pytest.raises(InvalidValueError, match=r"bounds must reach the 3\.9"):
+        plan_grip(scene, {"angle": np.radians(-10.0)}, knots=8, margin=0.0, bounds=(0.06, 3.885))
+
+
+def test_what_cannot_be_held_or_does_not_hold_is_refused_in_one_line():
+    model = pf.DistributedModel(DISC, LAW)
+    creeps = pf.DistributedModel(DISC, pf.CoulombStribeck(mu_c=1.0))
+    point = pf.DistributedModel(pf.ContactPatch.points([(0.0, 0.0)]), LAW)
+    cases = {
+        "model must be a friction model": lambda: dynamic_holding_load(LOAD, DISC),
+        "model must have a law that holds at rest": lambda: dynamic_holding_load(LOAD, creeps),
+        "fall must be > 1": lambda: dynamic_holding_load(LOAD, model, fall=1.0),
+        "ramp must be >= 0": lambda: dynamic_holding_load(LOAD, model, ramp=-1.0),
+        "mass must be > 0": lambda: dynamic_holding_load(LOAD, model, mass=0.0),
+        "inertia must be > 0": lambda: dynamic_holding_load(LOAD, model, inertia=-1.0),
+        "margin must be >= 0": lambda: dynamic_holding_load(LOAD, model, margin=-1.0),
+        "wrench must have shape": lambda: dynamic_holding_load((0.0, 1.0), model),
+        "patch must have a contact radius": lambda: dynamic_holding_load((0.0, 1.0, 0.1), point),
+    }
+    for message, attempt in cases.items():
+        with pytest.raises(InvalidValueError) as error:
+            attempt()
+        assert message in str(error.value) and "\n" not in str(error.value), error.value
