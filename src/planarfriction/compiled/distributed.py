@@ -12,6 +12,7 @@ from planarfriction.compiled import packed
 from planarfriction.compiled.base import CompiledModel
 from planarfriction.compiled.packed import PackedModel, PackedParts
 from planarfriction.compiled.rates import linearised
+from planarfriction.compiled.shapes_by_load import ShapesByLoad, cells_by_load
 from planarfriction.compiler.memory import places_of, rows_of
 from planarfriction.kernels import cells as contacts
 from planarfriction.kernels import distributed_step as steps
@@ -19,6 +20,9 @@ from planarfriction.kernels.contacts import ModelFunctions
 from planarfriction.kernels.general_cells import ROWS_OF_A_CELL
 from planarfriction.kernels.leaning_cells import RATES_OF_LEANING, STEPS_OF_LEANING
 from planarfriction.kernels.steps import StepFunctions
+
+LOAD_STEP = 1e-5
+"""Step of the central differences of weights by the load, as a share of it [-]; their relative error is 1e-10."""
 
 
 class CompiledDistributed(CompiledModel):
@@ -90,11 +94,22 @@ class CompiledDistributed(CompiledModel):
         """See `CompiledModel`."""
         return _alone(self._packed(np.array([self.patch.weights(load) for load in loads])))
 
+    def at_loads(self, loads: np.ndarray, slopes: bool) -> ShapesByLoad:
+        """Pack the cells at different loads > 0 `[L]` [N], with the `slopes` of their weights by the load or zeros.
+
+        Slopes are central differences.
+        """
+        by_load, step = None, LOAD_STEP * loads
+        if slopes:
+            above, below = (self.patch.weights(loads + change) for change in (step, -step))
+            by_load = (above - below) / (2.0 * step)[:, None]
+        return cells_by_load(self.numbers(), self.patch.weights(loads), by_load)
+
     def _packed(self, weights: np.ndarray, chosen: np.ndarray | None = None) -> PackedModel:
         """Pack the chosen cells, or all, with R rows of their weights `[R, n]`."""
         chosen = np.ones(weights.shape[1], bool) if chosen is None else chosen
         weights, positions = np.ascontiguousarray(weights), self.patch.positions[chosen]
-        count, numbers = len(positions), self._numbers(chosen)
+        count, numbers = len(positions), self.numbers(chosen)
         record, rows = self._record(numbers, weights)
         return PackedModel(
             self._contact,
@@ -107,8 +122,8 @@ class CompiledDistributed(CompiledModel):
             chosen,
         )
 
-    def _numbers(self, chosen: np.ndarray) -> np.ndarray:
-        """Return the numbers of the chosen cells as `kernels.cells` reads them, `[2, n]` or `[7, n]`."""
+    def numbers(self, chosen: Any = slice(None)) -> np.ndarray:
+        """Return the numbers of the chosen cells, or of all, as `kernels.cells` reads them, `[2, n]` or `[7, n]`."""
         if not self.patch.anisotropic:
             return np.ascontiguousarray(self.patch.positions[chosen].T)
         levers, asymmetry = self.patch.levers()[chosen], self.patch.asymmetries()[chosen]

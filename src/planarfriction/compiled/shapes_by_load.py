@@ -1,4 +1,7 @@
-"""Shapes of a model at many loads with their slopes by the load, as compiled roll-outs read them."""
+"""Shapes of a model at many loads with their slopes by the load, as compiled roll-outs read them.
+
+Cells are one part, whose numbers of the shape are its weights (see `kernels.cells_rollout`).
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ import numpy as np
 
 from planarfriction.compiler.memory import place_of
 from planarfriction.equality import by_parts
+from planarfriction.kernels.cells_rollout import LANES
 
 
 @by_parts
@@ -55,6 +59,19 @@ def shapes_by_load(loaded: Sequence[Sequence[Part]], by_load: np.ndarray | None)
     if by_load is None:
         by_load = np.zeros((*shares.shape, numbers.shape[-1] + 1))
     return ShapesByLoad(shares, surface, numbers, by_load, data)
+
+
+def cells_by_load(levers: np.ndarray, weights: np.ndarray, by_load: np.ndarray | None) -> ShapesByLoad:
+    """Pack cells by the numbers of their levers `[K, N]` and weights at L loads `[L, N]`, with their slopes or zeros."""
+    blocks = -(-levers.shape[1] // LANES)
+    padded = np.zeros((len(levers), blocks * LANES))
+    padded[:, : levers.shape[1]] = levers
+    shapes, slopes = (np.zeros((1, len(weights), blocks * LANES + i)) for i in range(2))
+    shapes[0, :, : levers.shape[1]] = weights
+    if by_load is not None:
+        slopes[0, :, : levers.shape[1]] = by_load
+    data = padded.reshape(len(levers), blocks, LANES).swapaxes(0, 1).ravel()
+    return ShapesByLoad(np.ones((1, len(weights))), np.zeros((1, len(weights), 3), dtype=int), shapes, slopes, data)
 
 
 def places_of(maps: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

@@ -30,7 +30,7 @@ class RolloutInputs(NamedTuple):
     rows: np.ndarray
     """Numbers of law and shape of each part, `[P, B or 1, N]`."""
     state: np.ndarray
-    """States before the first step `[P, B, 3]`."""
+    """States before the first step `[P, B, S]`, S numbers of each part."""
     twist: np.ndarray
     """Twists `[B or 1, T, 3]`."""
     normal_force: np.ndarray
@@ -40,7 +40,7 @@ class RolloutInputs(NamedTuple):
     batch: tuple[int, ...]
 
     def shaped(self, values: np.ndarray, *inner: int) -> np.ndarray:
-        """Return values of parts `[P, B, *inner, 3]` as `[*batch, *inner, P, 3]`; without P for one part."""
+        """Return values of parts `[P, B, *inner, S]` as `[*batch, *inner, *state_shape]`."""
         each = values[0] if len(values) == 1 else np.moveaxis(values, 0, -2)
         return each.reshape(*self.batch, *inner, *self.model.inner)
 
@@ -83,7 +83,7 @@ def checked(
 ) -> RolloutInputs:
     """Check the inputs of a roll-out; `more` are batch axes of other arrays that belong to it."""
     packed = pack(model, parameters)
-    inner, parts = packed.inner, len(packed.rows)
+    inner = packed.inner
     state = np.zeros(inner) if state is None else validation.numbers("state", state)
     if state.shape[-len(inner) :] != inner:
         wanted = ", ".join(map(str, inner))
@@ -104,7 +104,7 @@ def checked(
     return RolloutInputs(
         packed,
         np.array([rows_of("parameters", rows, rows.shape[-1:], batch) for rows in packed.rows]),
-        by_part(np.broadcast_to(state, (*batch, *inner)).reshape(count, *inner), parts),
+        by_part(np.broadcast_to(state, (*batch, *inner)).reshape(count, *inner), packed),
         packed.turned(rows_of("twist", twist, (steps, 3), batch)),
         rows_of("normal_force", load, (steps,), batch),
         np.require(dt, float, ["C", "W", "A"]),
@@ -112,9 +112,11 @@ def checked(
     )
 
 
-def by_part(values: np.ndarray, parts: int) -> np.ndarray:
-    """Return states of contacts `[B, ..., P, 3]`, of one part `[B, ..., 3]`, as those of each part `[P, B, ..., 3]`."""
-    return values[None] if parts == 1 else np.ascontiguousarray(np.moveaxis(values, -2, 0))
+def by_part(values: np.ndarray, packed: Packed) -> np.ndarray:
+    """Return states of contacts `[B, ..., *inner]` as those of each part, `[P, B, ..., S]`."""
+    parts, lead = len(packed.rows), values.shape[: values.ndim - len(packed.inner)]
+    flat = values.reshape(*lead, parts, math.prod(packed.inner) // parts)
+    return np.ascontiguousarray(np.moveaxis(flat, -2, 0))
 
 
 def rows_of(name: str, value: Any, inner: tuple[int, ...], batch: tuple[int, ...]) -> np.ndarray:

@@ -12,9 +12,11 @@ from planarfriction.compiled.shapes_by_load import ShapesByLoad, places_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
-from planarfriction.kernels import published_rollout, published_step, reduced_loads, reduced_rollout, reduced_step
+from planarfriction.kernels import cells_rollout, published_rollout, published_step, reduced_loads, reduced_rollout, reduced_step
 from planarfriction.kernels.law import LAW
-from planarfriction.models import ReducedModel, ReducedModelPublished
+from planarfriction.kernels.rollouts import Bars, Inputs
+from planarfriction.laws.base import is_rate_law
+from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.models.map_sizes import MapSizes, maps_of
 from planarfriction.models.published_shapes import PublishedShape, axes_of
 from planarfriction.models.reduced_map import ReducedShape
@@ -70,8 +72,27 @@ REDUCED_BY_LOAD = _family_of(_OF_LAW, reduced_step.NAMES, reduced_loads, reduced
 """The same where the shape follows the load."""
 
 
+def _cells(entries: cells_rollout.CellRollouts) -> Family:
+    def sensitivities(inputs: Inputs, span: Any, z: np.ndarray, columns: np.ndarray, wrenches: Any, slopes: Any) -> None:
+        """Change one number after the other."""
+        start, none = z[:, slice(*span)].copy(), np.zeros((1, len(inputs.dt), 3))
+        for d, column in enumerate(columns):
+            z[:, slice(*span)], numbers = start, np.zeros((1, inputs.rows.shape[-1]))
+            numbers[:, column] = 1.0
+            changes, change = Bars(np.zeros_like(z), none, none[..., 0], numbers), np.empty(wrenches.shape)
+            entries.tangent(inputs, span, z, changes, wrenches, change)
+            slopes[slice(*span), ..., d] = change[slice(*span)]
+
+    names, columns = cells_rollout.PARAMETERS, np.array(cells_rollout.COLUMNS)
+    return Family(names, columns, entries.rollout, entries.gradient, sensitivities, entries.tangent)
+
+
+CELLS, TURNED_CELLS = _cells(cells_rollout.ISOTROPIC), _cells(cells_rollout.TURNED)
+"""`DistributedModel`, isotropic or with a friction metric."""
+
+
 class Packed(NamedTuple):
-    """A reduced model of P parts as compiled loops see it; most models have one."""
+    """A model of P parts as compiled loops see it; most models have one."""
 
     family: Family
     rows: np.ndarray
@@ -80,10 +101,14 @@ class Packed(NamedTuple):
     """Shapes of the parts; a function of loads where they follow the load (see `CompiledThreeStates.at_loads`)."""
     axes: np.ndarray | None = None
     """Symmetric `[3, 3]`, or None: twists go in through it, wrenches come out."""
+    cells: int = 0
+    """Number of cells, each with a bristle; 0 for a model of three states a part."""
 
     @property
     def inner(self) -> tuple[int, ...]:
         """Shape of the state of one contact."""
+        if self.cells:
+            return 2, self.cells
         return (3,) if len(self.rows) == 1 else (len(self.rows), 3)
 
     def turned(self, vectors: np.ndarray) -> np.ndarray:
@@ -133,17 +158,24 @@ def _family(model: Any) -> Family:
         return REDUCED
     if isinstance(model, ReducedModelPublished):
         return PUBLISHED
-    raise InvalidValueError("model", "be a ReducedModel or a ReducedModelPublished", type(model).__name__)
+    if isinstance(model, DistributedModel) and not (is_rate_law(model.law) or model.patch.asymmetric):
+        return TURNED_CELLS if model.patch.anisotropic else CELLS
+    given = "one with a RateLaw or an asymmetry" if isinstance(model, DistributedModel) else type(model).__name__
+    raise InvalidValueError("model", f"be one that has compiled roll-outs ({MODELS.classes()})", given)
 
 
 def is_compiled(model: Any) -> bool:
-    """Return True for a reduced model that compiled roll-outs know."""
-    return isinstance(model, ReducedModel | ReducedModelPublished) and not _refusal(model)
+    """Return True for a model that compiled roll-outs know."""
+    try:
+        _family(model)
+    except InvalidValueError:
+        return False
+    return not _refusal(model)
 
 
-def _refusal(model: ReducedModel | ReducedModelPublished) -> tuple[str, str, Any] | None:
+def _refusal(model: Any) -> tuple[str, str, Any] | None:
     """Return the rule that keeps a model from compiled roll-outs, as `InvalidValueError` takes it, or None."""
-    if not model.depends_on_load:
+    if isinstance(model, DistributedModel) or not model.depends_on_load:
         return None
     if isinstance(model, ReducedModel):
         if model.load_error > 0.0:
@@ -158,11 +190,15 @@ def _refusal(model: ReducedModel | ReducedModelPublished) -> tuple[str, str, Any
 
 
 def _packed(model: Any) -> Packed:
-    _family(model)
+    family = _family(model)
     refusal = _refusal(model)
     if refusal is not None:
         raise InvalidValueError(*refusal)
     law = model.law.numbers
+    if isinstance(model, DistributedModel):
+        at_loads = model.compiled.at_loads
+        shapes = at_loads if model.depends_on_load else at_loads(np.ones(1), False)
+        return Packed(family, np.array([law]), shapes, cells=model.state_shape[1])
     if not model.depends_on_load:
         return pack_parts(law, model.parts_at(1.0))
     row = [*law, *np.zeros(len(reduced_step.NAMES) - len(law))]

@@ -157,16 +157,16 @@ def rollout_vjp(
     Raises `InvalidValueError` as `rollout` does, and for a model that has no compiled roll-out.
     """
     inputs = checked(model, state, twist, normal_force, dt, parameters)
-    (parts, count), steps, packed = inputs.state.shape[:2], len(inputs.dt), inputs.model
+    (parts, count, _), steps, packed = inputs.state.shape, len(inputs.dt), inputs.model
     inner, family, turned = packed.inner, packed.family, packed.turned
     cotangents = turned(rows_of("wrenches_bar", wrenches_bar, (steps, 3), inputs.batch))
     if states is None:
         on_the_way = _roll(inputs, steps)[2]
     else:
-        on_the_way = by_part(rows_of("states", states, (steps, *inner), inputs.batch), parts)
+        on_the_way = by_part(rows_of("states", states, (steps, *inner), inputs.batch), packed)
     z_bar = np.zeros_like(inputs.state)
     if state_bar is not None:
-        z_bar[:] = by_part(rows_of("state_bar", state_bar, inner, inputs.batch), parts)
+        z_bar[:] = by_part(rows_of("state_bar", state_bar, inner, inputs.batch), packed)
     rows_bar = np.zeros((parts, count, inputs.rows.shape[-1]))
     bars, compiled = Bars(z_bar, np.zeros((count, steps, 3)), np.zeros((count, steps)), rows_bar), inputs.compiled(True)
     share(compiled, count, lambda *span: family.gradient(compiled, on_the_way, cotangents, span, bars))
@@ -244,7 +244,7 @@ def rollout_jvp(
     numbers[:, family.columns] = values
     end, count = inputs.state.copy(), inputs.state.shape[1]
     moved = np.zeros_like(end)
-    moved[:] = by_part(z, len(end))
+    moved[:] = by_part(z, packed)
     changed, compiled = Bars(moved, turned(twists), loads, numbers), inputs.compiled(slopes=bool(loads.any()))
     both = [np.zeros((count, *steps, 3)) for _ in range(2)]
     share(compiled, count, lambda *span: family.tangent(compiled, span, end, changed, *both))
@@ -253,12 +253,12 @@ def rollout_jvp(
 
 
 def _roll(inputs: RolloutInputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return states at the end `[P, B, 3]`, wrenches `[..., T, 3]`, and with `kept = T` the states before each step.
+    """Return states at the end `[P, B, S]`, wrenches `[..., T, 3]`, and with `kept = T` the states before each step.
 
-    These are `[P, B, T, 3]`; `kept = 0` for none.
+    These are `[P, B, T, S]`; `kept = 0` for none.
     """
     end, count = inputs.state.copy(), inputs.state.shape[1]
-    states, wrenches = np.empty((len(end), count, kept, 3)), np.zeros((count, len(inputs.dt), 3))
+    states, wrenches = np.empty((len(end), count, kept, end.shape[-1])), np.zeros((count, len(inputs.dt), 3))
     compiled, family = inputs.compiled(), inputs.model.family
     share(compiled, count, lambda *span: family.rollout(compiled, span, end, wrenches, states))
     return end, inputs.of_all(inputs.model.turned(wrenches)), states

@@ -81,7 +81,7 @@ def placed(typingctx, a, i, x):
 
 @intrinsic
 def accumulate(typingctx, row, at, stride, record):
-    """Add the numbers of a record, which may hold records, one by one to `row[at]`, `row[at + stride]`, ..."""
+    """Add the numbers of a record, which may hold records, one by one to `row[at]`, `row[at + stride]`, ...; row: an array or a pointer."""
 
     def numbers(builder, kind, value):
         if not isinstance(kind, types.BaseTuple):
@@ -90,7 +90,8 @@ def accumulate(typingctx, row, at, stride, record):
         return [number for each in parts for number in numbers(builder, *each)]
 
     def generate(context, builder, signature, args):
-        first = context.make_array(signature.args[0])(context, builder, args[0]).data
+        pointed = isinstance(signature.args[0], types.CPointer)
+        first = args[0] if pointed else context.make_array(signature.args[0])(context, builder, args[0]).data
         at = args[1]
         for number in numbers(builder, signature.args[3], args[3]):
             place = builder.gep(first, [at])
