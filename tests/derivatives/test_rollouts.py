@@ -283,10 +283,12 @@ def test_one_load_for_each_contact_and_rest():
 # ---------------------------------------------------------------------- other models
 
 
-@pytest.mark.parametrize("kind", ["distributed", "a map for each load"])
+@pytest.mark.parametrize("kind", ["leaning cells", "a map for each load"])
 def test_a_rollout_of_any_model_takes_its_steps(kind):
     model = {
-        "distributed": lambda: pf.DistributedModel(PATCH, ELASTIC),
+        "leaning cells": lambda: pf.DistributedModel(
+            PATCH.with_friction_metric(np.eye(2), asymmetry=[0.2, 0.0]), ELASTIC
+        ),
         "a map for each load": lambda: pf.ReducedModel(FINGER, ELASTIC, segments=8, speeds=8, load_error=0.0),
     }[kind]()
     twists = np.random.default_rng(3).normal(size=(2, 5, 3)) * (1e-3, 1e-3, 0.3)
@@ -340,7 +342,7 @@ def test_a_shape_that_follows_the_load_is_refused_and_a_kept_one_is_not():
         ({"parameters": np.ones(12)}, r"breakaway_ratio must be in \[0, 1\), got 1.0"),
         ({"state": np.zeros((2, 3)), "twist": np.zeros((3, T, 3))}, "batch axes must broadcast"),
         ({"wrenches_bar": np.ones((T + 1, 3))}, rf"wrenches_bar must have shape \[..., {T}, 3\]"),
-        ({"model": "a"}, "model must be a ReducedModel or a ReducedModelPublished, got str"),
+        ({"model": "a"}, "model must be one that has compiled roll-outs, got str"),
     ],
 )
 def test_wrong_input_is_one_clear_line(changed, message):

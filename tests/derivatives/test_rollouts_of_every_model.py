@@ -71,17 +71,28 @@ def soft(patch: pf.ContactPatch, law: str, parts: int = 1) -> Case:
     return reduced(patch, law, parts=parts, speeds=6, load_error=3e-4)
 
 
+def distributed(patch: pf.ContactPatch, law: str, speed: str = "around") -> Case:
+    return Case(lambda: pf.DistributedModel(patch, LAWS[law]), SPEEDS[speed])
+
+
+MANY = pf.ContactPatch.disc(0.01, cells=5)
+"""More cells than one block of compiled roll-outs holds."""
+
 FIXED = {
     **{f"published {surface}, {law}": published(surface, law) for surface in SURFACES for law in LAWS},
     **{f"reduced, {law}, {speed}": reduced(PATCH, law, speed) for law in LAWS for speed in SPEEDS},
     **{f"reduced, {name}": reduced(patch, "wide") for name, patch in DIRECTED.items()},
     "parts": reduced(PATCH, "wide", parts=2),
     "parts, metric": reduced(DIRECTED["metric"], "wide", parts=2),
+    **{f"cells, {law}, {speed}": distributed(PATCH, law, speed) for law in LAWS for speed in SPEEDS},
+    **{f"cells, {name}": distributed(DIRECTED[name], "wide") for name in ("metric", "metrics")},
+    "cells, many": distributed(MANY, "elasto-plastic"),
     "published table, metric": Case(
         lambda: pf.ReducedModelPublished(DIRECTED["metric"], LAWS["wide"], pf.LimitSurfaceTable(DIRECTED["metric"]))
     ),
 }
 SOFT = {
+    "soft cells": distributed(TIP, "elasto-plastic"),
     "soft, plain": soft(TIP, "plain"),
     "soft, wide": soft(TIP, "wide"),
     "soft parts": soft(TIP, "wide", 3),
@@ -100,7 +111,7 @@ def twist_sizes(model: Any) -> np.ndarray:
 
 def state_sizes(model: Any) -> np.ndarray:
     """Return the factors that turn deflections [m] into states."""
-    return 1.0 / twist_sizes(model) if isinstance(model, pf.ReducedModelPublished) else np.ones(3)
+    return 1.0 / twist_sizes(model) if isinstance(model, pf.ReducedModelPublished) else np.ones(1)
 
 
 def drive(case: Case, seed: int = 0, steps: int = T) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -153,7 +164,7 @@ def test_a_rollout_takes_the_steps_of_the_model(name):
 def test_the_gradient_of_a_rollout_is_that_of_differences(name):
     case = CASES[name]
     model, (state, twists, loads) = case.model, drive(case, 3)
-    if name in SOFT:
+    if name in SOFT and isinstance(model, pf.ReducedModel):
         loads = blended_loads(model)
     parameters, bars = derivatives.parameters_of(model), cotangents(model)
     lengths = np.where(np.arange(len(parameters)) >= 10, model.patch.contact_radius(LOAD), 1e-3)
@@ -221,7 +232,7 @@ def test_changes_of_parameters_are_the_jacobian(name):
     assert np.array_equal(chosen, by.d_wrenches[..., [5, 3]])
 
 
-@pytest.mark.parametrize("name", [name for name in FIXED if "parts" not in name])
+@pytest.mark.parametrize("name", [name for name in FIXED if not name.startswith(("parts", "cells"))])
 def test_the_adjoint_is_the_transpose_of_the_jacobians(name):
     """`<bar, J dx> = <J' bar, dx>` for changes of state, twists and loads, `J` step by step."""
     case = CASES[name]
@@ -240,7 +251,7 @@ def test_the_adjoint_is_the_transpose_of_the_jacobians(name):
 
 
 @pytest.mark.parametrize(
-    "name", ["published published, elasto-plastic", "reduced, elasto-plastic, around", "soft parts"]
+    "name", ["published published, elasto-plastic", "reduced, elasto-plastic, around", "soft parts", "cells, many"]
 )
 def test_a_batch_is_a_loop(name):
     case, random = CASES[name], np.random.default_rng(8)
@@ -273,7 +284,9 @@ def test_a_batch_is_a_loop(name):
         assert got == pytest.approx(wanted, rel=1e-11, abs=1e-12 * np.abs(wanted).max())
 
 
-@pytest.mark.parametrize("name", ["published ellipsoid, elasto-plastic", "reduced, elasto-plastic, around"])
+@pytest.mark.parametrize(
+    "name", ["published ellipsoid, elasto-plastic", "reduced, elasto-plastic, around", "cells, wide, around"]
+)
 def test_kept_states_and_several_threads_change_nothing(name):
     case = CASES[name]
     model, (state, twists, loads) = case.model, drive(case, steps=500)

@@ -219,7 +219,7 @@ FINGER = pf.ContactPatch.rectangle(
         ({"parameters": np.ones(12)}, r"parameters must have shape \[..., 7\], got shape \[12\]"),
         ({"parameters": np.ones(7)}, r"breakaway_ratio must be in \[0, 1\), got 1.0"),
         ({"parameters": np.zeros(7)}, "sigma_0 must be > 0, got 0.0"),
-        ({"model": PATCH}, "model must be a ReducedModel or a ReducedModelPublished, got ContactPatch"),
+        ({"model": PATCH}, "model must be one that has compiled roll-outs, got ContactPatch"),
         ({"model": pf.ReducedModel(FINGER, LAWS["plain"], load_error=0.0)}, "load_error must be > 0 for derivatives"),
     ],
 )

@@ -62,7 +62,7 @@ def shapes_by_load(loaded: Sequence[Sequence[Part]], by_load: np.ndarray | None)
 
 
 def cells_by_load(levers: np.ndarray, weights: np.ndarray, by_load: np.ndarray | None) -> ShapesByLoad:
-    """Pack cells by the numbers of their levers `[K, N]` and weights at L loads `[L, N]`, with their slopes or zeros."""
+    """Pack cells by the numbers of their levers `[K, N]` and weights `[L, N]` at L loads, with slopes or zeros."""
     blocks = -(-levers.shape[1] // LANES)
     padded = np.zeros((len(levers), blocks * LANES))
     padded[:, : levers.shape[1]] = levers

@@ -1,9 +1,9 @@
 """Roll-outs with exact derivatives, on which the tensor front ends and identification are built.
 
-`rollout` steps a model through given twists and loads. For reduced models, `rollout_vjp` is its discrete adjoint,
-`rollout_jvp` its directional derivative, and `rollout_jacobian` gives the derivatives of each wrench with
-respect to the parameters. All are derivatives of the steps themselves, not of the continuous model, so they agree with
-finite differences of `rollout` to rounding. Kinks are described in `planarfriction.kernels.bristle_step`.
+`rollout` steps a model through given twists and loads. `rollout_vjp` is its discrete adjoint, `rollout_jvp` its
+directional derivative, and `rollout_jacobian` gives the derivatives of each wrench with respect to the parameters. All
+are derivatives of the steps themselves, not of the continuous model, so they agree with finite differences of `rollout`
+to rounding. Kinks are described in `planarfriction.kernels.bristle_step`.
 """
 
 from planarfriction.derivatives.parameters import PARAMETERS, parameter_names, parameters_of

@@ -1,4 +1,4 @@
-"""The physical parameters of a reduced model as one vector, and as the rows that compiled loops read."""
+"""The physical parameters of a model as one vector, and as the rows that compiled loops read."""
 
 from __future__ import annotations
 
@@ -12,7 +12,14 @@ from planarfriction.compiled.shapes_by_load import ShapesByLoad, places_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
-from planarfriction.kernels import cells_rollout, published_rollout, published_step, reduced_loads, reduced_rollout, reduced_step
+from planarfriction.kernels import (
+    cells_rollout,
+    published_rollout,
+    published_step,
+    reduced_loads,
+    reduced_rollout,
+    reduced_step,
+)
 from planarfriction.kernels.law import LAW
 from planarfriction.kernels.rollouts import Bars, Inputs
 from planarfriction.laws.base import is_rate_law
@@ -73,7 +80,9 @@ REDUCED_BY_LOAD = _family_of(_OF_LAW, reduced_step.NAMES, reduced_loads, reduced
 
 
 def _cells(entries: cells_rollout.CellRollouts) -> Family:
-    def sensitivities(inputs: Inputs, span: Any, z: np.ndarray, columns: np.ndarray, wrenches: Any, slopes: Any) -> None:
+    def sensitivities(
+        inputs: Inputs, span: Any, z: np.ndarray, columns: np.ndarray, wrenches: Any, slopes: Any
+    ) -> None:
         """Change one number after the other."""
         start, none = z[:, slice(*span)].copy(), np.zeros((1, len(inputs.dt), 3))
         for d, column in enumerate(columns):
@@ -117,10 +126,11 @@ class Packed(NamedTuple):
 
 
 def parameter_names(model: Any) -> tuple[str, ...]:
-    """Return the names of the P parameters of a reduced model, in the order of the parameter vector.
+    """Return the names of the P parameters of a model, in the order of the parameter vector.
 
-    Those of `ReducedModelPublished` are `PARAMETERS`. Those of `ReducedModel` are the parameters of the law without
-    gamma, because its stored map depends on gamma, as it does on the shape of the patch.
+    Those of `ReducedModelPublished` are `PARAMETERS`, those of `DistributedModel` the parameters of the law. Those of
+    `ReducedModel` are the parameters of the law without gamma, because its stored map depends on gamma, as it does on
+    the shape of the patch.
 
     Raises InvalidValueError for a model that has no roll-outs.
     """
@@ -128,7 +138,7 @@ def parameter_names(model: Any) -> tuple[str, ...]:
 
 
 def parameters_of(model: Any) -> np.ndarray:
-    """Return the parameters of a reduced model `[P]`; the breakaway ratio of plain bristles has no effect.
+    """Return the parameters of a model `[P]`; the breakaway ratio of plain bristles has no effect.
 
     Raises InvalidValueError for a model that has no roll-outs.
     """
@@ -160,8 +170,8 @@ def _family(model: Any) -> Family:
         return PUBLISHED
     if isinstance(model, DistributedModel) and not (is_rate_law(model.law) or model.patch.asymmetric):
         return TURNED_CELLS if model.patch.anisotropic else CELLS
-    given = "one with a RateLaw or an asymmetry" if isinstance(model, DistributedModel) else type(model).__name__
-    raise InvalidValueError("model", f"be one that has compiled roll-outs ({MODELS.classes()})", given)
+    given = "cells with a RateLaw or an asymmetry" if isinstance(model, DistributedModel) else type(model).__name__
+    raise InvalidValueError("model", "be one that has compiled roll-outs", given)
 
 
 def is_compiled(model: Any) -> bool:

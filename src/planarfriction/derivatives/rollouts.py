@@ -101,11 +101,11 @@ def rollout(
     """Step a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
 
     The steps are those of `model.step`. `normal_force` broadcasts with `[..., T]`: one number, one for each step, or
-    one for each contact `[..., 1]`; `dt` is one number or `[T]`; leading axes broadcast. For a reduced model,
-    `parameters` `[..., P]` (see `parameter_names`) replace its own; the limit surface, or the map of a `ReducedModel`,
-    stays as it is, in scaled coordinates. Reduced models run in compiled code, batches on all processors; all other
-    models step in Python, as do shapes that are rebuilt for each load (`load_error=0`, and `ReducedModelPublished`
-    unless "keep").
+    one for each contact `[..., 1]`; `dt` is one number or `[T]`; leading axes broadcast. `parameters` `[..., P]` (see
+    `parameter_names`) replace those of the model; the limit surface, or the map of a `ReducedModel`, stays as it is, in
+    scaled coordinates. Models run in compiled code, batches on all processors; cells with a `RateLaw` or an asymmetry
+    step in Python, as do shapes that are rebuilt for each load (`load_error=0`, and `ReducedModelPublished` unless
+    "keep").
 
     Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for `parameters` if the model cannot take
     them.
@@ -150,9 +150,9 @@ def rollout_vjp(
     gradient of an input that several contacts share is the sum over these contacts. `states` are those of
     `rollout_states`, if available. At zero load the gradient with respect to that load is one-sided.
 
-    If the shape depends on the load, it is differentiated too: second moments and shares by central differences with a
-    step of 1e-5 of the load (relative error 1e-10), maps along the chord between two of the stored loads
-    (docs/load-families.md).
+    If the shape depends on the load, it is differentiated too: weights of cells, second moments and shares by central
+    differences with a step of 1e-5 of the load (relative error 1e-10), maps along the chord between two of the stored
+    loads (docs/load-families.md).
 
     Raises `InvalidValueError` as `rollout` does, and for a model that has no compiled roll-out.
     """
@@ -190,7 +190,7 @@ def rollout_jacobian(
     *,
     parameters: Any = None,
 ) -> RolloutJacobian:
-    """Step a reduced model as `rollout` does, with derivatives of the wrenches by the parameters `names`.
+    """Step a model as `rollout` does, with derivatives of the wrenches by the parameters `names`.
 
     Computed forward in time, for least squares, which needs the derivatives of each wrench; the initial state is held
     fixed. `names` are some of `parameter_names`, or None for all.
@@ -220,7 +220,7 @@ def rollout_jvp(
     *,
     parameters: Any = None,
 ) -> RolloutJVP:
-    """Step a reduced model as `rollout` does, with the change of the result for changes of the inputs (`tangent`).
+    """Step a model as `rollout` does, with the change of the result for changes of the inputs (`tangent`).
 
     Computed forward in time, at about six times the cost of `rollout_vjp`: it gives `J x` where that gives `J' x`.
 

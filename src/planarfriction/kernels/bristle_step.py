@@ -10,7 +10,8 @@ grip `q`, the speed `v` and `h = |u|/v`. Derivatives are those that `derive` wri
 
 At the kinks: the slope of a norm at zero is zero, and `along` of no bristle is constant. A minimum or maximum of equal
 numbers has the slope of its first argument. A bristle that the cap just touches counts as not capped: steady sliding
-sits on the cap to the last bit, and whether rounding lifts it over must not decide about its slope.
+sits on the cap to the last bit, and whether rounding lifts it over must not decide about its slope, nor about that of
+the cap of the next step.
 """
 
 from __future__ import annotations
@@ -42,6 +43,20 @@ rule(cap, "s", {0: "-{t} * per_capped({0}, {1})", 1: "per_capped({0}, {1})"}, pe
 
 
 @kernel
+def reachable(deflection, law):
+    """Compute `formulas.reachable_deflection`, with no slope for a deflection that is full to rounding."""
+    return formulas.reachable_deflection(xp, deflection, law)
+
+
+@kernel
+def _beyond_full(deflection):
+    return xp.where(deflection > ROUNDING, 1.0, 0.0)
+
+
+rule(reachable, "s", {0: "beyond_full({0})"}, beyond_full=_beyond_full)
+
+
+@kernel
 def _along(z, size, u, per_h):
     """Compute the speed at which a bristle of norm `size` is being stretched; 0 for none."""
     return per_h * ratio(dot(z, u), size)
@@ -69,7 +84,7 @@ def finish(law, z, u, v, per_h, q, dt, deflection, decay_dt):
     free = plus(times(left, z), dt * mean, u)
     size = norm(free)
     reached = size * q * per_h
-    back = cap(reached, formulas.reachable_deflection(xp, deflection, law))
+    back = cap(reached, reachable(deflection, law))
     k = formulas.bristle_decay(xp, reached * back, _along(free, size, u, per_h), v, q, law)
     return times(back, free), k
 

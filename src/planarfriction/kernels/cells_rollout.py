@@ -22,18 +22,16 @@ from planarfriction.kernels.derive import derive
 from planarfriction.kernels.forward import forward
 from planarfriction.kernels.law import law_of, squared
 from planarfriction.kernels.rollouts import row_of
-from planarfriction.kernels.vectors import accumulate, dot, plus, put, three, times
+from planarfriction.kernels.vectors import accumulate, dot, plus, put, scatter, three, times
 
 LANES = 8
 """Cells of a block: the numbers of the longest vectors that processors have."""
 
-_Z, _WEIGHT, _BY_LOAD, _BAR, _BLOCK = (LANES * n for n in (5, 7, 8, 9, 11))
+_Z, _WEIGHT, _BY_LOAD, _BAR, _OUT, _LAW = (LANES * n for n in (5, 7, 8, 9, 11, 15))
 """Fields of a block behind the numbers of the levers: state, weights, their slopes by the load, cotangent or change of
-the state."""
-
-_LOAD, _LAW = LANES * 3, LANES * 4
-"""Fields of the sums over blocks on the way back, behind the cotangent of the twist; forwards the wrench and its
-change."""
+the state, what adds up over the cells (the wrench and its change; on the way back the cotangents of twist and load),
+and what adds up over the steps too: the cotangent of the law. Nothing is shared by blocks, so that each is seen to be
+free of dependences."""
 
 PARAMETERS = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
 """Numbers of the law that derivatives are taken by."""
@@ -42,7 +40,7 @@ COLUMNS = tuple(LawNumbers._fields.index(name) for name in PARAMETERS)
 """Their places in a row."""
 
 _COUNT = len(PARAMETERS)
-_SUMS = _LAW + LANES * _COUNT
+_BLOCK = _LAW + LANES * _COUNT
 _BY = ("z", "u", *(f"law.{name}" for name in PARAMETERS))
 _WRITTEN = derive(distributed_step.cell, _BY, ("z", "u"))
 _forth, _back = _WRITTEN.forth, _WRITTEN.back
@@ -70,23 +68,21 @@ def _put_pair(block, field, i, a):
 
 
 @kernel
-def _total(sums, field):
-    """Return the sum of the lanes of a field."""
+def _total(w, blocks, field):
+    """Return the sum of a field over all cells."""
     total = 0.0
-    for i in range(LANES):
-        total += sums[field + i]
+    for k in range(blocks):
+        block = at(w, k * _BLOCK + field)
+        for i in range(LANES):
+            total += block[i]
     return total
 
 
 @kernel
-def _totals(sums, field):
-    return _total(sums, field), _total(sums, field + LANES), _total(sums, field + 2 * LANES)
-
-
-@kernel
-def _clear(sums, count):
-    for i in range(count):
-        sums[i] = 0.0
+def _totals(w, blocks, field):
+    return (
+        _total(w, blocks, field), _total(w, blocks, field + LANES), _total(w, blocks, field + 2 * LANES)
+    )  # fmt: skip
 
 
 @kernel
@@ -139,24 +135,25 @@ def _weigh(w, blocks, weights, by_load):
 
 
 @kernel
-def _advance_one(lever, law, block, i, twist, dt, sums):
+def _advance_one(lever, law, block, i, twist, dt):
     one = lever.of(Block(block, LANES), i)
     new, traction = distributed_step.cell(law, _pair(block, _Z, i), lever.seen(one, twist), dt)
     _put_pair(block, _Z, i, new)
-    accumulate(sums, i, LANES, times(block[_WEIGHT + i], lever.wrench(one, traction)))
+    scatter(block, _OUT + i, LANES, times(block[_WEIGHT + i], lever.wrench(one, traction)))
 
 
 @kernel
-def _advance(lever, law, block, twist, dt, sums):
-    for i in range(LANES):
-        _advance_one(lever, law, block, i, twist, dt, sums)
+def _advance(lever, law, block, twist, dt, lanes):
+    for i in range(lanes):
+        _advance_one(lever, law, block, i, twist, dt)
 
 
 @kernel
-def _roll(lever, law, inputs, b, n, w, wrench, states, sums):
+def _roll(lever, law, inputs, b, n, w, wrench, states):
     twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
     which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shapes[0], -1
     blocks, kept = weights.shape[1] // LANES, states.shape[0] > 0
+    lanes = weights.shape[1] // blocks
     for t in range(inputs.dt.shape[0]):
         if which[t] != last:
             last = which[t]
@@ -168,23 +165,23 @@ def _roll(lever, law, inputs, b, n, w, wrench, states, sums):
             _forget(w, blocks, _Z)
             put(wrench[t], (0.0, 0.0, 0.0))
         else:
-            _clear(sums, 3 * LANES)
             for k in range(blocks):
-                _advance(lever, law, at(w, k * _BLOCK), twist, dt, sums)
-            put(wrench[t], times(load, _totals(sums, 0)))
+                _advance(lever, law, at(w, k * _BLOCK), twist, dt, lanes)
+            put(wrench[t], times(load, _totals(w, blocks, _OUT)))
 
 
 @kernel
-def _rollout(lever, inputs, span, z, wrench, states, scratch):
-    w, sums, n, rows = at(scratch, _SUMS), scratch, z.shape[2] // 2, inputs.rows[0]
+def _rollout(lever, inputs, span, z, wrench, states, w):
+    n, rows = z.shape[2] // 2, inputs.rows[0]
+    blocks = inputs.shapes.shape[2] // LANES
     for b in range(span[0], span[1]):
         law = law_of(rows[row_of(rows, b)])
-        _lay(w, inputs.shapes.shape[2] // LANES, inputs.data)
+        _lay(w, blocks, inputs.data)
         _write(w, _Z, z[0, b], n)
         if law.gamma == 2.0:
-            _roll(lever, squared(law), inputs, b, n, w, wrench[b], states[0, b], sums)
+            _roll(lever, squared(law), inputs, b, n, w, wrench[b], states[0, b])
         else:
-            _roll(lever, law, inputs, b, n, w, wrench[b], states[0, b], sums)
+            _roll(lever, law, inputs, b, n, w, wrench[b], states[0, b])
         _read(w, _Z, z[0, b], n)
 
 
@@ -193,7 +190,7 @@ def rollout(lever, inputs, span, z, wrench, states):
 
     The state before each step goes into `states` [1, B, T, 2 n], unless that is empty.
     """
-    scratch = np.empty(_SUMS + inputs.shapes.shape[2] // LANES * _BLOCK)
+    scratch = np.empty(inputs.shapes.shape[2] // LANES * _BLOCK)
     _rollout(lever, inputs, span, z, wrench, states, pointer(scratch))
 
 
@@ -201,7 +198,7 @@ def rollout(lever, inputs, span, z, wrench, states):
 
 
 @kernel
-def _retreat_one(lever, law, block, i, twist, dt, pull, load, loaded, sums):
+def _retreat_one(lever, law, block, i, twist, dt, pull, load, loaded):
     """Carry the cotangent of a cell's bristle back; `pull` is that of the wrench."""
     one, weight = lever.of(Block(block, LANES), i), block[_WEIGHT + i]
     pulled = lever.seen(one, pull)
@@ -209,56 +206,56 @@ def _retreat_one(lever, law, block, i, twist, dt, pull, load, loaded, sums):
     bars = _back(tape, (times(loaded, _pair(block, _BAR, i)), times(load * weight, pulled)))
     _put_pair(block, _BAR, i, bars[0])
     heavier = weight + load * block[_BY_LOAD + i]
-    numbers = lever.wrench(one, bars[1]), heavier * dot(pulled, traction), bars[2:]
-    accumulate(sums, i, LANES, numbers)
+    scatter(block, _OUT + i, LANES, (lever.wrench(one, bars[1]), heavier * dot(pulled, traction)))
+    accumulate(block, _LAW + i, LANES, bars[2:])
 
 
 @kernel
-def _retreat(lever, law, block, twist, dt, pull, load, loaded, sums):
-    for i in range(LANES):
-        _retreat_one(lever, law, block, i, twist, dt, pull, load, loaded, sums)
+def _retreat(lever, law, block, twist, dt, pull, load, loaded, lanes):
+    for i in range(lanes):
+        _retreat_one(lever, law, block, i, twist, dt, pull, load, loaded)
 
 
 @kernel
-def _pull(lever, law, inputs, b, n, w, states, pulls, twist_bar, load_bar, sums):
+def _pull(lever, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
     twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
     which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shapes[0], -1
     blocks = weights.shape[1] // LANES
+    lanes = weights.shape[1] // blocks
     for t in range(inputs.dt.shape[0] - 1, -1, -1):
         if which[t] != last:
             last = which[t]
             _weigh(w, blocks, weights[last], inputs.by_load[0, last])
         _write(w, _Z, states[t], n)
-        _clear(sums, _LAW)
         load, pull, twist, dt = loads[t], three(pulls[t]), three(twists[t]), inputs.dt[t]
         loaded = 0.0 if load == 0.0 else 1.0
         for k in range(blocks):
-            _retreat(lever, law, at(w, k * _BLOCK), twist, dt, pull, load, loaded, sums)
-        put(twist_bar[t], _totals(sums, 0))
-        load_bar[t] = _total(sums, _LOAD)
+            _retreat(lever, law, at(w, k * _BLOCK), twist, dt, pull, load, loaded, lanes)
+        put(twist_bar[t], _totals(w, blocks, _OUT))
+        load_bar[t] = _total(w, blocks, _OUT + 3 * LANES)
 
 
 @kernel
-def _gradient(lever, inputs, states, wrench_bar, span, bars, scratch):
-    w, sums, n, rows = at(scratch, _SUMS), scratch, bars.state.shape[2] // 2, inputs.rows[0]
+def _gradient(lever, inputs, states, wrench_bar, span, bars, w):
+    n, rows = bars.state.shape[2] // 2, inputs.rows[0]
+    blocks = inputs.shapes.shape[2] // LANES
     for b in range(span[0], span[1]):
         law, before, pulls = law_of(rows[row_of(rows, b)]), states[0], wrench_bar[row_of(wrench_bar, b)]
         before, row_bar = before[row_of(before, b)], bars.rows[0, b]
-        _lay(w, inputs.shapes.shape[2] // LANES, inputs.data)
+        _lay(w, blocks, inputs.data)
         _write(w, _BAR, bars.state[0, b], n)
-        _clear(sums, _SUMS)
         if law.gamma == 2.0:
-            _pull(lever, squared(law), inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b], sums)
+            _pull(lever, squared(law), inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b])
         else:
-            _pull(lever, law, inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b], sums)
+            _pull(lever, law, inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b])
         _read(w, _BAR, bars.state[0, b], n)
         for m in range(_COUNT):
-            row_bar[COLUMNS[m]] = _total(sums, _LAW + m * LANES)
+            row_bar[COLUMNS[m]] = _total(w, blocks, _LAW + m * LANES)
 
 
 def gradient(lever, inputs, states, wrench_bar, span, bars):
     """Write the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
-    scratch = np.empty(_SUMS + inputs.shapes.shape[2] // LANES * _BLOCK)
+    scratch = np.empty(inputs.shapes.shape[2] // LANES * _BLOCK)
     _gradient(lever, inputs, states, wrench_bar, span, bars, pointer(scratch))
 
 
@@ -266,7 +263,7 @@ def gradient(lever, inputs, states, wrench_bar, span, bars):
 
 
 @kernel
-def _push_one(lever, law, by, block, i, twist, turn, dt, load, push, sums):
+def _push_one(lever, law, by, block, i, twist, turn, dt, load, push):
     """Step a cell and its change, for changes `by` of the law, `turn` of the twist and `push` of the load."""
     one, weight = lever.of(Block(block, LANES), i), block[_WEIGHT + i]
     new, traction, d_new, d_traction = _pushed(
@@ -276,26 +273,27 @@ def _push_one(lever, law, by, block, i, twist, turn, dt, load, push, sums):
     _put_pair(block, _BAR, i, d_new)
     heavier = (weight + load * block[_BY_LOAD + i]) * push
     change = plus(times(load * weight, d_traction), heavier, traction)
-    accumulate(sums, i, LANES, (times(weight, lever.wrench(one, traction)), lever.wrench(one, change)))
+    scatter(block, _OUT + i, LANES, (times(weight, lever.wrench(one, traction)), lever.wrench(one, change)))
 
 
 @kernel
-def _push(lever, law, by, block, twist, turn, dt, load, push, sums):
-    for i in range(LANES):
-        _push_one(lever, law, by, block, i, twist, turn, dt, load, push, sums)
+def _push(lever, law, by, block, twist, turn, dt, load, push, lanes):
+    for i in range(lanes):
+        _push_one(lever, law, by, block, i, twist, turn, dt, load, push)
 
 
 @kernel
-def _tangent(lever, inputs, span, z, changes, wrenches, slopes, scratch):
-    w, sums, n, rows = at(scratch, _SUMS), scratch, z.shape[2] // 2, inputs.rows[0]
+def _tangent(lever, inputs, span, z, changes, wrenches, slopes, w):
+    n, rows = z.shape[2] // 2, inputs.rows[0]
     weights, all_by_load = inputs.shapes[0], inputs.by_load[0]
     blocks = weights.shape[1] // LANES
+    lanes = weights.shape[1] // blocks
     for b in range(span[0], span[1]):
         twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
         turns, pushes = changes.twist[row_of(changes.twist, b)], changes.load[row_of(changes.load, b)]
         law, d_law, which = law_of(rows[row_of(rows, b)]), law_of(changes.rows[row_of(changes.rows, b)]), inputs.which
         which, last = which[row_of(which, b)], -1
-        by = d_law[:7] + (d_law.breakaway_ratio,)
+        by = (*d_law[:7], d_law.breakaway_ratio)
         _lay(w, blocks, inputs.data)
         _write(w, _Z, z[0, b], n)
         _write(w, _BAR, changes.state[0, b], n)
@@ -303,12 +301,11 @@ def _tangent(lever, inputs, span, z, changes, wrenches, slopes, scratch):
             if which[t] != last:
                 last = which[t]
                 _weigh(w, blocks, weights[last], all_by_load[last])
-            _clear(sums, 6 * LANES)
             load, twist, turn, dt = loads[t], three(twists[t]), three(turns[t]), inputs.dt[t]
             for k in range(blocks):
-                _push(lever, law, by, at(w, k * _BLOCK), twist, turn, dt, load, pushes[t], sums)
-            put(wrenches[b, t], times(load, _totals(sums, 0)))
-            put(slopes[b, t], _totals(sums, 3 * LANES))
+                _push(lever, law, by, at(w, k * _BLOCK), twist, turn, dt, load, pushes[t], lanes)
+            put(wrenches[b, t], times(load, _totals(w, blocks, _OUT)))
+            put(slopes[b, t], _totals(w, blocks, _OUT + 3 * LANES))
             if load == 0.0:
                 _forget(w, blocks, _Z)
                 _forget(w, blocks, _BAR)
@@ -321,7 +318,7 @@ def tangent(lever, inputs, span, z, changes, wrenches, slopes):
 
     `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state in place.
     """
-    scratch = np.empty(_SUMS + inputs.shapes.shape[2] // LANES * _BLOCK)
+    scratch = np.empty(inputs.shapes.shape[2] // LANES * _BLOCK)
     _tangent(lever, inputs, span, z, changes, wrenches, slopes, pointer(scratch))
 
 

@@ -79,9 +79,8 @@ def placed(typingctx, a, i, x):
     return types.UniTuple(types.float64, len(a))(a, i, types.float64), generate
 
 
-@intrinsic
-def accumulate(typingctx, row, at, stride, record):
-    """Add the numbers of a record, which may hold records, one by one to `row[at]`, `row[at + stride]`, ...; row: an array or a pointer."""
+def _spread(add: bool):
+    """Return the code of `accumulate` or `scatter`."""
 
     def numbers(builder, kind, value):
         if not isinstance(kind, types.BaseTuple):
@@ -95,11 +94,26 @@ def accumulate(typingctx, row, at, stride, record):
         at = args[1]
         for number in numbers(builder, signature.args[3], args[3]):
             place = builder.gep(first, [at])
-            builder.store(builder.fadd(builder.load(place), number, flags=_FLAGS), place)
+            builder.store(builder.fadd(builder.load(place), number, flags=_FLAGS) if add else number, place)
             at = builder.add(at, args[2], flags=("nsw",))
         return context.get_dummy_value()
 
-    return types.void(row, types.intp, types.intp, record), generate
+    return generate
+
+
+@intrinsic
+def accumulate(typingctx, row, at, stride, record):
+    """Add the numbers of a record, which may hold records, one by one to `row[at]`, `row[at + stride]`, ...
+
+    `row` is an array or a pointer.
+    """
+    return types.void(row, types.intp, types.intp, record), _spread(add=True)
+
+
+@intrinsic
+def scatter(typingctx, row, at, stride, record):
+    """Write the numbers of a record as `accumulate` adds them."""
+    return types.void(row, types.intp, types.intp, record), _spread(add=False)
 
 
 @intrinsic(prefer_literal=True)
