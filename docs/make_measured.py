@@ -55,11 +55,25 @@ def fitted(task: str, stored: Mapping[str, Any]) -> list[list[str]]:
 
 
 def checked(task: str, stored: Mapping[str, Any]) -> list[list[str]]:
-    """Headings and rows: what the models say of their own answers on the test cases."""
-    told = {name: model["checked"] for name, model in stored["models"].items() if model["checked"]}
+    """Headings and rows: how large the models say that their errors are on the test cases."""
+    told = {
+        name: {key: value for key, value in model["checked"].items() if not isinstance(value, list)}
+        for name, model in stored["models"].items()
+        if model["checked"]
+    }
     keys = list(dict.fromkeys(key for found in told.values() for key in found))
     rows = [[name, *(f"{found[key]:.2f}" if key in found else "" for key in keys)] for name, found in told.items()]
     return [["model", *keys], *rows]
+
+
+THIRDS = [f"{which} {way}" for way in ("turn", "length") for which in ("least", "middle", "most")]
+
+
+def regions(task: str, stored: Mapping[str, Any]) -> list[list[str]]:
+    """Headings and rows: the share of test cases inside regions, of all and of thirds."""
+    told = [model["checked"] for model in stored["models"].values() if model["checked"]]
+    lists = {key: value for found in told for key, value in found.items() if isinstance(value, list)}
+    return [["", "all", *THIRDS], *([key, *(f"{each:.0f}" for each in value)] for key, value in lists.items())]
 
 
 TABLES: dict[str, tuple[str, Callable[[str, Mapping[str, Any]], list[list[str]]]]] = {
@@ -67,6 +81,7 @@ TABLES: dict[str, tuple[str, Callable[[str, Mapping[str, Any]], list[list[str]]]
     **{f"{task} minus": (task, differences) for task in TASKS},
     "slides fitted": ("slides", fitted),
     "slides checked": ("slides", checked),
+    "slides regions": ("slides", regions),
 }
 
 

@@ -125,8 +125,6 @@ def identify_motion(
         samples = validation.count("samples", samples, at_least=5)
     robust = validation.choice("loss", loss, ("robust", "squares")) == "robust"
     strange = contradictions(slides, body) if robust else {}
-    if 2 * len(strange) >= len(slides):
-        strange = {}  # if most slides are strange, the fit itself will be poor
     left_out = [Verdict("fit", True, f"{slides[i].name} is left out: {why}") for i, why in strange.items()]
     slides = tuple(slide for i, slide in enumerate(slides) if i not in strange)
     report = (lambda text: None) if progress is None else progress

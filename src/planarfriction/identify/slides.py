@@ -212,7 +212,10 @@ def speeds(slide: Slide, body: SlidingBody) -> tuple[np.ndarray, np.ndarray, flo
 
 
 def contradictions(slides: Sequence[Slide], body: SlidingBody) -> dict[int, str]:
-    """Find the slides that friction alone cannot have made; returns their indices with the reason."""
+    """Find the slides that friction alone cannot have made; returns their indices with the reason.
+
+    If half of the slides or more are strange, none is named: then it is the fit that will be poor.
+    """
     seen = [speeds(slide, body) for slide in slides]
     brakes = [brake for time, speed, _ in seen if (brake := _brake(time, speed)) > 0.0]
     usual = float(np.median(brakes)) if brakes else 0.0
@@ -228,7 +231,7 @@ def contradictions(slides: Sequence[Slide], body: SlidingBody) -> dict[int, str]
             LONG * (time[-1] - time[0]), 1.5 * (time[1] - time[0] if len(time) > 1 else 0)
         ):
             found[i] = f"its speed hardly falls for {1e3 * free:.0f} ms: it lost contact, or was pushed"
-    return found
+    return found if 2 * len(found) < len(slides) else {}
 
 
 def _brake(time: np.ndarray, speed: np.ndarray) -> float:

@@ -144,6 +144,8 @@ def _show(benchmark: Any, as_json: bool, folder: Path | None) -> None:
     """Print the tables, or JSON; write JSON and pictures to a folder."""
     import json
 
+    import numpy as np
+
     from planarfriction.cli import output
     from planarfriction.cli.console import note, print_table
     from planarfriction.writing import write_text
@@ -160,7 +162,7 @@ def _show(benchmark: Any, as_json: bool, folder: Path | None) -> None:
         for model, result in results.items():
             if result.fitted:
                 for key, value in result.checked.items():
-                    note(f"{model}: {key} {value:.3g}")
+                    note(f"{model}: {key} {' '.join(f'{each:.3g}' for each in np.atleast_1d(value))}")
                 note(f"{model}, fitted: {', '.join(f'{key} {value:.4g}' for key, value in result.fitted.items())}")
     for text in () if as_json else benchmark.left_out:
         note(f"left out: {text}")

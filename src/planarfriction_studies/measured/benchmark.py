@@ -46,8 +46,8 @@ class Result:
     """Errors `[rows, columns]` of each test case, as the task defines them."""
     fitted: Mapping[str, float]
     """Fitted numbers by name."""
-    checked: Mapping[str, float]
-    """Checks of the model's own uncertainty on the test cases, if it states any."""
+    checked: Mapping[str, Any]
+    """Checks of the model's own uncertainty on the test cases, if it states any: numbers, or lists of them."""
     seconds: float
     """Time of fit and prediction [s]."""
     regions: np.ndarray | None = None
@@ -72,7 +72,7 @@ class Benchmark:
     results: dict[str, dict[str, Result]] = field(default_factory=dict, init=False)
     """Results by task and model."""
     left_out: list[str] = field(default_factory=list, init=False)
-    """Models that were not run, with the reason."""
+    """Models that were not run and cases that are not used, with the reason."""
 
     def __post_init__(self) -> None:
         self.tasks = [validation.choice("task", name, TASKS) for name in self.tasks]
@@ -82,8 +82,12 @@ class Benchmark:
         for name, model in self.models.items():
             if not callable(model):
                 raise InvalidValueError(f"model {name}", "be a function of a question", model)
-        self.cases = {name: TASKS[name].read(self.folder) for name in self.tasks}
-        for name, cases in self.cases.items():
+        self.cases = {}
+        for name in self.tasks:
+            cases = TASKS[name].read(self.folder)
+            refused = TASKS[name].refused(cases)
+            self.left_out += [f"{cases[i].name}: {why}" for i, why in refused.items()]
+            self.cases[name] = cases = [case for i, case in enumerate(cases) if i not in refused]
             if len({case.is_training for case in cases}) != 2:
                 raise InvalidValueError(
                     f"table of {name}", "contain cases to fit and cases to test", f"{len(cases)} cases"

@@ -13,14 +13,16 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction.identify.slides import weights
 from planarfriction.limit_surface import LimitSurfaceExact
 from planarfriction.patch import ContactPatch
 from planarfriction_studies.measured import slide_integrator
+from planarfriction_studies.measured.end_regions import LEVELS, EndRegions, moved_to, shares
 from planarfriction_studies.measured.models import quick
 from planarfriction_studies.measured.questions import FIRST_POSES, BatchModel, Case, SlideQuestion
 
@@ -42,8 +44,15 @@ LOOSE = 1.5
 STEPS = 25
 """Steps of the fit of the spreads: more change the errors by less than 0.01 mm and 0.01 deg."""
 
-FOLDS, INSIDE = 4, 0.95
-"""Parts of the training tosses, each left out once to size the regions of the end, and the share that they hold."""
+FAR, ROUNDS = 5.0, 4
+"""Misfit of a pose in usual misfits beyond which it counts less, by the fourth power of what it is beyond that, and
+rounds of reweighting: two more change no error by 1 %."""
+
+SIGMA = 1.4826
+"""Standard deviation over the median of the magnitudes of normal numbers."""
+
+FOLDS = 4
+"""Parts of the training tosses, each left out once to size the regions of the end."""
 
 
 def friction(patch: ContactPatch, mu_0: float, mu_1: float, share: float) -> slide_integrator.Friction:
@@ -117,12 +126,14 @@ class TossModel(BatchModel):
     common: SpeedModel = SpeedModel()
     spreads: tuple[float, ...] = (*BEGIN, 0.0, 0.0)
     """Spreads as in `BEGIN`, then the means of a and b."""
-    reach: tuple[float, float] = (1.0, 1.0)
-    """Sizes of the regions of the end, in covariances: of the place, of the angle."""
+    usual: np.ndarray | None = None
+    """Usual misfits of first poses `[F, 3]` (see `estimate`): robust standard deviations over the training slides."""
+    sized: EndRegions = field(default_factory=EndRegions)
+    """Sizes of the regions of the end."""
 
     def _answers(self, questions: Sequence[Any]) -> list[np.ndarray]:
         linear = self.linear(questions)
-        found = linear.start + estimate(np.array(self.spreads), linear, questions)[0]
+        found = linear.start + self._estimate(linear, questions)[0]
         poses = slide_integrator.integrate(
             self._friction(questions), _state(found, _ways(questions)), linear.time, _radius(questions)
         )
@@ -136,29 +147,50 @@ class TossModel(BatchModel):
         # regions are sized on tosses that spreads were not fitted to, their errors over those that they were fitted to
         names = sorted({case.group for case in cases})
         fold = np.array([names.index(case.group) % FOLDS for case in cases])
-        far = []
+        far = own = full.distances(cases)
         for k in range(min(FOLDS, len(names)) if len(names) > 1 else 0):
-            known, other = [np.flatnonzero(side) for side in (fold != k, fold == k)]
-            part = model._with_spreads(linear.rows(known), [cases[int(i)] for i in known])
-            fitted, unseen = (part.distances([cases[int(i)] for i in rows]) for rows in (known, other))
-            far.append(unseen / fitted.mean(axis=0))
-        own = full.distances(cases)
-        sizes = np.concatenate(far) * own.mean(axis=0) if far else own
-        rank = min(int(np.ceil(INSIDE * (len(sizes) + 1))), len(sizes)) - 1
-        return dataclasses.replace(full, reach=tuple(np.sort(sizes, axis=0)[rank].tolist()))
+            known, other = fold != k, fold == k
+            rows = np.flatnonzero(known)
+            part = model._with_spreads(linear.rows(rows), [cases[i] for i in rows.tolist()]).distances(cases)
+            far = np.where(other[:, None], part * np.median(own[known], axis=0) / np.median(part[known], axis=0), far)
+        questions = [case.question for case in cases]
+        return dataclasses.replace(full, sized=EndRegions.fitted(moved_to(questions, full.ends(questions)[0]), far))
 
     def _with_spreads(self, linear: Linear, cases: Sequence[Case]) -> TossModel:
-        """Fit the spreads that predict the training slides best."""
+        """Fit the spreads that predict the training slides best, with the weights of `identify_motion` on slides."""
         from scipy.optimize import minimize
 
-        scale = _squares(np.array([*BEGIN, 0.0, 0.0]), linear, cases)
+        begun = self._with_usual(linear, cases)
+        counts = begun._estimate(linear, [case.question for case in cases])[2]
+        squares = _squares(np.array(begun.spreads), linear, cases, counts)
+        weighed = weights(np.sqrt((squares / np.median(squares, axis=0)).sum(axis=1)))
+        scale = weighed @ squares
 
         def misfit(x: np.ndarray) -> float:
             spreads = np.array([*(BEGIN * np.exp(x[:-2])), *x[-2:]])
-            return float((_squares(spreads, linear, cases) / scale).sum() + 1e-3 * (x[:-2] ** 2).sum() / LOOSE**2)
+            squares = weighed @ _squares(spreads, linear, cases, counts)
+            return float((squares / scale).sum() + 1e-3 * (x[:-2] ** 2).sum() / LOOSE**2)
 
         best = minimize(misfit, np.zeros(len(BEGIN) + 2), method="L-BFGS-B", options={"maxiter": STEPS}).x
-        return dataclasses.replace(self, spreads=(*(BEGIN * np.exp(best[:-2])), *best[-2:]))
+        model = dataclasses.replace(self, spreads=(*(BEGIN * np.exp(best[:-2])), *best[-2:]))
+        return model._with_usual(linear, cases)
+
+    def _with_usual(self, linear: Linear, cases: Sequence[Case]) -> TossModel:
+        """Measure the usual misfits of poses at the present spreads."""
+        even = np.ones((len(cases), FIRST_POSES))
+        misfits = estimate(np.array(self.spreads), linear, [case.question for case in cases], even)[2]
+        return dataclasses.replace(self, usual=SIGMA * np.median(np.abs(misfits), axis=0))
+
+    def _estimate(
+        self, linear: Linear, questions: Sequence[SlideQuestion]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return changes and covariances as `estimate` does, and the weights of the poses: robust, reweighted least
+        squares."""
+        spreads, counts = np.array(self.spreads), np.ones((len(questions), FIRST_POSES))
+        for _ in range(0 if self.usual is None else ROUNDS):
+            far = np.abs(estimate(spreads, linear, questions, counts)[2] / self.usual).max(axis=2)
+            counts = (FAR / np.maximum(far, FAR)) ** 4
+        return (*estimate(spreads, linear, questions, counts)[:2], counts)
 
     def fitted_values(self) -> dict[str, float]:
         """Return the fitted numbers by name."""
@@ -168,26 +200,27 @@ class TossModel(BatchModel):
         common["lever/radius"] *= np.exp(b_0)
         return common | {"spread of mu": a, "of the centre [mm]": 1e3 * c, "of the lever": b}
 
-    def check(self, cases: Sequence[Case]) -> dict[str, float]:
-        """Return the share of ends inside their regions, and the sizes of the regions."""
-        far, spread = self.distances(cases), self.ends([case.question for case in cases])[1]
-        axes = 1e3 * np.sqrt(np.linalg.eigvalsh(spread[:, :2, :2]) * self.reach[0])
-        return {
-            "ends inside the ellipse [%]": 100.0 * float((far[:, 0] <= self.reach[0]).mean()),
+    def check(self, cases: Sequence[Case]) -> dict[str, Any]:
+        """Return the usual sizes of the regions, and the shares of ends inside those of each of `LEVELS` (`shares`)."""
+        questions, reached = [case.question for case in cases], np.array([case.answer[-1] for case in cases])
+        regions, far = self.regions(questions), self.distances(cases)
+        axes = 1e3 * np.sqrt(np.linalg.eigvalsh(regions[:, :2, :2]))
+        found: dict[str, Any] = {
             "half axis along the way, median [mm]": float(np.median(axes[:, 1])),
             "half axis across, median [mm]": float(np.median(axes[:, 0])),
-            "angles inside the interval [%]": 100.0 * float((far[:, 1] <= self.reach[1]).mean()),
-            "half width of it, median [deg]": float(np.degrees(np.median(np.sqrt(spread[:, 2, 2] * self.reach[1])))),
+            "half width of the interval, median [deg]": float(np.degrees(np.median(np.sqrt(regions[:, 2, 2])))),
         }
+        predicted, moved = moved_to(questions, self.ends(questions)[0]), moved_to(questions, reached)
+        for i, name in enumerate(("places", "angles")):
+            for level in LEVELS:
+                inside = far[:, i] <= self.sized.radii(predicted, level)[:, i]
+                found[f"{name} inside {level:.0%} regions [%]"] = shares(inside, moved)
+        return found
 
     def ends(self, questions: Sequence[SlideQuestion]) -> tuple[np.ndarray, np.ndarray]:
-        """Return the predicted poses at the last sample `[K, 3]` and their covariances `[K, 3, 3]`.
-
-        The ellipse `d' S^-1 d <= reach[0]`, with S the part of x and y, is to hold 95 % of ends; `reach[1]` the same of
-        the angle.
-        """
+        """Return the predicted poses at the last sample `[K, 3]` and their covariances `[K, 3, 3]` by the spreads."""
         linear, answers = self.linear(questions), self.answer_all(questions)
-        _, spread = estimate(np.array(self.spreads), linear, questions)
+        spread = self._estimate(linear, questions)[1]
         found = []
         for i, each in enumerate(questions):
             last = len(each.time) - 1
@@ -197,21 +230,23 @@ class TossModel(BatchModel):
             found.append(slope @ spread[i] @ slope.T + np.diag(pushed))
         return np.array([answer[-1] for answer in answers]), np.array(found)
 
-    def regions(self, questions: Sequence[SlideQuestion]) -> np.ndarray:
-        """Return matrices S `[K, 3, 3]` of the regions that are to hold 95 % of the ends: places with `d' S^-1 d <= 1`,
-        angles within its root.
+    def regions(self, questions: Sequence[SlideQuestion], level: float = 0.95) -> np.ndarray:
+        """Return matrices S `[K, 3, 3]` of the regions that are to hold a share `level` of the ends.
 
-        S is the part of x and y for the place, and that of the angle.
+        Places have `d' S^-1 d <= 1`, with S the part of x and y; angles are within the root of their part.
+
+        Raises InvalidValueError for a level that is not between 0 and 1.
         """
-        size = np.sqrt([self.reach[0], self.reach[0], self.reach[1]])
-        return self.ends(questions)[1] * np.outer(size, size)
+        ends, spread = self.ends(questions)
+        size = self.sized.radii(moved_to(questions, ends), level)[:, [0, 0, 1]]
+        return spread * size[:, :, None] * size[:, None]
 
     def distances(self, cases: Sequence[Case]) -> np.ndarray:
-        """Return squares of the errors of place and angle at the end over their covariances, `[K, 2]`."""
+        """Return the errors of place and angle at the end in standard deviations, `[K, 2]`."""
         ends, spread = self.ends([case.question for case in cases])
         off = ends - np.array([case.answer[-1] for case in cases])
         place = np.einsum("ki,kij,kj->k", off[:, :2], np.linalg.inv(spread[:, :2, :2]), off[:, :2])
-        return np.stack([place, off[:, 2] ** 2 / spread[:, 2, 2]], axis=1)
+        return np.stack([np.sqrt(place), np.abs(off[:, 2]) / np.sqrt(spread[:, 2, 2])], axis=1)
 
     def linear(self, questions: Sequence[SlideQuestion]) -> Linear:
         """Linearise slides about the start that fits the first poses best when no toss has friction of its own."""
@@ -248,20 +283,32 @@ def _state(start: np.ndarray, ways: np.ndarray) -> np.ndarray:
     return np.column_stack([start[:, :6], a, -c * ways[:, 1], c * ways[:, 0], b])
 
 
-def estimate(spreads: np.ndarray, linear: Linear, questions: Sequence[SlideQuestion]) -> tuple[np.ndarray, np.ndarray]:
-    """Return changes `[K, 9]` of starts and own numbers by the first poses, and their covariances `[K, 9, 9]`."""
+def estimate(
+    spreads: np.ndarray, linear: Linear, questions: Sequence[SlideQuestion], counts: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return changes `[K, 9]` of starts and own numbers by the first poses, their covariances `[K, 9, 9]`, and misfits.
+
+    A misfit `[K, F, 3]` is the residual of a pose from the fit to all others: `(M_ii)^-1 (M r)_i`, where M is the
+    inverse of the covariance of the residuals r with starts and own numbers unknown. Camera noise has the covariance
+    `SEEN^2/counts`, with the weights `counts` `[K, F]` of the poses.
+    """
     time, count = linear.time[:FIRST_POSES], len(questions)
-    weights = np.zeros((FIRST_POSES, 3, FIRST_POSES, 3))
+    weights = np.zeros((count, FIRST_POSES, 3, FIRST_POSES, 3))
+    less = (1.0 / counts - 1.0)[:, :, None] * np.eye(FIRST_POSES)
     for i, (begin, on) in enumerate((spreads[:2], spreads[:2], spreads[2:4])):
-        weights[:, i, :, i] = np.linalg.inv(pushed(time, begin, on, SEEN[i]))
-    weights = weights.reshape(3 * FIRST_POSES, -1)
+        weights[:, :, i, :, i] = np.linalg.inv(pushed(time, begin, on, SEEN[i]) + SEEN[i] ** 2 * less)
+    weights = weights.reshape(count, 3 * FIRST_POSES, -1)
     slopes = linear.slopes[:, :FIRST_POSES].reshape(count, -1, 9)
     off = (np.array([each.first for each in questions]) - linear.poses[:, :FIRST_POSES]).reshape(count, -1, 1)
     prior, mean = np.zeros(9), np.zeros(9)
     prior[6:], mean[[6, 8]] = 1.0 / spreads[4:7] ** 2, spreads[7:]
     turned = np.swapaxes(slopes, 1, 2) @ weights
     spread = np.linalg.inv(turned @ slopes + np.diag(prior))
-    return (spread @ (turned @ off + (prior * mean)[:, None]))[..., 0], spread
+    changes = spread @ (turned @ off + (prior * mean)[:, None])
+    known = weights - np.swapaxes(turned, 1, 2) @ spread @ turned
+    own = np.einsum("kiaib->kiab", known.reshape(count, FIRST_POSES, 3, FIRST_POSES, 3))
+    left = (weights @ (off - slopes @ changes)).reshape(count, FIRST_POSES, 3, 1)
+    return changes[..., 0], spread, np.linalg.solve(own, left)[..., 0]
 
 
 def pushed(time: np.ndarray, begin: float, on: float, seen: float) -> np.ndarray:
@@ -275,13 +322,13 @@ def pushed(time: np.ndarray, begin: float, on: float, seen: float) -> np.ndarray
     return seen**2 * np.eye(len(time)) + (since * intensity * time[-1] / 64) @ since.T
 
 
-def _squares(spreads: np.ndarray, linear: Linear, cases: Sequence[Case]) -> np.ndarray:
-    """Return mean squares `[4]` of the linear slides' errors in place and angle, along the way and at the end."""
-    changes, _ = estimate(spreads, linear, [case.question for case in cases])
+def _squares(spreads: np.ndarray, linear: Linear, cases: Sequence[Case], counts: np.ndarray) -> np.ndarray:
+    """Return squares `[K, 4]` of the linear slides' errors in place and angle: means along the way, and at the end."""
+    changes = estimate(spreads, linear, [case.question for case in cases], counts)[0]
     poses = linear.poses + np.einsum("ktci,ki->ktc", linear.slopes, changes)
-    total = np.zeros(4)
-    for case, found in zip(cases, poses, strict=True):
-        off = found[: len(case.answer)] - case.answer
+    found = []
+    for case, each in zip(cases, poses, strict=True):
+        off = each[: len(case.answer)] - case.answer
         place, angle = off[:, 0] ** 2 + off[:, 1] ** 2, off[:, 2] ** 2
-        total += [place.mean(), angle.mean(), place[-1], angle[-1]]
-    return total / len(cases)
+        found.append([place.mean(), angle.mean(), place[-1], angle[-1]])
+    return np.array(found)

@@ -25,6 +25,9 @@ TURNS = 2
 MU, DIFFERENCE = 0.22, 0.02
 """Initial guess of the friction coefficient of a slide [-], and share of a number over which a fit differentiates."""
 
+USUAL = 5e-3
+"""Error of an end [m], twice the usual one, from which on it counts in proportion and no longer by its square."""
+
 Friction = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Friction wrenches `[K, 3]` over the weight [1, 1, m] of twists `[K, 3]`, both in the axes of the bodies.
 
@@ -150,7 +153,7 @@ Slides = Callable[[np.ndarray, Sequence[SlideQuestion]], list[np.ndarray]]
 
 
 def fit_slides(predict: Slides, begin: Sequence[float], cases: Sequence[Case]) -> np.ndarray:
-    """Return numbers with the least mean square of the errors of the end: position, and yaw at the contact radius."""
+    """Return numbers with the least errors of the end, by Huber's loss: position, and yaw at the contact radius."""
     from scipy.optimize import least_squares
 
     questions, ends = [case.question for case in cases], np.array([case.answer[-1] for case in cases])
@@ -161,5 +164,14 @@ def fit_slides(predict: Slides, begin: Sequence[float], cases: Sequence[Case]) -
         return ((found - ends) * [1.0, 1.0, length]).ravel()
 
     # sharing 1e-3 of a number is a tenth of its standard error; the path of a slide is nearly linear in 1/mu
-    found = least_squares(off, np.ones(len(scale)), diff_step=DIFFERENCE, xtol=1e-3, ftol=1e-4, bounds=(0.2, 5.0))
+    found = least_squares(
+        off,
+        np.ones(len(scale)),
+        diff_step=DIFFERENCE,
+        xtol=1e-3,
+        ftol=1e-4,
+        bounds=(0.2, 5.0),
+        loss="huber",
+        f_scale=USUAL,
+    )
     return found.x * scale

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from planarfriction.identify import Slide, SlidingBody
+from planarfriction.identify.slides import contradictions
 from planarfriction.patch import ContactPatch
 from planarfriction_studies.measured.questions import FIRST_POSES, Case, SlideQuestion
 from planarfriction_studies.measured.scores import Measure, rms
@@ -48,6 +50,15 @@ def read(folder: Path | None = None) -> list[Case]:
         group = int(rows["unique_id"].iloc[0])
         cases.append(Case(question, poses, f"toss {number:g}", f"{group}", np.arange(len(time)), "table"))
     return cases
+
+
+def refused(cases: Sequence[Case]) -> dict[int, str]:
+    """Find the tosses that `identify_motion` leaves out by itself: those that friction alone cannot have made.
+
+    Returns reasons by index.
+    """
+    measured = [Slide(case.question.time, case.answer, name=case.name) for case in cases]
+    return contradictions(measured, SlidingBody(MASS, INERTIA))
 
 
 def errors(case: Case, answer: np.ndarray) -> np.ndarray:

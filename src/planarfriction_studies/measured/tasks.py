@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,12 +23,14 @@ class Task(NamedTuple):
     errors: Callable[[Case, np.ndarray], np.ndarray]
     """Errors `[rows, columns]` of an answer to a case."""
     measures: tuple[Measure, ...]
+    refused: Callable[[Sequence[Case]], dict[int, str]] = lambda cases: {}
+    """Cases that no model is asked about, by index, with the reason."""
 
 
 TASKS = {
-    name: Task(name, title, module.read, module.errors, module.MEASURES)
-    for name, title, module in (
-        ("slides", "Free slides of a cube: path and end from the first 8 poses", slides),
+    name: Task(name, title, module.read, module.errors, module.MEASURES, *refused)
+    for name, title, module, *refused in (
+        ("slides", "Free slides of a cube: path and end from the first 8 poses", slides, slides.refused),
         ("pushes", "Slow pushes on known feet: angle to the measured twist", pushes),
         ("series", "Pushes over time: angles to the measured twist and wrench", push_series),
     )
