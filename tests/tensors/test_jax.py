@@ -324,8 +324,32 @@ def test_adjoint_says_what_it_cannot_differentiate():
     motion = sway(5, 1e-4)
     with pytest.raises(InvalidValueError, match="surface must be held fixed with method='adjoint'"):
         jax.grad(lambda m: pj.rollout(m, None, motion, 1.0, 1e-4, method="adjoint").wrenches.sum())(model)
-    with pytest.raises(InvalidValueError, match="method must be 'eager' for DistributedModel"):
-        pj.rollout(pairs("distributed", "wide")[1], None, motion, 1.0, 1e-4, method="adjoint")
+    with pytest.raises(InvalidValueError, match="positions must be held fixed with method='adjoint'"):
+        jax.grad(lambda m: pj.rollout(m, None, motion, 1.0, 1e-4, method="adjoint").wrenches.sum())(
+            pairs("distributed", "wide")[1]
+        )
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_adjoint_of_cells_takes_the_steps_and_slopes_of_jax(law):
+    reference, model = pairs("distributed", law)
+    motion, sides = sway(60, 1e-4), np.random.default_rng(0).normal(size=(60, 3)) * (1.0, 1.0, 100.0)
+    loads = np.linspace(0.5, 2.0, 60)
+    loads[30] = 0.0
+
+    def loss(parameters, state, motion, loads, method):
+        changed = model.replace(parameters=parameters)
+        run = pj.rollout(changed, state, motion, loads, 1e-4, method=method)
+        return (run.wrenches * sides).sum() + 1e6 * run.state.sum(), run.wrenches
+
+    state, slopes = (
+        states(reference, 2)[1],
+        jax.jit(jax.grad(loss, argnums=(0, 1, 2, 3), has_aux=True), static_argnums=4),
+    )
+    (eager, _), (adjoint, wrenches) = (slopes(model.parameters, state, motion, loads, m) for m in ("eager", "adjoint"))
+    close(wrenches, pf.rollout(reference, state, motion, loads, 1e-4).wrenches, 1e-11)
+    for one, other in zip(jax.tree.leaves(eager), jax.tree.leaves(adjoint), strict=True):
+        close(one, other, 1e-8)
 
 
 @given(

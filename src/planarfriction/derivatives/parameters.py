@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.compiled.shapes_by_load import ShapesByLoad, places_of
+from planarfriction.compiled.shapes_by_load import ShapesByLoad, cells_by_load, places_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
@@ -261,6 +261,12 @@ def pack_surface(
     row = [*_any_law(elasto_plastic), *np.zeros(len(published_step.NAMES) - LAW)]
     data, axes = np.ascontiguousarray(data, dtype=float), None if root is None else axes_of(root)
     return _fixed(PUBLISHED, np.array([row]), [1.0], [(kind, 0, size)], [data], axes)
+
+
+def pack_cells(elasto_plastic: bool, positions: np.ndarray, weights: np.ndarray) -> Packed:
+    """Return an isotropic `DistributedModel` by its cells `[2, N]` and weights `[N]`, as `pack_maps` its model."""
+    cells = np.asarray(positions, dtype=float), np.asarray(weights, dtype=float)[None]
+    return Packed(CELLS, np.array([_any_law(elasto_plastic)]), cells_by_load(*cells, None), cells=len(weights))
 
 
 def _any_law(elasto_plastic: bool) -> LawNumbers:

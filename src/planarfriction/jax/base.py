@@ -68,9 +68,9 @@ class FrictionPytree(TensorModel):
         end, wrenches = jax.lax.scan(one, state, (jnp.moveaxis(twist, -2, 0), jnp.moveaxis(normal_force, -1, 0)))
         return end, jnp.moveaxis(wrenches, 0, -2)
 
-    def compiled(self) -> Packed | None:
-        """Return the model, of NumPy arrays and with any law, as compiled rollouts take it, or None if they cannot."""
-        return None
+    def compiled(self) -> Packed:
+        """Return the model, of NumPy arrays and with any law, as compiled rollouts take it."""
+        raise NotImplementedError
 
     def _values(self, parameters: Any) -> dict[str, jax.Array]:
         record = self.parameters if parameters is None else type(self.parameters)(*parameters)

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import jax
 import jax.numpy as jnp
 
+from planarfriction.derivatives.parameters import Packed, pack_cells
 from planarfriction.equality import by_parts
 from planarfriction.formulas import LawNumbers
 from planarfriction.jax.base import FrictionPytree, record_of
@@ -49,6 +50,10 @@ class DistributedModel(FrictionPytree):
     def state_shape(self) -> tuple[int, ...]:
         """Shape of the state of one contact, `(2, N)`."""
         return self.positions.shape
+
+    def compiled(self) -> Packed:
+        """Return the model as compiled rollouts take it."""
+        return pack_cells(self.elasto_plastic, self.positions, self.weights)  # pyright: ignore[reportArgumentType]
 
     def _parts(self, law: LawNumbers, values: Mapping[str, jax.Array]) -> tuple[Part]:
         return (Part(law, distributed.Cells(self.positions, self.weights)),)

@@ -108,9 +108,9 @@ class FrictionModule(TensorModel, nn.Module):
         """Return the rate of the state, and the wrench."""
         return self._evaluated(state, twist, normal_force, parameters)
 
-    def compiled(self) -> Compiled | None:
-        """Return the model as compiled rollouts take it, or None if they cannot."""
-        return None
+    def compiled(self) -> Compiled:
+        """Return the model as compiled rollouts take it."""
+        raise NotImplementedError
 
     def rollout(
         self, state: Tensor, twist: Tensor, normal_force: Tensor, dt: Tensor, *, parameters: Tensor | None = None

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Mapping
 
 import torch
 from torch import Tensor, nn
 
+from planarfriction.derivatives.parameters import pack_cells
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws import FrictionLaw
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import distributed
 from planarfriction.tensors.steps import LAW, Part
-from planarfriction.torch.base import TRAINABLE, FrictionModule
+from planarfriction.torch.base import TRAINABLE, Compiled, FrictionModule
 
 
 class DistributedModel(FrictionModule):
@@ -67,6 +69,10 @@ class DistributedModel(FrictionModule):
     def state_shape(self) -> tuple[int, ...]:
         """Shape of the state of one contact, `(2, N)`."""
         return tuple(self.positions.shape)
+
+    def compiled(self) -> Compiled:
+        """Return the model as compiled rollouts take it."""
+        return Compiled(functools.partial(pack_cells, self.elasto_plastic), (self.positions, self.weights))
 
     def _parts(self, law: LawNumbers, values: Mapping[str, Tensor]) -> tuple[Part]:
         return (Part(law, distributed.Cells(self.positions, self.weights)),)

@@ -30,9 +30,9 @@ def rollout(
     `normal_force` broadcasts with `[..., T]`: one number, one for each step `[T]`, or one for each contact `[..., 1]`.
     Gradients reach the parameters of the model, `state`, `twist`, `normal_force` and `parameters`.
 
-    `method` is `"adjoint"`, the compiled rollout with its discrete adjoint (reduced models on the CPU, first
-    derivatives), or `"eager"`, PyTorch operations step by step (any model and device, derivatives of any order, also
-    with respect to `dt`); None uses the adjoint if possible.
+    `method` is `"adjoint"`, the compiled rollout with its discrete adjoint (on the CPU, first derivatives), or
+    `"eager"`, PyTorch operations step by step (any model and device, derivatives of any order, also with respect to
+    `dt`); None uses the adjoint if possible.
 
     Raises `InvalidValueError` as a step does (see `TensorModel`), and for a method that is not possible.
     """
@@ -47,16 +47,14 @@ def rollout(
     obstacle = _obstacle(model, compiled, *inputs)
     if method == "adjoint" and obstacle:
         raise InvalidValueError("method", f"be 'eager' {obstacle}", repr(method))
-    if method == "eager" or obstacle or compiled is None:
+    if method == "eager" or obstacle:
         return Rollout(*model.rollout(*inputs, parameters=parameters))
     operation, held = RolloutOperation(compiled.pack, len(model.state_shape)), (step, *compiled.buffers)
     return Rollout(*adjoint.call(operation, held, start, twist, load, model._vector(parameters)))
 
 
-def _obstacle(model: FrictionModule, compiled: Compiled | None, *tensors: Tensor) -> str:
+def _obstacle(model: FrictionModule, compiled: Compiled, *tensors: Tensor) -> str:
     """Return the reason why the adjoint cannot be used, or an empty text."""
-    if compiled is None:
-        return f"for {type(model).__name__}"
     if any(tensor.device.type != "cpu" for tensor in (*tensors, model.physical.values)):
         return "for tensors that are not on the processor"
     if tensors[-1].requires_grad:
