@@ -13,11 +13,14 @@ from planarfriction import geometry, validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceExact
 from planarfriction.limit_surface.comparison import directions
-from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, Grid, read_pressure_map
+from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, Grid, GridError, read_pressure_map
 from planarfriction_explorer.uploads import as_file, plain_name
 
 MOST_SIDE = 64
 """Most rows and columns of a map: with more, a stroke of the brush would no longer follow the hand."""
+
+MOST_QUICK = 700
+"""Most cells of a map whose grid error is found in less than a second."""
 
 SAMPLES = 100
 """Directions in which ellipsoid and surface are compared."""
@@ -116,6 +119,13 @@ class Drawing:
     def ellipsoid(self) -> LimitSurfaceEllipsoid:
         """The ellipsoid that is often put in its place."""
         return LimitSurfaceEllipsoid(self.patch)
+
+    @functools.cached_property
+    def grid_errors(self) -> tuple[GridError, GridError] | None:
+        """Errors of the cells, and of 3 x 3 in each, against the continuous patch; None with too many cells."""
+        if self.patch.cells > MOST_QUICK:
+            return None
+        return self.patch.grid_error(), self.patch.grid_error(refined=3)
 
     @functools.cached_property
     def largest_errors(self) -> tuple[float, float]:

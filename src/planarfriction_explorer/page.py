@@ -44,6 +44,7 @@ class Page:
             None, config={"displaylogo": False, "responsive": True}, height=430, sizing_mode="stretch_width"
         )
         self.numbers = pn.pane.HTML("", css_classes=["numbers"], sizing_mode="stretch_width")
+        self.grid = pn.pane.HTML("", sizing_mode="stretch_width")
         self.message = pn.pane.HTML("", visible=False, sizing_mode="stretch_width")
         self.python, self.toml = _code_area("python"), _code_area("toml")
         self.tabs = pn.Tabs(
@@ -172,7 +173,7 @@ class Page:
             self.answer = found = answer(self.state)
         except FrictionError:
             self.answer, self._figure, self.surface.visible = None, {}, False
-            self.python.value = self.toml.value = self.numbers.object = ""
+            self.python.value = self.toml.value = self.numbers.object = self.grid.object = ""
             self.ladder.clear()
             if self.state.drawing.pressures.any():
                 raise
@@ -188,6 +189,7 @@ class Page:
         if self.answer is not None:
             self.surface.param.update(object=pictures.moved(self._figure, self.answer), visible=True)
             self.python.value, self.toml.value = code.python(self.state), code.toml(self.state)
+            self.grid.object = pictures.grid_line(self.state)
 
     def _follow_ladder(self) -> None:
         """Run the comparison of the models while its tab is open."""
@@ -208,7 +210,7 @@ class Page:
             stylesheets=[looks.CARD],
             styles=looks.grows(330),
         )
-        space = pn.Column(self.numbers, self.surface, stylesheets=[looks.CARD], styles=looks.grows(360))
+        space = pn.Column(self.numbers, self.grid, self.surface, stylesheets=[looks.CARD], styles=looks.grows(360))
         main = pn.Column(
             pn.FlexBox(plane, space, gap="10px", align_items="stretch"),
             pn.Spacer(height=10),

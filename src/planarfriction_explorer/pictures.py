@@ -188,6 +188,17 @@ def numbers_table(state: State, found: Answer, seconds: float) -> str:
     )
 
 
+def grid_line(state: State) -> str:
+    """Return a line on what the cells of the map, and finer ones, cost against the continuous patch."""
+    errors = state.drawing.grid_errors
+    if errors is None:
+        return "<p id='grid'>Errors of this grid of many cells: <code>patch.grid_error()</code>.</p>"
+    return (
+        f"<p id='grid'>Errors of a sum over the cells of this grid: {errors[0]}; <code>patch.refined(3)</code>: "
+        f"{errors[1]}.</p>"
+    )
+
+
 def _shown(found: Answer, name: str) -> list[float]:
     """Return a wrench in N and N mm, without -0."""
     fx, fy, tau = getattr(found, name)

@@ -82,10 +82,11 @@ def test_a_law_has_its_fields_and_a_value_that_breaks_a_rule_is_one_line(page):
 def test_an_empty_map_leaves_no_numbers_of_another_one(page):
     page.controls.clear.clicks += 1
     assert "Nothing presses" in page.message.object and page.controls.tool.value == "brush"
-    assert page.numbers.object == page.python.value == ""
+    assert page.numbers.object == page.grid.object == page.python.value == ""
     assert not page.surface.visible
     page.controls.patch.value = "Line"
     assert shown(page).any() and page.surface.visible and "'Line'" in page.python.value
+    assert str(page.state.drawing.patch.grid_error()) in page.grid.object
 
 
 def test_a_scene_file_is_offered_and_a_wrong_one_is_one_line(page):

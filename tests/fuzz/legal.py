@@ -40,7 +40,7 @@ RECORDS = """
     Rollout RolloutVJP RolloutJacobian RolloutStates RolloutTangent RolloutJVP SceneGradient SceneSensitivities
     Identification Verdict MotionPlan GripPlan GripReport Push PushPlan PushReport Solution Progress
     SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration
-    LimitSurface FrictionLaw RateLaw FrictionModel Pressure HostStep
+    GridError LimitSurface FrictionLaw RateLaw FrictionModel Pressure HostStep
 """
 """Classes that the library makes itself, bases of families, and `HostStep`, which is checked where it is used."""
 
@@ -92,6 +92,7 @@ def objects() -> dict[str, Any]:
         "angle": 0.1, "along": 0.4, "across": 0.6, "c": 0.006, "n": 0.3, "k": 2.0, "normal_force": 2.0,
         "sigma_0": 1e5, "sigma_1": 100.0, "sigma_2": 0.1, "v_s": 1e-3, "gamma": 2.0, "dt": 1e-3, "time": TIMES,
         "cell_size": 0.001, "offset": 2.0, "amplitude": 1.0, "frequency": 2.0, "count": 2, "degree": 2, "parts": 2,
+        "refined": 2,
         "x_min": 0.0, "y_min": 0.0, "cell_width": 0.001, "cell_height": 0.001, "columns": 5, "rows": 5,
         "load": 1, "speed": 0.01, "spin": 1.0, "segments": 5, "samples": 20, "save_every": 0.01, "stop_speed": 1e-4,
         "start": "rest", "margin": 0.5, "ramp": 0.01, "fall": 2.0,

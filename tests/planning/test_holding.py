@@ -57,7 +57,7 @@ def test_a_central_force_without_stribeck_needs_what_statics_says():
 
 
 def test_a_plan_ends_above_what_holds_the_cells_of_the_model():
-    """Of 5 x 5 cells, whose radius is 2.7 % short, with mu_s = mu_c; bounds below that were found out by a slip."""
+    """The radius of 5 x 5 cells is 2.7 % short, which shows if mu_s = mu_c; bounds that no plan meets are refused."""
     law = pf.LuGre(mu_c=1.0, elasto_plastic=0.9)
     coarse = pf.DistributedModel(pf.ContactPatch.disc(0.01, cells=5), law)
     scene = pf.scenes.in_hand(coarse, centre_of_mass=(LEVER, 0.0), normal_force=4.0, t_end=1.0)

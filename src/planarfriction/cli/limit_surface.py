@@ -18,6 +18,9 @@ from planarfriction.writing import write_text
 HTML = ".html"
 """A picture to be turned with the mouse."""
 
+FINER, MOST_FINER = 3, 12_000
+"""Refinement whose errors stand beside those of a patch, and the number of cells up to which that takes a second."""
+
 POLAR_SAMPLES, AZIMUTH_SAMPLES = 37, 72
 """Samples of the direction sphere in the CSV: every five degrees."""
 
@@ -48,6 +51,7 @@ def show(patch: pf.ContactPatch, *, surface: str, out: Path | None, alone: bool,
         ["second moment <rho^2> [mm^2]", f"{1e6 * float(patch.second_moment()):.8g}"],
         ["largest distance from the ellipsoid [-]", f"{_distance_from_ellipsoid(shown):.4f}"],
     ]
+    rows += _grid_errors(patch)
     print_table(f"Limit surface of {patch.name} ({surface})", ["mu f_N = 1", "value"], rows)
     if csv is not None:
         from planarfriction.plots.limit_surface import sample_limit_surface
@@ -64,6 +68,16 @@ def show(patch: pf.ContactPatch, *, surface: str, out: Path | None, alone: bool,
         else:
             write_picture(plots.plot_limit_surface(shown, beside=beside), out)
         note(f"wrote {out}")
+
+
+def _grid_errors(patch: pf.ContactPatch) -> list[list[str]]:
+    """Return rows on what the cells cost against the continuous patch, and on what finer ones would; none of points."""
+    if not patch.cell_extents().any():
+        return []
+    rows = [["errors of a sum over its cells", f"{patch.grid_error()}"]]
+    if patch.cells * FINER**2 <= MOST_FINER:
+        rows.append([f"the same of refined({FINER})", f"{patch.grid_error(refined=FINER)}"])
+    return rows
 
 
 def _directions() -> tuple[np.ndarray, np.ndarray]:

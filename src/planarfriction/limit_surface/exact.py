@@ -144,6 +144,11 @@ class LimitSurfaceExact(LimitSurface):
             return np.zeros(2)
         return super().centre_of_pressure
 
+    @property
+    def integrates_outline(self) -> bool:
+        """True if the integral is over the outline of the patch, False if it is over its cells."""
+        return self._outline is not None
+
     @functools.cached_property
     def _outline(self) -> PolygonOutline | RoundOutline | None:
         """The patch's outline, if the pressure can be integrated over it."""

@@ -5,6 +5,7 @@ from planarfriction.patch.compressed import surface_error
 from planarfriction.patch.contact_patch import ContactPatch
 from planarfriction.patch.files import read_pressure_map
 from planarfriction.patch.grid import Grid
+from planarfriction.patch.grid_error import GridError
 from planarfriction.patch.metric import friction_metric
 from planarfriction.patch.pressure import LinearGradient, PerCell, Pressure, SoftFinger, Uniform
 from planarfriction.patch.pressure_maps import PressureMaps
@@ -14,6 +15,7 @@ __all__ = [
     "SHAPES",
     "ContactPatch",
     "Grid",
+    "GridError",
     "LinearGradient",
     "PerCell",
     "Pressure",

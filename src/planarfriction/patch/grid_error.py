@@ -1,0 +1,88 @@
+"""Errors of the cells of a patch against the continuous patch for which they stand."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planarfriction import geometry, validation
+from planarfriction.described import described
+from planarfriction.families import SURFACES
+from planarfriction.patch.pressure import Uniform
+
+if TYPE_CHECKING:
+    from planarfriction.patch.contact_patch import ContactPatch
+
+NEAREST = 60
+"""Largest number of cells, those nearest to the centre of pressure, beside which the centre of rotation is placed."""
+
+BESIDE = 0.01
+"""Distance of the centre of rotation from the middle of a cell, in cells: there the cell pulls with all its load, while
+its continuous friction nearly cancels."""
+
+FINER = 3
+"""Refinement by which a pressure that is given by a law, and not cell by cell, is taken to be continuous."""
+
+DIRECTIONS = 200
+"""Number of directions of the load in which breakaway is compared."""
+
+
+@described
+@dataclass(frozen=True)
+class GridError:
+    """Errors of a sum over cells against the continuous patch, per unit friction; `print` shows them in percent."""
+
+    force: float
+    """Largest error of the force of steady sliding, `|f_cells - f|/(mu f_N)`, while the patch turns about a point that
+    is at most a contact radius from its centre of pressure [-]."""
+    torque: float
+    """Largest error of the torque about the centre of pressure of the same, `|tau_cells - tau|/(mu f_N r)` [-]."""
+    breakaway: float
+    """Largest relative error of the load at which the patch lets go, over all directions of the load [-]."""
+    cells: int
+    """Number of cells."""
+
+    def __str__(self) -> str:
+        force, torque, breakaway = (f"{100.0 * each:.2g} %" for each in (self.force, self.torque, self.breakaway))
+        return f"force {force}, torque {torque}, breakaway {breakaway} ({self.cells} cells)"
+
+
+def grid_error(patch: ContactPatch, normal_force: float | None, refined: int) -> GridError:
+    """Implement `ContactPatch.grid_error`."""
+    with warnings.catch_warnings(action="ignore"):  # of the patch's size, said when it was made
+        fine = patch.refined(validation.count("refined", refined))
+    if not patch.cell_extents().any():
+        return GridError(0.0, 0.0, 0.0, fine.cells)
+    exact, cells = _continuous(patch, normal_force), SURFACES["cells"](fine, normal_force=normal_force)
+    centre, radius = exact.centre_of_pressure, exact.contact_radius
+    x, y = _beside_cells(fine, centre, radius, normal_force)
+    turns = np.stack([y, -x, np.ones_like(x)], -1)  # about (x, y) with 1 rad/s
+    fx, fy, torque = geometry.wrench_at(cells.wrench(turns) - exact.wrench(turns), centre).T
+    breakaway = cells.compare(exact, samples=DIRECTIONS).radius.largest
+    return GridError(float(np.hypot(fx, fy).max()), float(np.abs(torque).max()) / radius, breakaway, fine.cells)
+
+
+def _continuous(patch: ContactPatch, normal_force: float | None):
+    """Return the exact limit surface of the outline, or of cells so small that a pressure law is continuous on them."""
+    exact, pressure = SURFACES["exact"](patch, normal_force=normal_force), patch.pressure
+    by_law = pressure.repeated(2) is pressure and not isinstance(pressure, Uniform)
+    if exact.integrates_outline or not by_law:
+        return exact
+    return SURFACES["exact"](patch.refined(FINER), normal_force=normal_force)
+
+
+def _beside_cells(patch: ContactPatch, centre: np.ndarray, radius: float, normal_force: float | None) -> np.ndarray:
+    """Return points to all four sides of the middles of loaded cells, `[2, M]` [m].
+
+    Of the cells within `radius` [m] of `centre` those nearest to it, or the nearest of all.
+    """
+    loaded = np.flatnonzero(patch.weights(normal_force) > 0.0)
+    distance = np.hypot(*(patch.positions[loaded] - centre).T)
+    order = np.argsort(distance, kind="stable")[:NEAREST]
+    near = loaded[order[distance[order] <= max(radius, distance.min())]]
+    sides = BESIDE * np.array([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
+    points = patch.positions[near, None] + sides * patch.cell_extents()[near, None]
+    return points.reshape(-1, 2).T

@@ -1,0 +1,71 @@
+"""`ContactPatch.grid_error`: closed forms on lines, the order of convergence, points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction.errors import InvalidValueError
+from planarfriction.patch import PUBLISHED_PATCHES
+
+
+@pytest.mark.parametrize("cells", [5, 11])
+def test_a_cell_beside_the_centre_of_rotation_pulls_with_all_its_load(cells):
+    """At a hundredth of a cell from its middle its continuous friction is 0.02 of its load: the force errs by 0.98."""
+    error = pf.ContactPatch.line(0.02, cells).grid_error()
+    assert error.force == pytest.approx(0.98 / cells, rel=1e-6)
+    assert error.cells == cells
+
+
+def test_a_spin_of_a_square_shows_what_the_points_miss():
+    """The largest error of the torque is no less than that of the spin about the middle: `r_cells/r - 1`."""
+    patch = pf.ContactPatch.rectangle(0.02, cells=9)
+    missing = 1.0 - patch.contact_radius() / pf.LimitSurfaceExact(patch).contact_radius
+    error = patch.grid_error()
+    assert error.torque > 0.9 * missing > 0.0
+    spin = np.array([0.0, 0.0, 1.0])
+    surfaces = pf.LimitSurfaceExact(patch), pf.LimitSurfaceCells(patch)
+    exact, cells = (float(spin @ each.twist(-spin) / each.dissipation(each.twist(-spin))) for each in surfaces)
+    assert error.breakaway >= 0.8 * abs(cells / exact - 1.0) > 0.0  # no direction is that of a spin alone
+
+
+@pytest.mark.parametrize(
+    "patch",
+    [
+        pf.ContactPatch.disc(0.01, 9),
+        pf.ContactPatch.rectangle(0.02, cells=7, pressure=pf.LinearGradient((60.0, 30.0))),
+        PUBLISHED_PATCHES["NonConvex1"](),
+        pf.ContactPatch.rectangle(0.02, 0.01, 9).with_friction_metric(pf.friction_metric(0.3, 0.5, 1.0)),
+    ],
+    ids=["disc", "gradient", "pads", "brushed"],
+)
+def test_finer_cells_have_smaller_errors(patch):
+    """All fall with the area of a cell, to a ninth; rims and pressure laws leave up to a fifth."""
+    coarse, fine = patch.grid_error(), patch.grid_error(refined=3)
+    assert fine.cells == 9 * coarse.cells
+    for name in ("force", "torque", "breakaway"):
+        assert getattr(fine, name) < 0.2 * getattr(coarse, name)
+
+
+def test_a_shape_that_follows_its_load_is_compared_at_that_load():
+    patch = pf.ContactPatch.disc(0.01, 15, pressure=pf.SoftFinger(c=0.005, n=1 / 3, k=2.0))
+    small, large = patch.grid_error(1.0), patch.grid_error(8.0)
+    assert small.force > large.force  # fewer cells carry the smaller load
+    with pytest.raises(InvalidValueError, match="normal_force must be given"):
+        patch.grid_error()
+
+
+def test_points_stand_for_themselves():
+    feet = pf.ContactPatch.points([(0.0, 0.0), (0.01, 0.0)])
+    assert feet.grid_error(refined=3) == pf.patch.GridError(0.0, 0.0, 0.0, 2)
+    assert str(feet.grid_error()) == "force 0 %, torque 0 %, breakaway 0 % (2 cells)"
+
+
+def test_what_cannot_be_compared_is_refused():
+    patch = pf.ContactPatch.disc(0.01, 3)
+    metrics = np.eye(2) * (1.0 + 0.1 * np.arange(patch.cells))[:, None, None]
+    with pytest.raises(InvalidValueError, match="one friction metric"):
+        patch.with_friction_metric(metrics).grid_error()
+    with pytest.raises(InvalidValueError, match="refined must be"):
+        patch.grid_error(refined=0)
