@@ -35,11 +35,11 @@ MODELS = {
     "distributed, Stribeck exponent 1": pf.DistributedModel(DISC, pf.LuGre(mu_s=1.2, gamma=1.0)),
     "distributed, grain": pf.DistributedModel(GRAINED, LAW),
     "distributed, asymmetric": pf.DistributedModel(LOPSIDED, LAW),
-    "reduced": pf.ReducedModel(DISC, LAW),
-    "reduced, plain": pf.ReducedModel(DISC, PLAIN),
+    "reduced": pf.ReducedModel(DISC, LAW, parts=1),
+    "reduced, plain": pf.ReducedModel(DISC, PLAIN, parts=1),
     "distributed, a rate of its own": pf.DistributedModel(DISC, BoucWen()),
     "distributed, a rate of its own, grain": pf.DistributedModel(GRAINED, BoucWen()),
-    "reduced, grain": pf.ReducedModel(GRAINED, LAW),
+    "reduced, grain": pf.ReducedModel(GRAINED, LAW, parts=1),
     "reduced, four parts": pf.ReducedModel(DISC, LAW, parts=4),
     "published": pf.ReducedModelPublished(DISC, LAW),
     "published, off its origin": pf.ReducedModelPublished(ASIDE, LAW),
@@ -161,7 +161,11 @@ def test_agrees_with_a_dense_solver(rank):
 
 def test_patches_that_do_not_see_each_other_step_alone():
     generator = np.random.default_rng(3)
-    models = [pf.ReducedModel(DISC, LAW), pf.DistributedModel(DISC, PLAIN), pf.ReducedModelPublished(DISC, LAW)]
+    models = [
+        pf.ReducedModel(DISC, LAW, parts=1),
+        pf.DistributedModel(DISC, PLAIN),
+        pf.ReducedModelPublished(DISC, LAW),
+    ]
     hosts = [_host(generator, 1) for _ in models]
     fields = [np.concatenate(parts) for parts in zip(*(host[:3] for host in hosts), strict=True)]
     together = CoupledPatches(models)
@@ -211,7 +215,7 @@ def test_loads_follow_wrenches_and_vanish_at_zero():
 
 
 def test_shapes_follow_the_loads_that_come_out():
-    models = [pf.ReducedModel(SOFT, LAW), pf.DistributedModel(SOFT, LAW), pf.ReducedModel(SOFT, LAW, parts=2)]
+    models = [pf.ReducedModel(SOFT, LAW, parts=1), pf.DistributedModel(SOFT, LAW), pf.ReducedModel(SOFT, LAW, parts=2)]
     patches, generator = CoupledPatches(models), np.random.default_rng(4)
     hosts = [_host(generator, 3) for _ in range(6)]
     host = HostStep(*(np.stack(field) for field in zip(*(each[:4] for each in hosts), strict=True)))
@@ -275,7 +279,7 @@ def test_approaches_the_solver_with_order_one(kind):
 @pytest.mark.parametrize("damping", [0.0, 800.0])
 def test_what_sticks_does_not_creep(dt, damping):
     """Pushed with two thirds of what friction can hold, at any step length and without damping: it leans and stays."""
-    model = pf.ReducedModel(DISC, pf.LuGre(mu_s=1.2, sigma_0=1e6, sigma_1=damping, elasto_plastic=0.9))
+    model = pf.ReducedModel(DISC, pf.LuGre(mu_s=1.2, sigma_0=1e6, sigma_1=damping, elasto_plastic=0.9), parts=1)
     first, last = (_box(dt, steps * dt, model, push=(1.3, 0.0, 0.0)) for steps in (400, 800))
     # steps of the tolerance, 1e-9 m/s, that do not add up
     assert abs(last - first)[:2].max() / (400 * dt) < 1e-10

@@ -64,7 +64,8 @@ def _show(words: str) -> None:
 def _parts() -> list[Part]:
     patch, law = ContactPatch.disc(radius=0.01, cells=5), LuGre(mu_s=1.2, elasto_plastic=0.9)
     kinds = {name: MODELS[name](patch, law) for name in ("distributed", "reduced", "reduced-published")}
-    three_states = {name: model for name, model in kinds.items() if name != "distributed"}
+    in_parts = models.ReducedModel(patch, law, parts=1)
+    three_states = {"reduced in one part": in_parts, "reduced-published": kinds["reduced-published"]}
     sum_of_parts = models.ReducedModel(patch, law, parts=2)
     grooved = models.DistributedModel(patch.with_friction_metric(friction_metric(0.0, along=1.0, across=0.8)), law)
     return [

@@ -25,7 +25,7 @@ from tests.support.mujoco_misfit import misfit, step_checked, twists_and_loads  
 pytestmark = pytest.mark.mujoco
 
 LAW = pf.LuGre(mu_c=0.5, mu_s=0.6, elasto_plastic=0.9)
-PAD = pf.ReducedModel(pf.ContactPatch.disc(radius=0.01, cells=9), LAW)
+PAD = pf.ReducedModel(pf.ContactPatch.disc(radius=0.01, cells=9), LAW, parts=1)
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
@@ -341,7 +341,7 @@ def test_unprepared_models_and_unknown_names_are_refused():
             "site must be on the body of one of the geoms",
         ),
         (
-            [PatchContact(pf.ReducedModel(soft, LAW), "left", pads)],
+            [PatchContact(pf.ReducedModel(soft, LAW, parts=1), "left", pads)],
             "model must have a shape that does not change with",
         ),
         ([PAD], "patches must be patches"),

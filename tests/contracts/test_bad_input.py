@@ -133,7 +133,7 @@ NUMBERS = {
     "normal_force": lambda x: pf.LimitSurfaceCells(SQUARE, normal_force=x),
     "segments": lambda x: pf.LimitSurfaceTable(SQUARE, x),
     "samples": lambda x: ELLIPSOID.compare(ELLIPSOID, samples=x),
-    "speeds": lambda x: pf.ReducedModel(SQUARE, pf.LuGre(), speeds=x),
+    "speeds": lambda x: pf.ReducedModel(SQUARE, pf.LuGre(), speeds=x, parts=1),
 }
 ARRAYS = {
     "positions": pf.ContactPatch.points,
@@ -402,9 +402,9 @@ BODY = pf.Body(mass=0.2, inertia=1e-4)
 @pytest.mark.parametrize(
     ("mistake", "line"),
     [
-        (lambda: pf.ReducedModel(pf.LuGre(), SQUARE), r"patch must be a ContactPatch, got LuGre\("),
+        (lambda: pf.ReducedModel(pf.LuGre(), SQUARE, parts=1), r"patch must be a ContactPatch, got LuGre\("),
         (lambda: pf.LimitSurfaceExact(REDUCED), "patch must be a ContactPatch, got ReducedModelPublished"),
-        (lambda: pf.ReducedModel(SQUARE, 0.5), "law must be a friction law .* got 0.5"),
+        (lambda: pf.ReducedModel(SQUARE, 0.5, parts=1), "law must be a friction law .* got 0.5"),
         (lambda: pf.simulate(REDUCED), "scene must be a Scene, got ReducedModelPublished"),
         (lambda: pf.Contact(SQUARE, 5.0), r"model .* must be a friction model .* got ContactPatch\("),
         (lambda: pf.Contact(REDUCED, "5 N"), "normal_force .* must be a number, or a Signal of numbers, got '5 N'"),

@@ -85,7 +85,7 @@ def test_a_family_that_stays_as_it_is_has_the_gradient_of_a_fixed_patch(kind):
     family = pf.ReducedModel(measured, law, parts=parts, segments=8, speeds=6)
     single = pf.ReducedModel(fixed, law, parts=parts, segments=8, speeds=6)
     if not np.array_equal(family.labels, single.labels):  # split by the load and by the area
-        family, single = (pf.ReducedModel(p, law, segments=8, speeds=6) for p in (measured, fixed))
+        family, single = (pf.ReducedModel(p, law, segments=8, speeds=6, parts=1) for p in (measured, fixed))
     state, twists = drive(family)
     bars = bars_of(family)
     loads = LOADS.copy()
@@ -163,7 +163,7 @@ def test_without_load_the_slope_is_the_wrench_per_newton_of_a_small_one():
 def test_a_contact_that_shrinks_to_a_point_has_finite_slopes():
     pair = pf.ContactPatch.points([(0.0, 0.0), (0.011, 0.0)])
     patch = pf.ContactPatch(pair.positions, pair.areas, pf.SoftFinger(c=0.01, n=1.0, k=2.0))
-    model = pf.ReducedModel(patch, ELASTIC, segments=8, speeds=6)
+    model = pf.ReducedModel(patch, ELASTIC, segments=8, speeds=6, parts=1)
     loads = np.array([1.1 * (1.0 - 1e-7), 1.1, 1.1 * (1.0 + 5e-6), 1.105, 0.5, 5e-324])
     twists = np.tile([1e-3, 1e-3, 0.1], (len(loads), 1))
     found = derivatives.rollout_vjp(model, None, twists, loads, DT, np.ones((len(loads), 3)))
@@ -177,7 +177,7 @@ def test_a_contact_that_has_just_ceased_to_be_a_point_looks_ahead_alone():
     """Up to a share of 1e-6 of the other foot it is a point, behind that its radius goes on from 11 um."""
     pair = pf.ContactPatch.points([(0.0, 0.0), (0.011, 0.0)])
     patch = pf.ContactPatch(pair.positions, pair.areas, pf.PressureMaps((1.0, 2.0), [[1.0, 0.0], [1.0, 2e-6]]))
-    model = pf.ReducedModel(patch, ELASTIC, segments=8, speeds=6)
+    model = pf.ReducedModel(patch, ELASTIC, segments=8, speeds=6, parts=1)
     low, high = 1.4, 1.6
     for _ in range(60):
         middle = 0.5 * (low + high)
@@ -190,7 +190,7 @@ def test_a_contact_that_has_just_ceased_to_be_a_point_looks_ahead_alone():
 
 
 def test_a_map_for_each_load_is_refused_in_one_line():
-    model = pf.ReducedModel(TIP, ELASTIC, segments=8, speeds=6, load_error=0.0)
+    model = pf.ReducedModel(TIP, ELASTIC, segments=8, speeds=6, load_error=0.0, parts=1)
     state, twists = drive(model)
     with pytest.raises(InvalidValueError, match=r"^load_error must be > 0 for derivatives .*, got 0.0$") as caught:
         derivatives.rollout_jvp(model, state, twists, LOADS, DT)

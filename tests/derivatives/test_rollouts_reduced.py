@@ -25,7 +25,7 @@ every_law = pytest.mark.parametrize("law", LAWS)
 
 @functools.cache
 def model_of(law: str = "elasto-plastic") -> pf.ReducedModel:
-    return pf.ReducedModel(PATCH, LAWS[law], segments=8, speeds=8)
+    return pf.ReducedModel(PATCH, LAWS[law], segments=8, speeds=8, parts=1)
 
 
 def scale_of(model) -> np.ndarray:
@@ -54,7 +54,7 @@ def test_parameters_take_the_place_of_the_models_own():
     assert derivatives.parameter_names(pf.ReducedModelPublished(PATCH, LAWS["plain"])) == derivatives.PARAMETERS
     assert derivatives.parameters_of(model_of("early")).tolist() == [1e6, 800.0, 0.2, 0.7, 1.2, 1e-3, 0.3]
     other = pf.LuGre(0.4, 0.9, 2e-3, 3e5, 50.0, 0.7, elasto_plastic=pf.ElastoPlastic(0.5))
-    changed, (state, twists, loads) = pf.ReducedModel(PATCH, other, segments=8, speeds=8), drive(model_of())
+    changed, (state, twists, loads) = pf.ReducedModel(PATCH, other, segments=8, speeds=8, parts=1), drive(model_of())
     got = derivatives.rollout(model_of(), state, twists, loads, DT, parameters=derivatives.parameters_of(changed))
     assert np.array_equal(got.wrenches, derivatives.rollout(changed, state, twists, loads, DT).wrenches)
 
@@ -219,8 +219,16 @@ FINGER = pf.ContactPatch.rectangle(
         ({"parameters": np.ones(12)}, r"parameters must have shape \[..., 7\], got shape \[12\]"),
         ({"parameters": np.ones(7)}, r"breakaway_ratio must be in \[0, 1\), got 1.0"),
         ({"parameters": np.zeros(7)}, "sigma_0 must be > 0, got 0.0"),
+<<<<<<< HEAD
         ({"model": PATCH}, "model must be one that has compiled roll-outs, got ContactPatch"),
         ({"model": pf.ReducedModel(FINGER, LAWS["plain"], load_error=0.0)}, "load_error must be > 0 for derivatives"),
+=======
+        ({"model": PATCH}, "model must be a ReducedModel or a ReducedModelPublished, got ContactPatch"),
+        (
+            {"model": pf.ReducedModel(FINGER, LAWS["plain"], load_error=0.0, parts=1)},
+            "load_error must be > 0 for derivatives",
+        ),
+>>>>>>> 3c58831 (ReducedModel stands on the bristles of a few cells by default: it lets go where the distributed model does)
     ],
 )
 def test_wrong_input_is_one_clear_line(changed, message):

@@ -30,7 +30,7 @@ def model_of(kind: str, mu: float = 1.0, r: float = 1.0, law: pf.LuGre = LAW):
     if kind in ("table", "moments"):  # of a smooth limit surface: that of four points has facets
         patch = pf.ContactPatch.disc(r * 0.012, cells=9)
     if kind == "moments":
-        return pf.ReducedModel(patch, law, segments=12, speeds=8)
+        return pf.ReducedModel(patch, law, segments=12, speeds=8, parts=1)
     return (
         pf.DistributedModel(patch, law)
         if kind == "distributed"

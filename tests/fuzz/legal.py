@@ -120,7 +120,7 @@ def objects() -> dict[str, Any]:
         # instances, for their methods
         "ContactPatch": SOFT, "Coulomb": pf.Coulomb(0.5), "CoulombStribeck": pf.CoulombStribeck(), "Dahl": pf.Dahl(),
         "LuGre": LAW, "DistributedModel": pf.DistributedModel(PATCH, LAW), "ReducedModelPublished": soft,
-        "ReducedModel": pf.ReducedModel(PATCH, LAW, segments=8, speeds=6), "Signal": signal, "Scene": scene,
+        "ReducedModel": pf.ReducedModel(PATCH, LAW, segments=8, speeds=6, parts=1), "Signal": signal, "Scene": scene,
         "Solution": solution, "Grid": pf.patch.Grid.around_origin(0.02, 0.02, 5, 5), "SoftFinger": SOFT.pressure,
         "Slide": pf.identify.Slide(time, pose), "Log": log, "Uniform": pf.Uniform(),
         "LinearGradient": pf.LinearGradient((5.0, 2.0)), "PressureMaps": pf.PressureMaps([1.0, 2.0], np.ones((2, 3))),

@@ -217,7 +217,7 @@ def test_the_reduced_model_takes_dahl_and_refuses_creep():
         same.step(same.rest(), twist, LOAD, 1e-2)[1], rel=1e-12
     )
     with pytest.raises(InvalidValueError, match=r"^law must have no creep_speed for ReducedModel .*got Coulomb[^\n]*$"):
-        pf.ReducedModel(DISC, CREEPING)
+        pf.ReducedModel(DISC, CREEPING, parts=1)
     leaning = DISC.with_friction_metric(None, (0.1, 0.0))
     with pytest.raises(InvalidValueError, match="no creep_speed for patches with an asymmetry"):
         pf.DistributedModel(leaning, CREEPING)

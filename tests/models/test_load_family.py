@@ -20,8 +20,8 @@ SCALED = pf.ContactPatch.points([(0.01, 0.0), (-0.01, 0.002), (0.0, 0.012)])
 """Three feet."""
 
 
-def model(patch: pf.ContactPatch = SOFT, **options) -> pf.ReducedModel:
-    return pf.ReducedModel(patch, LAW, **{**SMALL, **options})
+def model(patch: pf.ContactPatch = SOFT, **options) -> pf.models.MomentModel:
+    return pf.models.MomentModel(patch, LAW, **{**SMALL, **options})
 
 
 def feet(*weights, loads=(1.0, 2.0)) -> pf.ContactPatch:
@@ -30,7 +30,7 @@ def feet(*weights, loads=(1.0, 2.0)) -> pf.ContactPatch:
     return pf.ContactPatch(SCALED.positions, SCALED.areas, pressure)
 
 
-def steady(model: pf.ReducedModel, twist: np.ndarray, load: float) -> np.ndarray:
+def steady(model: pf.models.MomentModel, twist: np.ndarray, load: float) -> np.ndarray:
     """`z_ss` [m] in scaled coordinates."""
     return model.step(np.zeros_like(twist), twist, load, 1e6)[0]
 
@@ -196,7 +196,7 @@ def test_a_family_forgets_shapes_too(monkeypatch):
 
 
 def test_files_keep_the_stated_error(tmp_path):
-    scene = pf.scenes.in_hand(model(load_error=0.01))
+    scene = pf.scenes.in_hand(pf.ReducedModel(SOFT, LAW, parts=1, load_error=0.01, **SMALL))
     scene.to_file(tmp_path / "scene.toml")
     assert pf.Scene.from_file(tmp_path / "scene.toml").contacts[0].model.load_error == 0.01
     with pytest.raises(pf.FrictionError, match="load_error must be >= 0"):

@@ -19,7 +19,7 @@ ASIDE = pf.ContactPatch(
 """Two cells far from the frame's origin, of which the second is loaded from 0.1 N on."""
 GRAINED = ASIDE.with_friction_metric(friction_metric(0.4, along=1.0, across=0.7), asymmetry=(0.1, 0.2))
 MODELS = {
-    "reduced": lambda patch: pf.ReducedModel(patch, LAW, segments=8, speeds=28),
+    "reduced": lambda patch: pf.models.MomentModel(patch, LAW, segments=8, speeds=28, parts=1),
     "published": lambda patch: pf.ReducedModelPublished(patch, LAW),
 }
 TWIST = np.array([1e-2, 2e-3, 0.5])
@@ -45,7 +45,7 @@ def test_a_point_slides_as_one_cell_does(kind, patch, load):
 def test_a_point_with_a_grain_slides_as_one_cell_does():
     twists = np.stack([TWIST * np.sin(0.3 * t + np.array([0.0, 1.0, 2.0])) for t in range(60)])
     plain = pf.LuGre(mu_s=1.2)
-    found = run(pf.ReducedModel(GRAINED, plain, segments=8), 0.1, twists, 1e-2)[-20:]
+    found = run(pf.models.MomentModel(GRAINED, plain, segments=8, parts=1), 0.1, twists, 1e-2)[-20:]
     wanted = run(pf.DistributedModel(GRAINED, plain), 0.1, twists, 1e-2)[-20:]
     # steady sliding: before it the asymmetry is treated differently (see `ReducedModel`)
     np.testing.assert_allclose(found, wanted, rtol=0.0, atol=3e-5)
@@ -101,7 +101,7 @@ def test_light_cells_dissipate_beside_a_heavy_one(positions, share):
     """Twists that turn close to the heavy cell, where a map of even spacing lost a third of the power and more."""
     count = len(positions) - 1
     patch = pf.ContactPatch.points(np.add(positions, (0.02, -0.01)), [1 - share, *[share / count] * count])
-    model = pf.ReducedModel(patch, pf.LuGre(mu_s=1.0))
+    model = pf.models.MomentModel(patch, pf.LuGre(mu_s=1.0), parts=1)
     generator = np.random.default_rng(0)
     gyration = model.shape_at(None).contact_radius
     away = 10.0 ** generator.uniform(-4.0, 1.5, 3000) * gyration
@@ -124,7 +124,9 @@ def test_a_heavy_cell_of_a_grid_spreads_no_further_than_the_patch():
     for share in (1e-2, 1e-4, 1.1e-6):
         pressure = np.full((3, 3), share / 8.0)
         pressure[1, 1] = 1.0 - share
-        model = pf.ReducedModel(pf.ContactPatch.from_pressure(pressure, 0.005), pf.LuGre(mu_s=1.0, sigma_2=0.0))
+        model = pf.models.MomentModel(
+            pf.ContactPatch.from_pressure(pressure, 0.005), pf.LuGre(mu_s=1.0, sigma_2=0.0), parts=1
+        )
         twist = np.array([[0.0, 0.0, 1.0], [0.0, 1e-3, 1.0]])
         _, wrench = model.step(np.zeros((2, 3)), twist, 1.0, 1e6)
         powers.append(-(wrench * twist).sum(1))
@@ -141,4 +143,4 @@ def test_a_fixed_patch_that_is_a_point_is_refused(share):
     with pytest.raises(
         InvalidValueError, match="patch must carry more than 1e-06 of its load outside its heaviest cell"
     ):
-        pf.ReducedModel(patch, LAW)
+        pf.models.MomentModel(patch, LAW, parts=1)

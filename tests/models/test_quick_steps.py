@@ -10,7 +10,7 @@ import planarfriction as pf
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 DISC = pf.ContactPatch.disc(radius=0.01, cells=9)
 MODELS = {
-    "reduced": pf.ReducedModel(DISC, LAW),
+    "reduced": pf.ReducedModel(DISC, LAW, parts=1),
     "reduced, three parts": pf.ReducedModel(DISC, LAW, parts=3),
     "published": pf.ReducedModelPublished(DISC, LAW),
 }

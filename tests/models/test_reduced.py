@@ -24,8 +24,8 @@ SMALL = {"segments": 8, "speeds": 8}
 
 
 @pytest.fixture(scope="module", params=LAWS)
-def model(request) -> pf.ReducedModel:
-    return pf.ReducedModel(PATCH, LAWS[request.param])
+def model(request) -> pf.models.MomentModel:
+    return pf.models.MomentModel(PATCH, LAWS[request.param], parts=1)
 
 
 def twists(count: int, seed: int = 1, speeds: tuple[float, float] = (-5.0, -1.0)) -> np.ndarray:
@@ -34,7 +34,7 @@ def twists(count: int, seed: int = 1, speeds: tuple[float, float] = (-5.0, -1.0)
     return directions * 10.0 ** generator.uniform(*speeds, (count, 1))
 
 
-def steady(model: pf.ReducedModel, twist: np.ndarray) -> np.ndarray:
+def steady(model: pf.models.MomentModel, twist: np.ndarray) -> np.ndarray:
     """Steady state: that of a step much longer than the memory of the bristles."""
     return model.step(np.zeros_like(twist), twist, 1.0, 1e6)[0]
 
@@ -44,7 +44,7 @@ def steady(model: pf.ReducedModel, twist: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("law", LAWS)
 def test_before_sliding_it_is_the_distributed_model(law):
-    reduced, distributed = pf.ReducedModel(PATCH, LAWS[law], **SMALL), pf.DistributedModel(PATCH, LAWS[law])
+    reduced, distributed = pf.models.MomentModel(PATCH, LAWS[law], **SMALL), pf.DistributedModel(PATCH, LAWS[law])
     for twist in np.eye(3) * [1e-9, 1e-9, 1e-7]:  # bends bristles by 1e-6 of their largest deflection
         ours, theirs = (m.step(m.rest(), twist, 2.0, 1e-3)[1] for m in (reduced, distributed))
         # plain bristles have slipped by that share of their speed
@@ -54,7 +54,7 @@ def test_before_sliding_it_is_the_distributed_model(law):
 def test_translation_is_the_distributed_model():
     twist, loads = np.array([3e-4, -2e-4, 0.0]), 2.0
     for law in LAWS.values():
-        models = [pf.ReducedModel(PATCH, law), pf.DistributedModel(PATCH, law)]
+        models = [pf.models.MomentModel(PATCH, law, parts=1), pf.DistributedModel(PATCH, law)]
         states = [m.rest() for m in models]
         for _ in range(40):
             results = [m.step(z, twist, loads, 2e-4) for m, z in zip(models, states, strict=True)]
@@ -65,7 +65,7 @@ def test_translation_is_the_distributed_model():
 
 def test_steady_sliding_is_the_sum_over_the_cells():
     fine = PATCH.refined(9)
-    reduced, cells = pf.ReducedModel(PATCH, PLAIN), pf.DistributedModel(fine, PLAIN)
+    reduced, cells = pf.models.MomentModel(PATCH, PLAIN, parts=1), pf.DistributedModel(fine, PLAIN)
     errors = []
     for twist in twists(60):
         wrench = reduced.step(reduced.rest(), twist, 1.0, 1e6)[1]
@@ -78,10 +78,10 @@ def test_viscous_friction_is_that_of_the_cells():
     law = pf.LuGre(mu_s=1.2, sigma_2=5.0)
     without = pf.LuGre(mu_s=1.2, sigma_2=0.0)
     twist = np.array([0.1, -0.2, 20.0])
-    for kind in (pf.ReducedModel, pf.DistributedModel):
+    for kind in (pf.models.MomentModel, pf.DistributedModel):
         model, other = kind(PATCH, law), kind(PATCH, without)
         viscous = model.wrench(model.rest(), twist, 1.0) - other.wrench(other.rest(), twist, 1.0)
-        if kind is pf.ReducedModel:
+        if kind is pf.models.MomentModel:
             ours = viscous
     np.testing.assert_allclose(ours, viscous, rtol=1e-12)
 
@@ -141,13 +141,18 @@ def test_slopes_are_continuous_across_the_edges_of_the_cube(faces):
 
 
 def test_a_map_is_small_and_finer_maps_are_closer():
-    assert pf.ReducedModel(PATCH, PLAIN).shape_at(None).data.nbytes < 1.1e6  # half of a common second-level cache
+    assert (
+        pf.models.MomentModel(PATCH, PLAIN, parts=1).shape_at(None).data.nbytes < 1.1e6
+    )  # half of a common second-level cache
     twist = twists(300, seed=5)
-    fine = steady(pf.ReducedModel(PATCH, PLAIN, segments=48, speeds=28), twist)
+    fine = steady(pf.models.MomentModel(PATCH, PLAIN, segments=48, speeds=28, parts=1), twist)
     scale = np.linalg.norm(fine, axis=1)
     errors = [
         np.median(
-            np.linalg.norm(steady(pf.ReducedModel(PATCH, PLAIN, segments=n, speeds=t), twist) - fine, axis=1) / scale
+            np.linalg.norm(
+                steady(pf.models.MomentModel(PATCH, PLAIN, segments=n, speeds=t, parts=1), twist) - fine, axis=1
+            )
+            / scale
         )
         for n, t in ((6, 7), (12, 14), (24, 28))
     ]
@@ -174,7 +179,8 @@ def test_the_map_is_the_sum_over_the_cells_at_every_speed(patch, median, gamma):
     true = law.mu_c * sums[:, :1] + (law.mu_s - law.mu_c) * sums[:, 1:]
     speeds = law.v_s * raised ** (1.0 / gamma)
     ours = steady(
-        pf.ReducedModel(patch, law), np.linalg.solve(factor, (scaled[:, None] * speeds[:, None])[..., None])[..., 0]
+        pf.models.MomentModel(patch, law, parts=1),
+        np.linalg.solve(factor, (scaled[:, None] * speeds[:, None])[..., None])[..., 0],
     )
     errors = np.linalg.norm(law.sigma_0 * ours - true, axis=-1) / np.linalg.norm(true, axis=-1)
     assert np.median(errors) < median
@@ -191,17 +197,17 @@ def test_sliding_always_dissipates(pressure, seed):
     if np.count_nonzero(pressure) < 2:
         pressure[0, 0], pressure[2, 3] = 1.0, 1e-3
     patch = pf.ContactPatch.from_pressure(pressure, 0.005)
-    _dissipates(pf.ReducedModel(patch, PLAIN, segments=4, speeds=6), seed)
+    _dissipates(pf.models.MomentModel(patch, PLAIN, segments=4, speeds=6, parts=1), seed)
 
 
 @settings(max_examples=20, deadline=None)
 @given(st.floats(1e-4, 1.0), st.integers(0, 10**6))
 def test_two_points_always_dissipate(weight, seed):
     patch = pf.ContactPatch.points([(0.0, 0.01), (0.0, -0.01)], [1.0, weight])
-    _dissipates(pf.ReducedModel(patch, PLAIN, segments=4, speeds=6), seed)
+    _dissipates(pf.models.MomentModel(patch, PLAIN, segments=4, speeds=6, parts=1), seed)
 
 
-def _dissipates(model: pf.ReducedModel, seed: int) -> None:
+def _dissipates(model: pf.models.MomentModel, seed: int) -> None:
     twist = twists(60, seed)
     centre = np.random.default_rng(seed).choice(model.patch.positions, 20)  # turning about a cell
     about = np.stack([centre[:, 1], -centre[:, 0], np.ones(20)], -1) * 10.0 ** np.linspace(-4, 1, 20)[:, None]
@@ -219,7 +225,7 @@ def _dissipates(model: pf.ReducedModel, seed: int) -> None:
 def test_turning_patch_twist_and_state_turns_the_wrench(angle):
     """By right angles, which turn the cells into cells; others change the map's own error, not more."""
     turned = pf.ContactPatch.points(pf.geometry.rotate(FEET.positions, angle), FEET.weights())
-    one, other = pf.ReducedModel(FEET, ELASTIC, **SMALL), pf.ReducedModel(turned, ELASTIC, **SMALL)
+    one, other = pf.models.MomentModel(FEET, ELASTIC, **SMALL), pf.models.MomentModel(turned, ELASTIC, **SMALL)
     generator = np.random.default_rng(3)
     twist, z = twists(50, seed=3), 1e-6 * generator.normal(size=(50, 3))
     turn = lambda a: np.concatenate([pf.geometry.rotate(a[:, :2], angle), a[:, 2:]], axis=1)  # noqa: E731
@@ -241,7 +247,7 @@ def test_at_rest_nothing_moves_and_nothing_is_nan(model):
 
 def test_a_patch_of_one_point_is_refused():
     with pytest.raises(InvalidValueError, match="patch must carry more than 1e-06 of its load"):
-        pf.ReducedModel(pf.ContactPatch.points([(0.0, 0.0)]), PLAIN)
+        pf.models.MomentModel(pf.ContactPatch.points([(0.0, 0.0)]), PLAIN, parts=1)
 
 
 def test_a_contact_without_load_forgets(model):
@@ -343,7 +349,7 @@ def test_step_jacobians_are_the_derivatives(model, dt):
 
 
 def test_scene_with_default_tolerances_agrees_with_a_tight_one():
-    model = pf.ReducedModel(PATCH, ELASTIC)
+    model = pf.models.MomentModel(PATCH, ELASTIC, parts=1)
     scene = pf.Scene(pf.Body(0.3, 4e-5, (0.0, 0.0), 0.0, (0.1, -0.05, 8.0)), [pf.Contact(model, 2.0)], 0.1)
     loose, tight = pf.simulate(scene).data, pf.simulate(scene, rtol=1e-9, atol=1e-8).data
     for name in ("x", "y"):
@@ -355,7 +361,7 @@ def test_a_scene_file_keeps_the_model():
     from planarfriction.scenes.model_files import model_from_dict, model_to_dict
     from planarfriction.scenes.section import Section
 
-    model = pf.ReducedModel(FEET, ELASTIC, **SMALL)
+    model = pf.ReducedModel(FEET, ELASTIC, parts=1, **SMALL)
     again = model_from_dict(Section(model_to_dict(model), "contact"))
     assert isinstance(again, pf.ReducedModel)
     assert (again.segments, again.speeds) == (8, 8)
@@ -367,7 +373,7 @@ def test_a_scene_file_keeps_the_model():
 
 def test_a_patch_that_depends_on_the_load_has_a_shape_for_each():
     soft = pf.ContactPatch.disc(0.01, 9, pressure=pf.SoftFinger(k=2.0, c=0.006, n=1.0 / 3.0))
-    model = pf.ReducedModel(soft, PLAIN, **SMALL)
+    model = pf.models.MomentModel(soft, PLAIN, **SMALL)
     loads, twist = np.array([0.0, 0.5, 2.0]), np.array([0.01, 0.0, 2.0])
     _, wrenches = model.step(np.zeros((3, 3)), twist, loads, 1.0)
     assert not wrenches[0].any()
@@ -385,7 +391,7 @@ def test_driven_it_beats_the_published_model_against_the_converged_one(shape):
     twist = pf.Signal.sampled([0.0, 0.2, 0.4], [[0, 0, 0], [0.02, 0.01, 3.0], [-0.02, 0.0, 1.0]], hold="linear")
     models = [
         pf.DistributedModel(patch.refined(3), ELASTIC),
-        pf.ReducedModel(patch, ELASTIC),
+        pf.models.MomentModel(patch, ELASTIC, parts=1),
         pf.ReducedModelPublished(patch, ELASTIC),
     ]
     runs = [pf.simulate(pf.scenes.driven(m, twist=twist, t_end=0.4), rtol=1e-6, atol=1e-6).data for m in models]

@@ -27,8 +27,8 @@ every_patch = pytest.mark.parametrize("name", PATCHES)
 
 
 @pytest.fixture(scope="module")
-def models() -> dict[str, pf.ReducedModel]:
-    return {name: pf.ReducedModel(patch, LAW) for name, patch in PATCHES.items()}
+def models() -> dict[str, pf.models.MomentModel]:
+    return {name: pf.models.MomentModel(patch, LAW, parts=1) for name, patch in PATCHES.items()}
 
 
 def spread(count: int, seed: int = 2) -> np.ndarray:
@@ -82,7 +82,7 @@ def test_metrics_of_ones_change_no_bit(shape):
     ones = np.broadcast_to(np.eye(2), (*shape, 2, 2))
     same = PLAIN.with_friction_metric(ones, np.zeros((*shape, 2)))
     small = {"segments": 8, "speeds": 6}
-    one, other = (pf.ReducedModel(patch, LAW, **small).shape_at(None) for patch in (PLAIN, same))
+    one, other = (pf.models.MomentModel(patch, LAW, **small).shape_at(None) for patch in (PLAIN, same))
     np.testing.assert_array_equal(one.factor, other.factor)
     np.testing.assert_array_equal(one.data, other.data)
 

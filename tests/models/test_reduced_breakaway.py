@@ -14,7 +14,7 @@ FEET = pf.ContactPatch.points([(0.01, 0.0), (-0.01, 0.002), (0.0, 0.012)], [1.0,
 GRAIN = pf.friction_metric(0.4, 1.3, 0.6)
 
 
-def _evenness(model: pf.ReducedModel, z: np.ndarray) -> np.ndarray:
+def _evenness(model: pf.models.MomentModel, z: np.ndarray) -> np.ndarray:
     """Evenness of states `[B, 3]`, from the sums over the cells, which count as points."""
     factor = model.shape_at(None).factor
     bent = np.einsum("nij,bj->bni", model.patch.levers(), np.linalg.solve(factor, z.T).T)
@@ -22,7 +22,7 @@ def _evenness(model: pf.ReducedModel, z: np.ndarray) -> np.ndarray:
     return (square @ model.patch.weights()) ** 2 / (square**2 @ model.patch.weights())
 
 
-def _breakaway(model: pf.ReducedModel, twist: np.ndarray, z: np.ndarray) -> float:
+def _breakaway(model: pf.models.MomentModel, twist: np.ndarray, z: np.ndarray) -> float:
     """The share of `z` [3], as long as the steady state, from which the rates are not the scaled twist any more."""
     elastic = model.rate(np.zeros(3), twist, 1.0)  # to the last bit, on any processor
     low, high = 0.0, 1.0
@@ -34,7 +34,7 @@ def _breakaway(model: pf.ReducedModel, twist: np.ndarray, z: np.ndarray) -> floa
 
 
 def test_breakaway_is_that_of_the_evenness_of_the_state():
-    model = pf.ReducedModel(PATCH, LAW, segments=8, speeds=8)
+    model = pf.models.MomentModel(PATCH, LAW, segments=8, speeds=8, parts=1)
     random = np.random.default_rng(12)
     states, found = random.normal(size=(12, 3)), []
     for z in states:
@@ -48,7 +48,7 @@ def test_breakaway_is_that_of_the_evenness_of_the_state():
 
 
 def test_states_of_any_size_break_away_without_a_number_out_of_range():
-    model = pf.ReducedModel(PATCH, LAW, segments=8, speeds=8)
+    model = pf.models.MomentModel(PATCH, LAW, segments=8, speeds=8, parts=1)
     twist = np.array([0.01, -0.02, 3.0])
     direction = np.array([1.0, -2.0, 2.0])
     for size in (0.0, 5e-324, 1e-200, 1e-100, 1e-42, 1e-41, 1e-30, 1e-9, 1e-6, 1.0, 1e28, 1e30, 1e49):
@@ -62,7 +62,7 @@ def test_states_of_any_size_break_away_without_a_number_out_of_range():
 
 @pytest.mark.parametrize("patch", [PATCH, FEET, PATCH.with_friction_metric(GRAIN)], ids=["T", "feet", "grain"])
 def test_a_translated_patch_breaks_away_as_one_bristle(patch):
-    model, cells = pf.ReducedModel(patch, LAW), pf.DistributedModel(patch, LAW)
+    model, cells = pf.models.MomentModel(patch, LAW, parts=1), pf.DistributedModel(patch, LAW)
     for angle in (0.3, 2.0):
         twist = 1e-3 * np.array([np.cos(angle), np.sin(angle), 0.0])
         states = [m.rest() for m in (model, cells)]
@@ -81,7 +81,7 @@ def test_a_patch_that_is_spun_up_breaks_away_as_its_cells_do(shape):
     A threshold that follows the speeds of the cells, without the square, has 0.28 to 0.62.
     """
     patch, twist = PUBLISHED_PATCHES[shape](), (0.0, 0.0, 0.02)
-    models = [kind(patch, LAW) for kind in (pf.DistributedModel, pf.ReducedModel, pf.ReducedModelPublished)]
+    models = [kind(patch, LAW) for kind in (pf.DistributedModel, pf.models.MomentModel, pf.ReducedModelPublished)]
     dt = 1e-8 / (twist[2] * patch.contact_radius())  # full deflection takes 1e-6 m
     torques = np.empty((3, 400))
     for model, torque in zip(models, torques, strict=True):

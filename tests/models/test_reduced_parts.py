@@ -34,7 +34,7 @@ def twists(count: int, seed: int = 1) -> np.ndarray:
 def test_as_many_parts_as_cells_are_the_distributed_model(law, patch):
     cells, errors = pf.DistributedModel(patch, LAWS[law]), []
     for sizes in ({"segments": 12, "speeds": 7}, {}):
-        model = pf.ReducedModel(patch, LAWS[law], parts=patch.cells, **sizes)
+        model = pf.models.MomentModel(patch, LAWS[law], parts=patch.cells, **sizes)
         ours, theirs, off = model.rest(), cells.rest(), []
         for twist in twists(60):
             rates = model.rate(ours, twist, 2.0)[:, :2].T, cells.rate(theirs, twist, 2.0)
@@ -55,7 +55,7 @@ def test_as_many_parts_as_cells_are_the_distributed_model(law, patch):
 
 def test_a_scene_with_a_part_per_cell_is_that_of_the_distributed_model():
     ends = []
-    for model in (pf.ReducedModel(T, ELASTIC, parts=T.cells), pf.DistributedModel(T, ELASTIC)):
+    for model in (pf.models.MomentModel(T, ELASTIC, parts=T.cells), pf.DistributedModel(T, ELASTIC)):
         data = simulate(pf.scenes.free_slide(model), rtol=1e-7, atol=1e-7).histories
         ends.append([data[name].values[-1] for name in ("x", "y", "theta")])
     np.testing.assert_allclose(ends[0], ends[1], rtol=2e-5)
@@ -66,7 +66,7 @@ def test_a_scene_with_a_part_per_cell_is_that_of_the_distributed_model():
 
 @pytest.mark.parametrize("patch", [T, ROUGH, SOFT], ids=["T", "grain", "soft"])
 def test_steps_one_by_one_in_batches_and_rolled_out_are_the_same(patch):
-    model = pf.ReducedModel(patch, ELASTIC, parts=3, **SMALL)
+    model = pf.models.MomentModel(patch, ELASTIC, parts=3, **SMALL)
     held, loads, dt = twists(12), np.linspace(0.5, 2.0, 12), np.linspace(1e-4, 1e-2, 12)
     loads[5] = 0.0  # a contact without load forgets all its parts
     states, wrenches = [model.rest()], []
@@ -84,13 +84,13 @@ def test_steps_one_by_one_in_batches_and_rolled_out_are_the_same(patch):
 
 
 def test_a_roll_out_is_that_of_its_parts():
-    model = pf.ReducedModel(T, ELASTIC, parts=3)
+    model = pf.models.MomentModel(T, ELASTIC, parts=3)
     held, total = twists(30), 0.0
     kept = derivatives.rollout_states(model, model.rest(), held, 2.0, 1e-3)
     for k in range(3):
         part = part_of(T, model.labels == k)
         rolled = derivatives.rollout_states(
-            pf.ReducedModel(part, ELASTIC), None, held, 2.0 * model.parts_at(None)[k].share, 1e-3
+            pf.models.MomentModel(part, ELASTIC, parts=1), None, held, 2.0 * model.parts_at(None)[k].share, 1e-3
         )
         total = total + rolled.wrenches
         np.testing.assert_allclose(kept.states[:, k], rolled.states, rtol=1e-12, atol=1e-20)
@@ -98,7 +98,7 @@ def test_a_roll_out_is_that_of_its_parts():
 
 
 def test_gradients_and_sensitivities_are_differences_of_roll_outs():
-    model = pf.ReducedModel(T, ELASTIC, parts=3)
+    model = pf.models.MomentModel(T, ELASTIC, parts=3)
     generator = np.random.default_rng(5)
     held, loads, dt = twists(20, 4), np.linspace(1.0, 2.0, 20), 1e-3
     own, start = derivatives.parameters_of(model), 1e-7 * generator.normal(size=(3, 3))
@@ -128,7 +128,7 @@ def test_gradients_and_sensitivities_are_differences_of_roll_outs():
 
 @pytest.mark.parametrize("patch", [T, ROUGH], ids=["T", "grain"])
 def test_before_sliding_parts_are_the_distributed_model(patch):
-    cells, model = pf.DistributedModel(patch, ELASTIC), pf.ReducedModel(patch, ELASTIC, parts=4, **SMALL)
+    cells, model = pf.DistributedModel(patch, ELASTIC), pf.models.MomentModel(patch, ELASTIC, parts=4, **SMALL)
     for twist in np.eye(3) * [1e-9, 1e-9, 1e-7]:  # bends bristles by 1e-6 of their largest deflection
         ours, theirs = (each.step(each.rest(), twist, 2.0, 1e-3)[1] for each in (model, cells))
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9 * np.abs(theirs).max())
@@ -137,14 +137,14 @@ def test_before_sliding_parts_are_the_distributed_model(patch):
 @pytest.mark.parametrize("patch", [T, BRUSHED], ids=["T", "brushed"])
 def test_viscous_friction_of_parts_is_that_of_the_cells(patch):
     twist, pulls = np.array([0.1, -0.2, 20.0]), []
-    for make in (pf.DistributedModel, lambda *given: pf.ReducedModel(*given, parts=5, **SMALL)):
+    for make in (pf.DistributedModel, lambda *given: pf.models.MomentModel(*given, parts=5, **SMALL)):
         some, none = (make(patch, pf.LuGre(mu_s=1.2, sigma_2=sigma_2)) for sigma_2 in (5.0, 0.0))
         pulls.append(some.wrench(some.rest(), twist, 1.0) - none.wrench(none.rest(), twist, 1.0))
     np.testing.assert_allclose(pulls[0], pulls[1], rtol=1e-12)
 
 
 def test_translation_of_parts_is_that_of_the_distributed_model():
-    models = pf.ReducedModel(T, ELASTIC, parts=4), pf.DistributedModel(T, ELASTIC)
+    models = pf.models.MomentModel(T, ELASTIC, parts=4), pf.DistributedModel(T, ELASTIC)
     states = [model.rest() for model in models]
     for _ in range(40):
         found = [m.step(z, (3e-4, -2e-4, 0.0), 2.0, 2e-4) for m, z in zip(models, states, strict=True)]
@@ -156,7 +156,7 @@ def test_translation_of_parts_is_that_of_the_distributed_model():
 def test_steady_sliding_at_a_twist_that_all_share_is_that_of_one_part():
     # a common twist slides each cell at its own speed, whichever part it is in; far from v_s, where maps are closest
     held = twists(200) * 30.0
-    one, many = (pf.ReducedModel(PUBLISHED_PATCHES["Square"](), PLAIN, parts=parts) for parts in (1, 4))
+    one, many = (pf.models.MomentModel(PUBLISHED_PATCHES["Square"](), PLAIN, parts=parts) for parts in (1, 4))
     wrenches = [each.step(each.rest(), held, 1.0, 1e6)[1] / [1.0, 1.0, 0.01] for each in (one, many)]
     off = np.linalg.norm(wrenches[0] - wrenches[1], axis=1)
     assert np.median(off) < 2e-5
@@ -165,15 +165,15 @@ def test_steady_sliding_at_a_twist_that_all_share_is_that_of_one_part():
 
 @pytest.mark.parametrize("patch", [T, BRUSHED, SOFT], ids=["T", "brushed", "soft"])
 def test_sliding_parts_dissipate(patch):
-    model, held = pf.ReducedModel(patch, ELASTIC, parts=4, **SMALL), twists(300, 8)
+    model, held = pf.models.MomentModel(patch, ELASTIC, parts=4, **SMALL), twists(300, 8)
     state, _ = model.step(np.zeros((4, 3)), held, 1.5, 1e6)
     wrench = model.wrench(state, held, 1.5)
     assert (np.einsum("bi,bi->b", wrench, held) < 0.0).all()
 
 
 def test_maps_of_parts_blend_over_the_load_as_that_of_the_patch():
-    held, blended = twists(40, 6), pf.ReducedModel(SOFT, PLAIN, parts=4, **SMALL)
-    exact = pf.ReducedModel(SOFT, PLAIN, parts=4, load_error=0.0, **SMALL)
+    held, blended = twists(40, 6), pf.models.MomentModel(SOFT, PLAIN, parts=4, **SMALL)
+    exact = pf.models.MomentModel(SOFT, PLAIN, parts=4, load_error=0.0, **SMALL)
     errors = []
     for load in np.linspace(1.02, 1.98, 9):
         pulls = [each.step(np.zeros((4, 3)), held, load, 1e6)[1] / [1.0, 1.0, 0.006] for each in (exact, blended)]
@@ -188,7 +188,7 @@ def test_maps_of_parts_blend_over_the_load_as_that_of_the_patch():
 
 @pytest.mark.parametrize("patch", [T, ROUGH, SOFT], ids=["T", "grain", "soft"])
 def test_jacobians_are_differences(patch):
-    model = pf.ReducedModel(patch, ELASTIC, parts=3, **SMALL)
+    model = pf.models.MomentModel(patch, ELASTIC, parts=3, **SMALL)
     held, load, dt = np.array([2e-3, -1e-3, 0.4]), 1.3, 5e-5
     state = model.step(model.rest(), held, load, 3e-4)[0]
     functions = {

@@ -115,18 +115,18 @@ def test_parts_add_up_to_the_patch():
             weights = part.weights(at) * shares[k][..., None]
             np.testing.assert_allclose(weights, patch.weights(at)[..., labels == k], rtol=1e-12, atol=1e-300)
             np.testing.assert_allclose(part.weights(at).sum(-1), 1.0, rtol=1e-14)
-        model = pf.ReducedModel(patch, PLAIN, parts=6, **SMALL)
+        model = pf.models.MomentModel(patch, PLAIN, parts=6, **SMALL)
         for load in np.atleast_1d(at):
             found = model.parts_at(load)
             np.testing.assert_allclose(sum(part.share for part in found), 1.0, rtol=1e-14)
             # second moments of slip add up
             squares = sum(part.share * part.shape.factor.T @ part.shape.factor for part in found)
-            whole = pf.ReducedModel(patch, PLAIN, **SMALL).shape_at(load).factor
+            whole = pf.models.MomentModel(patch, PLAIN, **SMALL).shape_at(load).factor
             np.testing.assert_allclose(squares, whole.T @ whole, rtol=1e-12, atol=1e-18)
 
 
 @pytest.mark.parametrize("parts", [True, 0, -1, 2.5, "six", None, [2], float("nan"), 85, 2000])
 def test_other_parts_are_refused_in_one_line(parts):
     with pytest.raises(InvalidValueError, match="parts must be") as error:
-        pf.ReducedModel(PUBLISHED_PATCHES["NonConvex2"](), PLAIN, parts=parts, **SMALL)
+        pf.models.MomentModel(PUBLISHED_PATCHES["NonConvex2"](), PLAIN, parts=parts, **SMALL)
     assert "\n" not in str(error.value)

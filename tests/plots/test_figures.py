@@ -562,7 +562,7 @@ def test_nothing_is_wrong_with_the_picture_of_a_patch(name):
 def test_a_model_has_its_colour_in_every_figure():
     patch, law = pf.ContactPatch.disc_published(0.01, 7), pf.LuGre(mu_s=1.2)
     models = {
-        "a": pf.ReducedModel(patch, law),
+        "a": pf.ReducedModel(patch, law, parts=1),
         "b": pf.DistributedModel(patch, law),
         "c": pf.ReducedModelPublished(patch, law),
         "d": pf.ReducedModel(patch, law, parts=2),

@@ -39,8 +39,8 @@ def test_a_contact_in_parts_is_as_many_contacts_on_the_same_body():
     alone = [
         dataclasses.replace(
             contact,
-            model=pf.ReducedModel(part_of(T, model.labels == k), LAW),
-            normal_force=dataclasses.replace(load, values=load.values * model.parts_at(None)[k].share),
+            model=pf.ReducedModel(part_of(T, model.reduction.labels == k), LAW, parts=1),
+            normal_force=dataclasses.replace(load, values=load.values * model.reduction.parts_at(None)[k].share),
             name=f"part {k}",
         )
         for k in range(3)
@@ -100,7 +100,9 @@ def test_sensitivities_of_a_scene_are_differences_of_scenes():
     wanted = (ahead - behind) / 2e-4
     # differences of runs at 1e-8: 1e-4 of the largest
     np.testing.assert_allclose(found.d_motion[:, 3:, 0], wanted, atol=3e-4 * np.abs(wanted).max(0).max())
-    one = derivatives.scene_sensitivities(scenes.free_slide(pf.ReducedModel(T, LAW), t_end=0.05), ("mu", "r", "load"))
+    one = derivatives.scene_sensitivities(
+        scenes.free_slide(pf.ReducedModel(T, LAW, parts=1), t_end=0.05), ("mu", "r", "load")
+    )
     largest = np.abs(one.d_motion[:, 3:]).max(0)
     assert (np.abs(found.d_motion[:, 3:] - one.d_motion[:, 3:]).max(0) < 5e-3 * largest.max(0)).all()
 

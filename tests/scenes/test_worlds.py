@@ -89,7 +89,7 @@ def test_a_foot_turns_where_the_torque_passes_the_least_dissipation(part, turns)
 
 
 def test_a_foot_walks_sideways_on_heel_and_forefoot():
-    model = pf.ReducedModel(PAD, COULOMB)
+    model = pf.ReducedModel(PAD, COULOMB, parts=1)
     data = pf.simulate(foot(model)).data
     x, y, theta = (np.asarray(data[name]) for name in ("x", "y", "theta"))
     heel = np.stack([x - 0.08 * np.cos(theta), y - 0.08 * np.sin(theta)])

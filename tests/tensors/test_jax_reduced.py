@@ -131,7 +131,7 @@ def test_a_patch_whose_shape_follows_the_load_keeps_that_of_one_load():
     for got, want in zip(model.step(jnp.array(state), jnp.array(twist), 0.3, 1e-4), wanted, strict=True):
         np.testing.assert_allclose(got, want, rtol=1e-12)
     with pytest.raises(pf.FrictionError, match="normal_force must be"):
-        pj.ReducedModel(patch, LAWS["plain"])
+        pj.ReducedModel(patch, LAWS["plain"], parts=1)
 
 
 def test_gradients_are_the_analytic_jacobians():
@@ -292,7 +292,7 @@ def test_gradients_of_roll_outs_are_those_of_pytorch():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: pj.ReducedModel("disc", LAWS["plain"]), "patch must be a ContactPatch"),
+        (lambda: pj.ReducedModel("disc", LAWS["plain"], parts=1), "patch must be a ContactPatch"),
         (lambda: pair("plain")[1].replace(weights=1.0), "leaf must be one of parameters, shape, got 'weights'"),
         (
             lambda: jax.grad(lambda m: pj.rollout(m, None, sway(4), 1.0, 1e-4, method="adjoint").state.sum())(

@@ -24,7 +24,7 @@ every_model = pytest.mark.parametrize("kind", ["reduced", "published", "smooth t
 
 def module(kind: str):
     if kind == "reduced":
-        return ReducedModel(PATCH, LAW, segments=8, speeds=8, dtype=torch.float64)
+        return ReducedModel(PATCH, LAW, segments=8, speeds=8, dtype=torch.float64, parts=1)
     surface = pf.LimitSurfaceTable(PATCH) if kind == "smooth table" else None
     return ReducedModelPublished(PATCH, LAW, surface, dtype=torch.float64)
 

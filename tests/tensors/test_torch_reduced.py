@@ -122,7 +122,7 @@ def test_a_patch_whose_shape_follows_the_load_keeps_that_of_one_load():
     for got, want in zip(model.step(tensor(state), tensor(twist), 0.3, 1e-4), wanted, strict=True):
         np.testing.assert_allclose(got.detach().numpy(), want, rtol=1e-12, atol=1e-18)
     with pytest.raises(pf.FrictionError, match="normal_force must be"):
-        ReducedModel(patch, law)
+        ReducedModel(patch, law, parts=1)
 
 
 def test_float32_is_as_close_as_its_digits():
@@ -289,7 +289,7 @@ def test_state_dicts_travel():
         (lambda: module("plain", trainable=("breakaway_ratio",)), "not contain breakaway_ratio for plain bristles"),
         (lambda: module().set(gamma=1.0), "parameter must be one of"),
         (lambda: module()(tensor([0.0]), tensor([0.0] * 3), 1.0), r"state must have shape \[..., 3\]"),
-        (lambda: ReducedModel("disc", LAWS["plain"]), "patch must be a ContactPatch"),
+        (lambda: ReducedModel("disc", LAWS["plain"], parts=1), "patch must be a ContactPatch"),
     ],
 )
 def test_wrong_input_is_one_line(make, message):

@@ -23,7 +23,7 @@ from planarfriction.kernels import (
 from planarfriction.kernels.law import LAW
 from planarfriction.kernels.rollouts import Bars, Inputs
 from planarfriction.laws.base import is_rate_law
-from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
+from planarfriction.models import DistributedModel, MomentModel, ReducedModelPublished
 from planarfriction.models.map_sizes import MapSizes, maps_of
 from planarfriction.models.published_shapes import PublishedShape, axes_of
 from planarfriction.models.reduced_map import ReducedShape
@@ -73,7 +73,7 @@ PUBLISHED = _family_of(PARAMETERS, published_step.NAMES, published_rollout, publ
 _OF_LAW = tuple(name for name in PARAMETERS[:8] if name != "gamma")
 
 REDUCED = _family_of(_OF_LAW, reduced_step.NAMES, reduced_rollout, reduced_loads)
-"""`ReducedModel`; gamma and the shape are built into its stored map."""
+"""`ReducedModel` in parts; gamma and the shape are built into its stored map."""
 
 REDUCED_BY_LOAD = _family_of(_OF_LAW, reduced_step.NAMES, reduced_loads, reduced_loads)
 """The same where the shape follows the load."""
@@ -129,7 +129,7 @@ def parameter_names(model: Any) -> tuple[str, ...]:
     """Return the names of the P parameters of a model, in the order of the parameter vector.
 
     Those of `ReducedModelPublished` are `PARAMETERS`, those of `DistributedModel` the parameters of the law. Those of
-    `ReducedModel` are the parameters of the law without gamma, because its stored map depends on gamma, as it does on
+    `ReducedModel` in parts are the parameters of the law without gamma, because its stored map depends on gamma, as it does on
     the shape of the patch.
 
     Raises InvalidValueError for a model that has no roll-outs.
@@ -164,7 +164,8 @@ def pack(model: Any, parameters: Any = None) -> Packed:
 
 
 def _family(model: Any) -> Family:
-    if isinstance(model, ReducedModel):
+    model = getattr(model, "reduction", model)
+    if isinstance(model, MomentModel):
         return REDUCED
     if isinstance(model, ReducedModelPublished):
         return PUBLISHED
@@ -180,14 +181,14 @@ def is_compiled(model: Any) -> bool:
         _family(model)
     except InvalidValueError:
         return False
-    return not _refusal(model)
+    return not _refusal(model.reduction)
 
 
 def _refusal(model: Any) -> tuple[str, str, Any] | None:
     """Return the rule that keeps a model from compiled roll-outs, as `InvalidValueError` takes it, or None."""
     if isinstance(model, DistributedModel) or not model.depends_on_load:
         return None
-    if isinstance(model, ReducedModel):
+    if isinstance(model, MomentModel):
         if model.load_error > 0.0:
             return None
         rule = "be > 0 for derivatives and parameters of roll-outs, which interpolate the shape over the load"
@@ -201,6 +202,7 @@ def _refusal(model: Any) -> tuple[str, str, Any] | None:
 
 def _packed(model: Any) -> Packed:
     family = _family(model)
+    model = model.reduction
     refusal = _refusal(model)
     if refusal is not None:
         raise InvalidValueError(*refusal)
@@ -245,7 +247,7 @@ def _fixed(
 def pack_maps(
     elasto_plastic: bool, sizes: Sequence[MapSizes], shares: np.ndarray, factors: np.ndarray, data: np.ndarray
 ) -> Packed:
-    """Return a `ReducedModel` by its parts, for roll-outs at given parameters, which take the place of those here.
+    """Return a `ReducedModel` in parts, for roll-outs at given parameters, which take the place of those here.
 
     `shares` `[P]` of the load, F `[P, 3, 3]`, and the maps one behind the other.
     """

@@ -20,7 +20,7 @@ from planarfriction.kernels.distributed_step import ISOTROPIC
 from planarfriction.kernels.steps import WORDS, Parts, step_sequence
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
-from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
+from planarfriction.models import DistributedModel, MomentModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
 
 CHANGE = 1e-6
@@ -178,20 +178,20 @@ class DistributedSimulator(ScaledSimulator):
 
 
 class ReducedSimulator(ScaledSimulator):
-    """Simulator of `ReducedModel`, whose map is rebuilt for each Stribeck exponent."""
+    """Simulator of `ReducedModel` in one part, whose map is rebuilt for each Stribeck exponent."""
 
     model_class = ReducedModel
     changes: Mapping[str, float] = {"gamma": 1e-3}
 
     def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
         super().__init__(patch, law)
-        self._models: dict[float, ReducedModel] = {}
+        self._models: dict[float, MomentModel] = {}
 
-    def _model(self, gamma: float) -> ReducedModel:
+    def _model(self, gamma: float) -> MomentModel:
         if gamma not in self._models:
             if len(self._models) > 3:
                 self._models.pop(next(iter(self._models)))
-            self._models[gamma] = ReducedModel(self.patch, dataclasses.replace(self._law, gamma=gamma), **MAP)
+            self._models[gamma] = MomentModel(self.patch, dataclasses.replace(self._law, gamma=gamma), **MAP)
         return self._models[gamma]
 
     def _inner(self, twists, loads, dt, vector):

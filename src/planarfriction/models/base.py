@@ -70,6 +70,11 @@ class FrictionModel(ByValue):
         return f"{type(self).__name__}({', '.join(parts)})"
 
     @property
+    def reduction(self) -> FrictionModel:
+        """Model whose equations and state this one has: itself, but for models that choose one (`ReducedModel`)."""
+        return self
+
+    @property
     def state_shape(self) -> tuple[int, ...]:
         """Shape of the state of one contact."""
         raise NotImplementedError

@@ -93,7 +93,7 @@ def compressed(
     chosen = np.arange(0, len(weights), CHOSEN_EVERY)
     for index in [*chosen, *np.setdiff1d(np.arange(len(weights)), chosen)]:
         favoured = np.any(found > 0.0, axis=0)
-        problem = _WeightProblem.of(patch.positions, weights[index], degree)
+        problem = WeightProblem.of(patch.positions, weights[index], degree)
         refit = None if index in chosen else problem.refit(favoured)
         if refit is None:
             refit = problem.solution(most, favoured)
@@ -165,7 +165,7 @@ def _few(patch: ContactPatch, weights: np.ndarray, nodes: np.ndarray | None) -> 
 # ---------------------------------------------------------------------- one set of weights
 
 
-class _WeightProblem(NamedTuple):
+class WeightProblem(NamedTuple):
     """Constraints on the weights of a compressed patch, over the C cells that may be chosen (`cells`) out of N."""
 
     every: int
@@ -180,7 +180,7 @@ class _WeightProblem(NamedTuple):
     surface_wanted: np.ndarray
 
     @classmethod
-    def of(cls, positions: np.ndarray, weights: np.ndarray, degree: int) -> _WeightProblem:
+    def of(cls, positions: np.ndarray, weights: np.ndarray, degree: int) -> WeightProblem:
         """Return the problem of compressing `weights` `[N]` at `positions` `[N, 2]`."""
         loaded = np.flatnonzero(weights > 0.0)
         scaled, twists = rows.scaled_positions(positions[loaded], weights[loaded]), rows.directions(DIRECTIONS)
@@ -218,7 +218,7 @@ class _WeightProblem(NamedTuple):
         return self._everywhere(kept, self._polished(kept, weights))
 
     def refit(self, chosen: np.ndarray) -> np.ndarray | None:
-        """Return the weights `[N]` of the cells `chosen` `[N]` alone, or None where they cannot have the moments."""
+        """Return the weights `[N]` of the cells `chosen` alone, or None where they cannot have the moments."""
         kept = chosen[self.cells]
         found = self._positive(kept, np.empty(0, dtype=int))
         return None if found is None else self._everywhere(*found)
@@ -226,7 +226,7 @@ class _WeightProblem(NamedTuple):
     def _everywhere(self, kept: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """Return the weights of the cells `kept` among zeros, `[N]`."""
         result = np.zeros(self.every)
-        result[self.cells[kept]] = weights
+        result[self.cells[kept]] = np.maximum(weights, 0.0)  # rounding of the last step
         return result
 
     def _weights(self, kept: np.ndarray) -> np.ndarray | None:

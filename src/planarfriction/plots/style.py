@@ -117,7 +117,7 @@ def unit_for(kind: str, *values) -> Unit:
 def model_colour(model: Any) -> str | None:
     """Return the colour of a friction model; None if it is not one of the library's."""
     name = MODELS.name_of(model)
-    return PARTS if name == "reduced" and model.parts > 1 else OF_MODEL.get(name or "")
+    return PARTS if name == "reduced" and model.parts and model.parts > 1 else OF_MODEL.get(name or "")
 
 
 def show_lengths(axes: Any, largest: float) -> None:

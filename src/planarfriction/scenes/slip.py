@@ -97,11 +97,9 @@ def slip_fraction(model: Any, states: np.ndarray, twists: np.ndarray, loads: np.
 
 def _weights(model: Any, loads: np.ndarray) -> np.ndarray:
     """Return the weight of each state in the mean square: that of its cell, or one over the square of its scale."""
-    shape, cells = tuple(model.state_shape), len(model.patch.positions)
-    if shape == (2, cells):
-        weights = np.array([model.patch.weights(load) for load in loads]) if model.patch.depends_on_load else (
-            model.patch.weights()[None]
-        )  # fmt: skip
+    shape, patch = tuple(model.state_shape), getattr(model, "reduction", model).patch
+    if shape == (2, patch.cells):
+        weights = np.array([patch.weights(load) for load in loads]) if patch.depends_on_load else patch.weights()[None]
         return weights[:, None, :]
     if "m^2" in getattr(model, "state_units", "m"):
         radius = np.array([float(model.patch.contact_radius(load)) for load in loads])

@@ -76,7 +76,7 @@ class ReducedParts(NamedTuple):
 
 def parts_of(patch: ContactPatch, law: FrictionLaw, normal_force: float | None, **options: Any) -> ReducedParts:
     """Return the parts of a patch at a load [N]; `parts`, `segments` and `speeds` as in `ReducedModel`."""
-    model = models.ReducedModel(patch, law, load_error=0.0, **options)
+    model = models.MomentModel(patch, law, load_error=0.0, **options)
     shares, shapes = zip(*model.parts_at(normal_force), strict=True)
     data = [shape.data for shape in shapes]
     factor = np.stack([shape.factor for shape in shapes])

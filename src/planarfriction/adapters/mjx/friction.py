@@ -282,7 +282,8 @@ def _in_jax(model: models.FrictionModel) -> FrictionPytree:
     if model.depends_on_load:
         rule = "have a shape that does not change with the load: models of JAX keep theirs"
         raise InvalidValueError("model", rule, type(model).__name__)
-    if isinstance(model, models.ReducedModel):
+    model = model.reduction
+    if isinstance(model, models.MomentModel):
         return ReducedModel(model.patch, model.law, parts=model.parts, segments=model.segments, speeds=model.speeds)
     if isinstance(model, models.ReducedModelPublished):
         return ReducedModelPublished(model.patch, model.law, model.surface)

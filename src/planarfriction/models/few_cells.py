@@ -1,0 +1,148 @@
+"""Few cells whose bristles stand for those of a whole patch."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from planarfriction.equality import ByValue
+from planarfriction.patch import ContactPatch
+from planarfriction.patch import compressed_rows as rows
+from planarfriction.patch.compressed import WeightProblem
+from planarfriction.patch.pressure import Pressure
+
+OF_ALL_LOADS = 2
+"""Times as many cells as of another stand for a patch whose shape depends on the load."""
+
+DEGREE = 2
+"""Degree up to which they keep the moments of the pressure; what is left open of their weights fits limit surfaces."""
+
+PROBED = np.geomspace(1e-6, 1e6, 1001)
+"""Loads [N] at which a patch is looked at to find where its shape changes."""
+
+MOVED = 0.1
+"""Share of the load that moves between cells from one load to the next over whose shapes cells are chosen."""
+
+ROUNDS = 10
+"""Largest number of times that shares are corrected, again after one has come out negative."""
+
+INDEPENDENT = 1e-10
+"""Relative singular value below which sums over the few cells count as dependent."""
+
+LEAST = 0.05
+"""Share of itself down to which a share may fall in a round that others leave negative."""
+
+
+def few_cells(patch: ContactPatch, cells: int) -> ContactPatch:
+    """Return a patch of about `cells` cells that stand for all of `patch` (see `ContactPatch.compressed`).
+
+    Cells with a friction metric or asymmetry of their own are compressed together with those that share it. The cells
+    of a patch whose shape depends on the load are more than that, chosen at several loads; if they do not share
+    one friction, all are kept.
+    """
+    if patch.cells <= cells:
+        return patch
+    kinds = _kinds(patch)
+    if patch.depends_on_load:
+        return _by_load(patch, OF_ALL_LOADS * cells) if kinds.max() == 0 else patch
+    return patch.compressed(DEGREE, cells=cells) if kinds.max() == 0 else _by_kind(patch, kinds, cells)
+
+
+def _kinds(patch: ContactPatch) -> np.ndarray:
+    """Return the number of the kind of friction of each cell, `[N]`."""
+    if patch.metric is None and patch.asymmetry is None:
+        return np.zeros(patch.cells, int)
+    metric = np.broadcast_to(np.eye(2) if patch.metric is None else patch.metric, (patch.cells, 2, 2))
+    numbers = np.hstack([metric.reshape(-1, 4), patch.asymmetries()])
+    return np.unique(numbers, axis=0, return_inverse=True)[1].reshape(-1)
+
+
+def _by_kind(patch: ContactPatch, kinds: np.ndarray, count: int) -> ContactPatch:
+    """Return the patch with the cells of each kind of friction compressed by themselves."""
+    groups = [np.flatnonzero(kinds == kind) for kind in range(kinds.max() + 1)]
+    weights = patch.weights()
+    few = [few_cells(ContactPatch(patch.positions[g], patch.areas[g], weights[g]), count) for g in groups]
+    shares = np.concatenate([weights[g].sum() * each.weights() for g, each in zip(groups, few, strict=True)])
+    first = np.repeat([g[0] for g in groups], [each.cells for each in few])
+    metric = None if patch.metric is None else np.broadcast_to(patch.metric, (patch.cells, 2, 2))[first]
+    asymmetry = None if patch.asymmetry is None else patch.asymmetries()[first]
+    areas = np.full(len(first), patch.areas.sum() / len(first))
+    positions = np.vstack([each.positions for each in few])
+    return ContactPatch(positions, areas, shares, None, patch.name, metric=metric, asymmetry=asymmetry)
+
+
+def _by_load(patch: ContactPatch, count: int) -> ContactPatch:
+    """Return the few cells of a patch whose shape depends on the load."""
+    if patch.cells <= count:
+        return patch
+    mean = patch.weights(_loads_of_change(patch)).mean(axis=0)
+    problem = WeightProblem.of(patch.positions, mean, DEGREE)
+    chosen = problem.solution(count, np.zeros(patch.cells, bool)) > 0.0
+    metric = None if patch.metric is None else patch.metric.reshape(-1, 2, 2)[0]
+    asymmetry = None if patch.asymmetry is None else patch.asymmetries()[0]
+    areas = np.full(int(chosen.sum()), patch.areas.sum() / chosen.sum())
+    law = Gathered(patch, chosen)
+    return ContactPatch(patch.positions[chosen], areas, law, None, patch.name, metric=metric, asymmetry=asymmetry)
+
+
+def _loads_of_change(patch: ContactPatch) -> np.ndarray:
+    """Return loads [N] from the lowest to the highest at which the shape changes, by equal changes of the shape."""
+    moved = 0.5 * np.abs(np.diff(patch.weights(PROBED), axis=0)).sum(axis=1)
+    changes = np.flatnonzero(moved > 0.0)
+    span = slice(changes[0], changes[-1] + 2)
+    total = np.r_[0.0, np.cumsum(moved[changes[0] : changes[-1] + 1])]
+    wanted = np.linspace(0.0, total[-1], max(2, math.ceil(total[-1] / MOVED)) + 1)
+    return np.exp(np.interp(wanted, total, np.log(PROBED[span])))
+
+
+@dataclass(frozen=True, eq=False)
+class Gathered(ByValue, Pressure):
+    """Shares of the load of the few cells of a patch whose shape depends on the load.
+
+    Each cell of the whole patch gives its share to the nearest of the few; then the shares w of these change by the
+    least `sum (dw)^2/w` that gives them the moments of the whole up to `DEGREE` and its wrench of a spin.
+    """
+
+    patch: ContactPatch
+    """Whole patch."""
+    chosen: np.ndarray
+    """True for the few cells, `[N]`."""
+
+    @functools.cached_property
+    def nearest(self) -> np.ndarray:
+        """Index of the few cell that is nearest to each cell of the patch, `[N]`."""
+        from scipy.spatial import KDTree
+
+        return KDTree(self.patch.positions[self.chosen]).query(self.patch.positions)[1]
+
+    @property
+    def depends_on_load(self) -> bool:
+        return True
+
+    def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
+        loads = np.asarray(normal_force, dtype=float)
+        different, place = np.unique(loads, return_inverse=True)
+        shares = np.array([self._at(weights) for weights in self.patch.weights(different)])
+        return shares[place.reshape(loads.shape)]
+
+    def ever_loaded(self, positions: np.ndarray, between: tuple[float, float] | None = None) -> np.ndarray:
+        loaded = self.patch.pressure.ever_loaded(self.patch.positions, between)
+        return np.bincount(self.nearest[loaded], minlength=len(positions)) > 0
+
+    def _at(self, weights: np.ndarray) -> np.ndarray:
+        """Return the shares of the few cells for `weights` `[N]` of all."""
+        shares = np.bincount(self.nearest, weights, int(self.chosen.sum()))
+        scaled = rows.scaled_positions(self.patch.positions, weights)
+        sums = np.vstack([rows.polynomials(scaled, DEGREE), rows.spin(scaled)])
+        wanted, sums = sums @ weights, sums[:, self.chosen]
+        for _ in range(ROUNDS):
+            missing = wanted - sums @ shares
+            turned = sums * shares
+            changed = shares * (1.0 + sums.T @ np.linalg.lstsq(turned @ sums.T, missing, rcond=INDEPENDENT)[0])
+            if (changed >= 0.0).all():
+                return changed
+            shares = np.maximum(changed, LEAST * shares)
+        return shares
