@@ -50,7 +50,7 @@ def an_identification() -> identify.Identification:
 
 MODELS = {
     f"{kind.__name__} of a {name}": lambda kind=kind, patch=patch: used(kind(patch, LAW))
-    for kind in (pf.DistributedModel, pf.ReducedModel, pf.ReducedModelPublished)
+    for kind in (pf.DistributedModel, pf.models.MomentModel, pf.ReducedModel, pf.ReducedModelPublished)
     for name, patch in (("square", SQUARE), ("finger", FINGER))
 }
 SURFACES = {
@@ -95,9 +95,9 @@ MAKERS = {
     "RODAS4": lambda: copy.deepcopy(solvers.RODAS4),
     "RODAS3": lambda: copy.deepcopy(solvers.RODAS3),
     "comparison": lambda: SURFACES["LimitSurfaceCells"]().compare(SURFACES["LimitSurfaceEllipsoid"]()),
-    "jacobians": lambda: MODELS["ReducedModel of a square"]().jacobians(np.zeros(3), (0.1, 0.0, 0.0), 1.0),
-    "step jacobians": lambda: MODELS["ReducedModel of a square"]().step_jacobians(np.zeros(3), (1, 0, 0), 1.0, 1e-3),
-    "shape": lambda: MODELS["ReducedModel of a finger"]().shape_at(1.0),
+    "jacobians": lambda: MODELS["MomentModel of a square"]().jacobians(np.zeros(3), (0.1, 0.0, 0.0), 1.0),
+    "step jacobians": lambda: MODELS["MomentModel of a square"]().step_jacobians(np.zeros(3), (1, 0, 0), 1.0, 1e-3),
+    "shape": lambda: MODELS["MomentModel of a finger"]().shape_at(1.0),
     "published shape": lambda: MODELS["ReducedModelPublished of a finger"]().shape_at(1.0),
     "surface numbers": lambda: SURFACES["LimitSurfaceTable"]().numbers,
     "roll-out": lambda: pf.rollout(MODELS["DistributedModel of a square"](), None, np.ones((5, 3)), 1.0, 1e-3),

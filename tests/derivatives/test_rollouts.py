@@ -286,15 +286,10 @@ def test_one_load_for_each_contact_and_rest():
 @pytest.mark.parametrize("kind", ["leaning cells", "a map for each load"])
 def test_a_rollout_of_any_model_takes_its_steps(kind):
     model = {
-<<<<<<< HEAD
         "leaning cells": lambda: pf.DistributedModel(
             PATCH.with_friction_metric(np.eye(2), asymmetry=[0.2, 0.0]), ELASTIC
         ),
-        "a map for each load": lambda: pf.ReducedModel(FINGER, ELASTIC, segments=8, speeds=8, load_error=0.0),
-=======
-        "distributed": lambda: pf.DistributedModel(PATCH, ELASTIC),
         "a map for each load": lambda: pf.ReducedModel(FINGER, ELASTIC, segments=8, speeds=8, load_error=0.0, parts=1),
->>>>>>> 3c58831 (ReducedModel stands on the bristles of a few cells by default: it lets go where the distributed model does)
     }[kind]()
     twists = np.random.default_rng(3).normal(size=(2, 5, 3)) * (1e-3, 1e-3, 0.3)
     loads, steps = np.linspace(0.5, 1.5, 5), np.linspace(1e-4, 2e-4, 5)

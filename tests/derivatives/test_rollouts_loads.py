@@ -84,7 +84,7 @@ def test_a_family_that_stays_as_it_is_has_the_gradient_of_a_fixed_patch(kind):
         measured, fixed = (p.with_friction_metric(patch.metric, asymmetry=patch.asymmetry) for p in (measured, fixed))
     family = pf.ReducedModel(measured, law, parts=parts, segments=8, speeds=6)
     single = pf.ReducedModel(fixed, law, parts=parts, segments=8, speeds=6)
-    if not np.array_equal(family.labels, single.labels):  # split by the load and by the area
+    if not np.array_equal(family.reduction.labels, single.reduction.labels):  # split by the load and by the area
         family, single = (pf.ReducedModel(p, law, segments=8, speeds=6, parts=1) for p in (measured, fixed))
     state, twists = drive(family)
     bars = bars_of(family)
@@ -108,16 +108,16 @@ def test_a_load_that_one_rung_serves_moves_on_along_the_blend(kind, error, monke
     state, twists = drive(model, 3)
     bars = bars_of(model)
     for rung in (1.0, 2.0):
-        at_rung = [part.shape.data for part in model.parts_at(rung)]
+        at_rung = [part.shape.data for part in model.reduction.parts_at(rung)]
         for load in (rung * (1.0 + 1e-6), rung * (1.0 - 1e-6)):
-            for part, data in zip(model.parts_at(load), at_rung, strict=True):
+            for part, data in zip(model.reduction.parts_at(load), at_rung, strict=True):
                 assert part.shape.other is None and np.array_equal(part.shape.data, data)
             served = derivatives.rollout_vjp(model, state, twists, load, DT, *bars)
             with monkeypatch.context() as patched:
-                for part in model.shapes.each:
+                for part in model.reduction.shapes.each:
                     patched.setattr(part.family, "_error", 1e-12)
                     patched.setattr(part.family, "_shapes", {})
-                assert all(part.shape.blend > 0.0 for part in model.parts_at(load))
+                assert all(part.shape.blend > 0.0 for part in model.reduction.parts_at(load))
                 ends = [pf.rollout(model, state, twists, load * (1.0 + h), DT) for h in (5e-7, -5e-7)]
             values = [(bars[0] * run.wrenches).sum() + (bars[1] * run.state).sum() for run in ends]
             # 1e-6 of the way to the next rung, and rounding of numbers near 100 by 1e-16/1e-6
@@ -181,7 +181,7 @@ def test_a_contact_that_has_just_ceased_to_be_a_point_looks_ahead_alone():
     low, high = 1.4, 1.6
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if model.shape_at(middle).contact_radius == 0.0 else (low, middle)
+        low, high = (middle, high) if model.reduction.shape_at(middle).contact_radius == 0.0 else (low, middle)
     load, twist, bar = high * (1.0 + 2e-6), [[0.0, 0.0, 0.1]], [[0.0, 0.0, 1.0]]
     found = derivatives.rollout_vjp(model, None, twist, load, DT, bar)
     ends = [pf.rollout(model, None, twist, load * (1.0 + h), DT).wrenches[0, 2] for h in (1e-6, -1e-6)]

@@ -64,7 +64,9 @@ def published(surface: str, law: str) -> Case:
 
 
 def reduced(patch: pf.ContactPatch, law: str, speed: str = "around", **options) -> Case:
-    return Case(lambda: pf.ReducedModel(patch, LAWS[law], **{"segments": 8, "speeds": 8, **options}), SPEEDS[speed])
+    return Case(
+        lambda: pf.ReducedModel(patch, LAWS[law], **{"parts": 1, "segments": 8, "speeds": 8, **options}), SPEEDS[speed]
+    )
 
 
 def soft(patch: pf.ContactPatch, law: str, parts: int = 1) -> Case:
@@ -134,7 +136,7 @@ def blended_loads(model: pf.ReducedModel) -> np.ndarray:
     loads = [
         load
         for load in np.linspace(1.031, 3.063, 60)
-        if all(part.shape.blend > 0.0 for h in (-1e-5, 1e-5) for part in model.parts_at(load * (1.0 + h)))
+        if all(part.shape.blend > 0.0 for h in (-1e-5, 1e-5) for part in model.reduction.parts_at(load * (1.0 + h)))
     ]
     return np.array(loads)[np.linspace(0, len(loads) - 1, T).astype(int)]
 

@@ -30,7 +30,7 @@ def model_of(law: str = "elasto-plastic") -> pf.ReducedModel:
 
 def scale_of(model) -> np.ndarray:
     """Return the factors that turn speeds [m/s] into twists."""
-    return np.array([1.0, 1.0, 1.0 / model.shape_at(LOAD).contact_radius])
+    return np.array([1.0, 1.0, 1.0 / model.reduction.shape_at(LOAD).contact_radius])
 
 
 def drive(model, seed: int = 0, speed: float = 3e-3, steps: int = T):
@@ -68,7 +68,7 @@ def test_steady_sliding_scales_with_the_friction_and_with_the_speed(law):
     model, twist = model_of(law), np.array([2e-3, -1e-3, 0.3])
     _, wrenches, slopes = derivatives.rollout_jacobian(model, model.rest(), twist[None], LOAD, 1e6)
     by, numbers = dict(zip(NAMES, slopes[0].T, strict=True)), model.law
-    factor = model.shape_at(LOAD).factor
+    factor = model.reduction.shape_at(LOAD).factor
     viscous = -LOAD * numbers.sigma_2 * factor.T @ factor @ twist
     units, by_speed = 1.0 / scale_of(model), model.step_jacobians(model.rest(), twist, LOAD, 1e6).wrench_twist @ twist
     dry = (wrenches[0] - viscous) / units
@@ -85,7 +85,7 @@ def test_steady_sliding_scales_with_the_friction_and_with_the_speed(law):
 def test_at_rest_the_state_stays_and_pulls_as_a_spring(law):
     """`W = -F' (sigma_0 (z + F V dt) + (sigma_1 + sigma_2) F V) f_N` for vanishing twists."""
     model, state = model_of(law), np.array([3e-7, -2e-7, 1e-7])
-    numbers, factor, (wrench_bar, state_bar) = model.law, model.shape_at(LOAD).factor, bars_of(model)
+    numbers, factor, (wrench_bar, state_bar) = model.law, model.reduction.shape_at(LOAD).factor, bars_of(model)
     bar = wrench_bar[:1]
     got = derivatives.rollout_vjp(model, state, np.zeros((1, 3)), LOAD, DT, bar, state_bar)
     push = numbers.sigma_0 * DT + numbers.sigma_1 + numbers.sigma_2
@@ -108,7 +108,7 @@ def test_gradients_are_finite_at_every_kink(law):
     x, y = PATCH.centre_of_pressure()
     spin = np.array([0.5 * y, -0.5 * x, 0.5])  # about the centre of pressure
     twists = [np.zeros(3), spin, -spin, 1e-300 * spin, 1e-140 * spin, [1e-3, 0, 0], [0, 1e-3, 0], [1e-3, 1e-3, 0]]
-    factor = model.shape_at(LOAD).factor
+    factor = model.reduction.shape_at(LOAD).factor
     twists.append(np.linalg.solve(factor, -z / DT))  # takes z to zero
     states = np.array([np.zeros(3), z, 1e-300 * z, 1e-160 * z, -z, 1e4 * z])[:, None, None]
     held = np.repeat(np.array(twists)[:, None, None], 2, axis=2)  # [9, 1, 2, 3]
@@ -219,16 +219,11 @@ FINGER = pf.ContactPatch.rectangle(
         ({"parameters": np.ones(12)}, r"parameters must have shape \[..., 7\], got shape \[12\]"),
         ({"parameters": np.ones(7)}, r"breakaway_ratio must be in \[0, 1\), got 1.0"),
         ({"parameters": np.zeros(7)}, "sigma_0 must be > 0, got 0.0"),
-<<<<<<< HEAD
         ({"model": PATCH}, "model must be one that has compiled roll-outs, got ContactPatch"),
-        ({"model": pf.ReducedModel(FINGER, LAWS["plain"], load_error=0.0)}, "load_error must be > 0 for derivatives"),
-=======
-        ({"model": PATCH}, "model must be a ReducedModel or a ReducedModelPublished, got ContactPatch"),
         (
             {"model": pf.ReducedModel(FINGER, LAWS["plain"], load_error=0.0, parts=1)},
             "load_error must be > 0 for derivatives",
         ),
->>>>>>> 3c58831 (ReducedModel stands on the bristles of a few cells by default: it lets go where the distributed model does)
     ],
 )
 def test_wrong_input_is_one_clear_line(changed, message):

@@ -53,7 +53,7 @@ def samples(model: pf.ReducedModel, seed: int = 1):
     state = rng.normal(size=(count, 3)) * STATE_SIZE * 10.0 ** rng.uniform(-2, 0.3, (count, 1))
     twist = rng.normal(size=(count, 3)) * TWIST_SIZE * 10.0 ** rng.uniform(-2, 2, (count, 1))
     load = rng.uniform(0.2, 3.0, count)
-    twist[: len(directions)] = 1e-3 * directions @ np.linalg.inv(model.shape_at(None).factor).T
+    twist[: len(directions)] = 1e-3 * directions @ np.linalg.inv(model.reduction.shape_at(None).factor).T
     state[:5], load[5], load[-3], twist[4], twist[-1], twist[-2] = 0.0, 0.0, 0.0, 0.0, 0.0, [0.0, 0.0, 0.3]
     return state, twist, load
 
@@ -99,7 +99,7 @@ def test_a_stuck_patch_is_a_spring():
     numpy_model, model = pair("elasto-plastic")
     state, twist, load = samples(numpy_model)
     by_state = slopes()(1e-3 * state, 0.0 * twist, np.full_like(load, 2.0), model.parameters, 1e-3)[1][0]
-    exact = np.broadcast_to(-2.0 * 1e6 * numpy_model.shape_at(None).factor.T, by_state.shape)
+    exact = np.broadcast_to(-2.0 * 1e6 * numpy_model.reduction.shape_at(None).factor.T, by_state.shape)
     np.testing.assert_allclose(by_state, exact, rtol=1e-13, atol=1e-6)
 
 

@@ -45,7 +45,7 @@ def compiled(law):
 def on_the_cube(model: pf.ReducedModel) -> np.ndarray:
     """Twists at the middles of the faces, on the edges and at the corners of the cube of directions."""
     directions = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
-    return 1e-3 * directions @ np.linalg.inv(model.shape_at(None).factor).T
+    return 1e-3 * directions @ np.linalg.inv(model.reduction.shape_at(None).factor).T
 
 
 def samples(model: pf.ReducedModel, seed: int = 1):

@@ -129,7 +129,7 @@ def parameter_names(model: Any) -> tuple[str, ...]:
     """Return the names of the P parameters of a model, in the order of the parameter vector.
 
     Those of `ReducedModelPublished` are `PARAMETERS`, those of `DistributedModel` the parameters of the law. Those of
-    `ReducedModel` in parts are the parameters of the law without gamma, because its stored map depends on gamma, as it does on
+    `ReducedModel` in parts are those without gamma, because its stored map depends on gamma, as it does on
     the shape of the patch.
 
     Raises InvalidValueError for a model that has no roll-outs.

@@ -72,9 +72,7 @@ class MomentModel(ThreeStateModel):
         super().__post_init__()
         refuse_rate_law(self.law, "ReducedModel in parts")
         refuse_creep(self.law, "ReducedModel in parts")  # its stored steady state is that of bristles without creep
-        object.__setattr__(self, "segments", validation.count("segments", self.segments, 4, MOST_SEGMENTS))
-        object.__setattr__(self, "speeds", validation.count("speeds", self.speeds, 5, MOST_SPEEDS))
-        object.__setattr__(self, "load_error", validation.non_negative("load_error", self.load_error))
+        check_maps(self)
         parts = _count_of(self.parts, int(MOST_PARTS * min(1.0, 24.0 / self.segments) ** 2))
         if not self.patch.depends_on_load and is_point(self.patch):
             shown = f"{1.0 - self.patch.weights().max():.1g} of it"
@@ -122,6 +120,13 @@ class MomentModel(ThreeStateModel):
     @property
     def _labels(self) -> np.ndarray:
         return self.labels
+
+
+def check_maps(model: Any) -> None:
+    """Check and convert the settings of the maps of a model."""
+    object.__setattr__(model, "segments", validation.count("segments", model.segments, 4, MOST_SEGMENTS))
+    object.__setattr__(model, "speeds", validation.count("speeds", model.speeds, 5, MOST_SPEEDS))
+    object.__setattr__(model, "load_error", validation.non_negative("load_error", model.load_error))
 
 
 def _count_of(parts: Any, most: int) -> int | None:

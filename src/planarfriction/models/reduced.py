@@ -14,8 +14,7 @@ from planarfriction.laws import FrictionLaw
 from planarfriction.models.base import FrictionModel, ModelJacobians
 from planarfriction.models.distributed import DistributedModel
 from planarfriction.models.few_cells import few_cells
-from planarfriction.models.moments import MomentModel
-
+from planarfriction.models.moments import MomentModel, check_maps
 
 FEWEST = 9
 """Least number of cells: as many as there are sums that they keep."""
@@ -53,6 +52,7 @@ class ReducedModel(FrictionModel):
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "cells", validation.count("cells", self.cells, FEWEST))
+        check_maps(self)
         if self.parts is not None:
             for name in ("parts", "segments", "speeds", "load_error"):
                 object.__setattr__(self, name, getattr(self.reduction, name))
