@@ -116,7 +116,7 @@ MODELS = Family(
     "model",
     {
         "distributed": ("a bristle in every cell", "models.distributed:DistributedModel"),
-        "reduced": ("bristles of a few cells, or moments of them all in parts", "models.reduced:ReducedModel"),
+        "reduced": ("bristles of a few cells, or moments in parts", "models.reduced:ReducedModel"),
         "reduced-published": (
             "three bristles and a limit surface, as published",
             "models.reduced_published:ReducedModelPublished",

@@ -74,7 +74,7 @@ def test_smoothing_leaves_what_it_says_and_no_more_than_half():
 
 @pytest.mark.parametrize("kind", [DistributedSimulator, ReducedSimulator])
 def test_a_scaled_and_moved_patch_through_its_twists(kind):
-    """The same as the model of the patch that was really scaled and moved, to rounding; maps to 2e-3 of the wrench."""
+    """The same as the model of the patch that was really scaled and moved, to rounding."""
     patch = pf.ContactPatch.rectangle(0.02, 0.01, (6, 4))
     simulator = kind(patch, LAW)
     moved = scaled_patch(patch, 1.3, np.array([0.002, -0.003]))
@@ -88,8 +88,7 @@ def test_a_scaled_and_moved_patch_through_its_twists(kind):
     twists = 0.01 * np.random.default_rng(0).standard_normal((40, 3)) * [1.0, 1.0, 100.0]
     expected = pf.rollout(model, None, twists, LOAD, 1e-3).wrenches
     found = simulator.wrenches(twists, np.full(40, LOAD), 1e-3, vector)
-    close = 1e-9 if kind is DistributedSimulator else 2e-3
-    assert np.abs(found - expected).max(axis=0) == pytest.approx(0.0, abs=close * np.abs(expected).max())
+    assert np.abs(found - expected).max(axis=0) == pytest.approx(0.0, abs=1e-9 * np.abs(expected).max())
 
 
 def test_without_load_the_bristles_are_forgotten():

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from planarfriction.compiler import threads
-from planarfriction.compiler.calls import address_of
-from planarfriction.compiler.memory import Packed, place_of, row_of
 from planarfriction.derivatives import PARAMETERS, rollout, rollout_jacobian
-from planarfriction.formulas import LawNumbers
 from planarfriction.identify.logs import Log
 from planarfriction.identify.parameters import RADIUS
-from planarfriction.kernels.cells import CellsContact
-from planarfriction.kernels.distributed_step import ISOTROPIC
-from planarfriction.kernels.steps import WORDS, Parts, step_sequence
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
-from planarfriction.models import DistributedModel, MomentModel, ReducedModel, ReducedModelPublished
+from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
 
 CHANGE = 1e-6
@@ -28,9 +21,6 @@ CHANGE = 1e-6
 
 LEAST_CHANGE = {"centre_x": 1e-3, "centre_y": 1e-3}
 """Least sizes [m] of which `CHANGE` is a share: a centre may lie at zero."""
-
-MAP = {"segments": 12, "speeds": 12}
-"""Size of the maps of `ReducedModel` during a fit: errors of 2e-4, in a third of the time."""
 
 CELLS, DEGREE = 120, 9
 """Number of cells above which a patch is compressed, and the degree of the moments that compression keeps."""
@@ -43,7 +33,7 @@ MOST_STEPS = 2_000_000
 
 LAW_NAMES = PARAMETERS[:8]
 
-CENTRE, GAMMA = [PARAMETERS.index("centre_x"), PARAMETERS.index("centre_y")], PARAMETERS.index("gamma")
+CENTRE = [PARAMETERS.index("centre_x"), PARAMETERS.index("centre_y")]
 
 
 class Simulator:
@@ -112,9 +102,6 @@ class ScaledSimulator(Simulator):
     `d = c - s c0`, and the torque is `s tau0 + d x f`.
     """
 
-    changes: Mapping[str, float] = {}
-    """Steps of difference quotients, as shares of the parameter, of parameters for which `CHANGE` is too small."""
-
     def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
         self.patch = patch.compressed(degree=DEGREE) if len(patch.positions) > CELLS else patch
         self._law = law
@@ -145,7 +132,7 @@ class ScaledSimulator(Simulator):
         def work(first: int, last: int) -> None:
             for i in range(first, last):
                 at = PARAMETERS.index(names[i])
-                change = self.changes.get(names[i], CHANGE) * max(abs(vector[at]), LEAST_CHANGE.get(names[i], 1e-3))
+                change = CHANGE * max(abs(vector[at]), LEAST_CHANGE.get(names[i], 1e-3))
                 moved = vector.copy()
                 moved[at] += change
                 slopes[..., i] = (self.wrenches(twists, loads, dt, moved) - base) / change
@@ -157,63 +144,39 @@ class ScaledSimulator(Simulator):
 class DistributedSimulator(ScaledSimulator):
     """Simulator of `DistributedModel`."""
 
-    model_class = DistributedModel
+    model_class: type = DistributedModel
 
     def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
         super().__init__(patch, law)
-        self._cells, self._weights = np.ascontiguousarray(self.patch.positions.T), self.patch.weights()
-
-    def work(self, parameters):
-        return 0.03 * len(self.patch.positions) * (parameters + 1)
+        self._model = self.model_class(self.patch, law)
 
     def _inner(self, twists, loads, dt, vector):
-        plastic = float(self._law.elasto_plastic is not None)
-        law = LawNumbers._make([*vector[:7].tolist(), plastic, float(vector[7]), 0.0])
-        wrenches, count = np.zeros((len(twists), 3)), len(self._weights)
-        record = row_of(CellsContact(law, count, self._cells, self._weights))
-        step = address_of(ISOTROPIC.step, WORDS)
-        parts = Packed(Parts(step, 1, 2 * count, 0, 1, np.array([place_of(record)]), np.ones(1)))
-        step_sequence(parts.words, np.zeros(2 * count), twists, loads, dt, wrenches, np.empty(2 * count + 3))
-        return wrenches
-
-
-class ReducedSimulator(ScaledSimulator):
-    """Simulator of `ReducedModel` in one part, whose map is rebuilt for each Stribeck exponent."""
-
-    model_class = ReducedModel
-    changes: Mapping[str, float] = {"gamma": 1e-3}
-
-    def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
-        super().__init__(patch, law)
-        self._models: dict[float, MomentModel] = {}
-
-    def _model(self, gamma: float) -> MomentModel:
-        if gamma not in self._models:
-            if len(self._models) > 3:
-                self._models.pop(next(iter(self._models)))
-            self._models[gamma] = MomentModel(self.patch, dataclasses.replace(self._law, gamma=gamma), **MAP)
-        return self._models[gamma]
-
-    def _inner(self, twists, loads, dt, vector):
-        model = self._model(float(vector[GAMMA]))
-        return rollout(model, None, twists, loads, dt, parameters=np.delete(vector[:8], GAMMA)).wrenches
+        return rollout(self._model, None, twists, loads, dt, parameters=vector[: len(LAW_NAMES)]).wrenches
 
     def sensitivities(self, twists, loads, dt, vector, names):
-        base = self.wrenches(twists, loads, dt, vector)
-        known = [name for name in names if name in LAW_NAMES and name != "gamma"]
-        rest = [name for name in names if name not in known]
-        model, numbers = self._model(float(vector[GAMMA])), np.delete(vector[:8], GAMMA)
+        of_law, rest = [n for n in names if n in LAW_NAMES], [n for n in names if n not in LAW_NAMES]
+        own, slopes = vector[: len(LAW_NAMES)], np.empty((len(twists), 3, len(names)))
+        if not of_law:
+            base = self.wrenches(twists, loads, dt, vector)
+        else:
 
-        def of_law(inner):
-            return rollout_jacobian(model, None, inner, loads, dt, known, parameters=numbers).d_wrenches
+            def work(inner):
+                found = rollout_jacobian(self._model, None, inner, loads, dt, of_law, parameters=own)
+                return np.concatenate([found.wrenches[..., None], found.d_wrenches], -1)
 
-        slopes = np.empty((*base.shape, len(names)))
-        slopes[..., [names.index(name) for name in known]] = self._placed(vector, twists, of_law)
+            found = self._placed(vector, twists, work)
+            base, slopes[..., [names.index(name) for name in of_law]] = found[..., 0], found[..., 1:]
         slopes[..., [names.index(n) for n in rest]] = self._differences(twists, loads, dt, vector, rest, base)
         return base, slopes
 
     def work(self, parameters):
-        return 0.6 * parameters
+        return 0.03 * self._model.state_shape[1] * (parameters + 1)
+
+
+class ReducedSimulator(DistributedSimulator):
+    """Simulator of `ReducedModel`."""
+
+    model_class = ReducedModel
 
 
 SIMULATORS: dict[str, type[Simulator]] = {

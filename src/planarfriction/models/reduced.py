@@ -60,7 +60,10 @@ class ReducedModel(FrictionModel):
 
     @functools.cached_property
     def reduction(self) -> DistributedModel | MomentModel:
-        """Model that stands for the patch: the distributed model on a few cells, or the moments of parts."""
+        """Model that stands for the patch: the distributed model on a few cells, or the moments of parts.
+
+        Raises InvalidValueError as the class does.
+        """
         if self.parts is None:
             return DistributedModel(few_cells(self.patch, self.cells), self.law)
         maps = {"segments": self.segments, "speeds": self.speeds, "load_error": self.load_error}
