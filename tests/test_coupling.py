@@ -314,7 +314,8 @@ def test_energy_never_grows(kind, dt):
 
 
 def _weights(model) -> np.ndarray | float:
-    return model.patch.weights() if isinstance(model, pf.DistributedModel) else 1.0
+    few = model.reduction
+    return few.patch.weights() if isinstance(few, pf.DistributedModel) else 1.0
 
 
 # ---------------------------------------------------------------------- Newton's method

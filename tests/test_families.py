@@ -187,7 +187,10 @@ def test_laws_by_kind(tmp_path, table, law):
             "law = {}\nmodel = { kind = 'reduced-published', surface = 'round' }\n",
             "kind must be one of cells, exact, table, table-published, ellipsoid, quartic, got 'round'",
         ),
-        ("law = { kind = 'coulomb-stribeck' }\nmodel = { kind = 'reduced', parts = 1 }\n", "law must have no creep_speed for Red"),
+        (
+            "law = { kind = 'coulomb-stribeck' }\nmodel = { kind = 'reduced', parts = 1 }\n",
+            "law must have no creep_speed for Red",
+        ),
     ],
 )
 def test_wrong_kinds_get_one_line_with_all_names(tmp_path, contact, message):

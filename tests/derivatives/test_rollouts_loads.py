@@ -94,7 +94,7 @@ def test_a_family_that_stays_as_it_is_has_the_gradient_of_a_fixed_patch(kind):
     for got, want in zip(found, wanted, strict=True):
         # weights at another load differ by rounding, and so do slopes of the shape: 1e-16 over the step of 1e-5
         assert got == pytest.approx(want, rel=1e-8, abs=1e-9 * np.abs(want).max())
-    assert {rung for rung in family.load_rungs if rung > 1e-6} == {1.0, 2.0}  # no maps to move towards
+    assert {rung for rung in family.reduction.load_rungs if rung > 1e-6} == {1.0, 2.0}  # no maps to move towards
 
 
 # ---------------------------------------------------------------------- against differences

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import importlib.util
 import pickle
 from dataclasses import dataclass
@@ -231,8 +232,9 @@ def test_a_law_that_was_used_goes_to_another_process():
 
 
 def test_what_needs_the_bristles_of_lugre_refuses_it_in_one_line():
-    for make in (pf.ReducedModel, pf.ReducedModelPublished):
-        rule = f"^law must have the bristles of LuGre for {make.__name__}, not a rate of its own, got BoucWen$"
+    in_parts = functools.partial(pf.ReducedModel, parts=1)
+    for make, name in ((in_parts, "ReducedModel in parts"), (pf.ReducedModelPublished, "ReducedModelPublished")):
+        rule = f"^law must have the bristles of LuGre for {name}, not a rate of its own, got BoucWen$"
         with pytest.raises(InvalidValueError, match=rule):
             make(DISC, BoucWen())
     with pytest.raises(InvalidValueError, match="for patches with an asymmetry"):
