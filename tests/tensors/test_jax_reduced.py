@@ -41,11 +41,11 @@ def double_precision():
 @functools.cache
 def pair(law: str):
     """The same model in NumPy and in JAX."""
-    model = pf.ReducedModel(PATCH, LAWS[law], **SMALL)
-    return model, pj.ReducedModel(PATCH, LAWS[law], **SMALL)
+    model = pf.models.MomentModel(PATCH, LAWS[law], **SMALL)
+    return model, pj.MomentModel(PATCH, LAWS[law], **SMALL)
 
 
-def samples(model: pf.ReducedModel, seed: int = 1):
+def samples(model: pf.models.MomentModel, seed: int = 1):
     """States in stick and slip, twists at kinks, on the edges and corners of the cube, and of all speeds; loads."""
     rng = np.random.default_rng(seed)
     directions = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
@@ -126,12 +126,12 @@ def test_it_equals_the_compiled_model(law):
 def test_a_patch_whose_shape_follows_the_load_keeps_that_of_one_load():
     patch = pf.ContactPatch.disc(0.01, cells=9, pressure=pf.SoftFinger(c=0.005, n=1 / 3, k=2.0))
     state, twist = [1e-7, 1e-7, 2e-7], [1e-3, 2e-4, 0.1]
-    model = pj.ReducedModel(patch, LAWS["plain"], 0.3, **SMALL)
-    wanted = pf.ReducedModel(patch, LAWS["plain"], **SMALL, load_error=0.0).step(state, twist, 0.3, 1e-4)
+    model = pj.MomentModel(patch, LAWS["plain"], 0.3, **SMALL)
+    wanted = pf.models.MomentModel(patch, LAWS["plain"], **SMALL, load_error=0.0).step(state, twist, 0.3, 1e-4)
     for got, want in zip(model.step(jnp.array(state), jnp.array(twist), 0.3, 1e-4), wanted, strict=True):
         np.testing.assert_allclose(got, want, rtol=1e-12)
     with pytest.raises(pf.FrictionError, match="normal_force must be"):
-        pj.ReducedModel(patch, LAWS["plain"], parts=1)
+        pj.MomentModel(patch, LAWS["plain"], parts=1)
 
 
 def test_gradients_are_the_analytic_jacobians():
@@ -275,9 +275,9 @@ def test_without_a_method_jax_does_what_the_adjoint_cannot():
 @pytest.mark.slow
 def test_gradients_of_roll_outs_are_those_of_pytorch():
     torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
-    from planarfriction.torch import ReducedModel, rollout
+    from planarfriction.torch import MomentModel, rollout
 
-    model = ReducedModel(PATCH, LAWS["elasto-plastic"], dtype=torch.float64, **SMALL)
+    model = MomentModel(PATCH, LAWS["elasto-plastic"], dtype=torch.float64, **SMALL)
     parameters, twists = model.physical().detach().requires_grad_(), torch.tensor(sway(40), requires_grad=True)
     wrenches = rollout(model, None, twists, 2.0, 1e-4, parameters=parameters).wrenches
     theirs = torch.autograd.grad((wrenches * torch.tensor(WEIGHTS)).square().sum(), [parameters, twists])
@@ -292,7 +292,7 @@ def test_gradients_of_roll_outs_are_those_of_pytorch():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: pj.ReducedModel("disc", LAWS["plain"], parts=1), "patch must be a ContactPatch"),
+        (lambda: pj.MomentModel("disc", LAWS["plain"], parts=1), "patch must be a ContactPatch"),
         (lambda: pair("plain")[1].replace(weights=1.0), "leaf must be one of parameters, shape, got 'weights'"),
         (
             lambda: jax.grad(lambda m: pj.rollout(m, None, sway(4), 1.0, 1e-4, method="adjoint").state.sum())(

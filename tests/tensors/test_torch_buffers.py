@@ -12,7 +12,7 @@ import planarfriction as pf
 
 torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
 
-from planarfriction.torch import DistributedModel, ReducedModel, ReducedModelPublished, rollout  # noqa: E402
+from planarfriction.torch import DistributedModel, MomentModel, ReducedModelPublished, rollout  # noqa: E402
 
 pytestmark = pytest.mark.torch
 
@@ -20,7 +20,7 @@ PATCH = pf.ContactPatch.from_pressure(np.random.default_rng(4).uniform(0.0, 1.0,
 OTHER = pf.ContactPatch.from_pressure(np.random.default_rng(5).uniform(0.0, 1.0, (5, 6)), 0.004, name="other")
 PLAIN, ELASTIC = pf.LuGre(mu_s=1.2, gamma=1.7), pf.LuGre(mu_s=1.2, gamma=1.3, elasto_plastic=pf.ElastoPlastic(0.7))
 MODELS = {
-    "reduced": functools.partial(ReducedModel, segments=8, speeds=8),
+    "reduced": functools.partial(MomentModel, segments=8, speeds=8),
     "published": ReducedModelPublished,
     "distributed": DistributedModel,
 }
@@ -131,7 +131,11 @@ def test_buffers_share_no_memory_with_what_the_caller_gave(kind):
     model = module(kind, surface=surface) if surface else module(kind)
     before = surface.numbers.data.copy() if surface else None
     positions, weights = PATCH.positions.copy(), PATCH.weights().copy()
-    reference = {"reduced": pf.ReducedModel, "published": pf.ReducedModelPublished, "distributed": pf.DistributedModel}
+    reference = {
+        "reduced": pf.models.MomentModel,
+        "published": pf.ReducedModelPublished,
+        "distributed": pf.DistributedModel,
+    }
     numpy_model = reference[kind](PATCH, ELASTIC)
     inputs = numpy_model.rest() + 1e-7, twists()[3].numpy(), 2.0
     wrench = numpy_model.wrench(*inputs)

@@ -13,7 +13,7 @@ from planarfriction.tensors import reduced
 torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
 
 from planarfriction.tensors.reduced import PARAMETERS  # noqa: E402
-from planarfriction.torch import ReducedModel, rollout, tracking_loss  # noqa: E402
+from planarfriction.torch import MomentModel, rollout, tracking_loss  # noqa: E402
 from planarfriction.torch.namespace import xp  # noqa: E402
 
 pytestmark = pytest.mark.torch
@@ -35,20 +35,20 @@ def tensor(value):
 
 
 def module(law="elasto-plastic", **options):
-    return ReducedModel(PATCH, LAWS[law], **{"dtype": torch.float64, **SMALL, **options})
+    return MomentModel(PATCH, LAWS[law], **{"dtype": torch.float64, **SMALL, **options})
 
 
 def compiled(law):
-    return pf.ReducedModel(PATCH, LAWS[law], **SMALL)
+    return pf.models.MomentModel(PATCH, LAWS[law], **SMALL)
 
 
-def on_the_cube(model: pf.ReducedModel) -> np.ndarray:
+def on_the_cube(model: pf.models.MomentModel) -> np.ndarray:
     """Twists at the middles of the faces, on the edges and at the corners of the cube of directions."""
     directions = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
     return 1e-3 * directions @ np.linalg.inv(model.reduction.shape_at(None).factor).T
 
 
-def samples(model: pf.ReducedModel, seed: int = 1):
+def samples(model: pf.models.MomentModel, seed: int = 1):
     """States in stick and slip, twists from far below to far above the Stribeck speed; the first ones at kinks."""
     rng = np.random.default_rng(seed)
     corners = on_the_cube(model)
@@ -116,13 +116,13 @@ def test_it_equals_the_compiled_model(law):
 def test_a_patch_whose_shape_follows_the_load_keeps_that_of_one_load():
     patch = pf.ContactPatch.disc(0.01, cells=9, pressure=pf.SoftFinger(c=0.005, n=1 / 3, k=2.0))
     law = LAWS["plain"]
-    model = ReducedModel(patch, law, 0.3, dtype=torch.float64, **SMALL)
+    model = MomentModel(patch, law, 0.3, dtype=torch.float64, **SMALL)
     state, twist = [1e-7, 0.0, 2e-7], [1e-3, 0.0, 0.1]
-    wanted = pf.ReducedModel(patch, law, **SMALL, load_error=0.0).step(state, twist, 0.3, 1e-4)
+    wanted = pf.models.MomentModel(patch, law, **SMALL, load_error=0.0).step(state, twist, 0.3, 1e-4)
     for got, want in zip(model.step(tensor(state), tensor(twist), 0.3, 1e-4), wanted, strict=True):
         np.testing.assert_allclose(got.detach().numpy(), want, rtol=1e-12, atol=1e-18)
     with pytest.raises(pf.FrictionError, match="normal_force must be"):
-        ReducedModel(patch, law, parts=1)
+        MomentModel(patch, law, parts=1)
 
 
 def test_float32_is_as_close_as_its_digits():
@@ -224,7 +224,7 @@ def test_a_roll_out_is_its_steps_and_its_gradient_that_of_differences(law):
 @every_law
 def test_the_adjoint_agrees_with_autograd(law, patch):
     soft = pf.ContactPatch.disc(0.01, cells=9, pressure=pf.SoftFinger(c=0.005, n=1 / 3, k=2.0))
-    model = module(law) if patch == "fixed" else ReducedModel(soft, LAWS[law], 2.0, dtype=torch.float64, **SMALL)
+    model = module(law) if patch == "fixed" else MomentModel(soft, LAWS[law], 2.0, dtype=torch.float64, **SMALL)
     twists, loads = sway(60), torch.linspace(0.5, 1.5, 60, dtype=torch.float64)
     twists[20:23], twists[30, :2], loads[40:43] = 0.0, 0.0, 0.0
     inputs = tensor([1e-7, 2e-7, -1e-7]), twists, loads, model.physical().detach().clone()
@@ -289,7 +289,7 @@ def test_state_dicts_travel():
         (lambda: module("plain", trainable=("breakaway_ratio",)), "not contain breakaway_ratio for plain bristles"),
         (lambda: module().set(gamma=1.0), "parameter must be one of"),
         (lambda: module()(tensor([0.0]), tensor([0.0] * 3), 1.0), r"state must have shape \[..., 3\]"),
-        (lambda: ReducedModel("disc", LAWS["plain"], parts=1), "patch must be a ContactPatch"),
+        (lambda: MomentModel("disc", LAWS["plain"], parts=1), "patch must be a ContactPatch"),
     ],
 )
 def test_wrong_input_is_one_line(make, message):

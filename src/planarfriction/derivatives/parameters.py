@@ -266,9 +266,13 @@ def pack_surface(
 
 
 def pack_cells(elasto_plastic: bool, positions: np.ndarray, weights: np.ndarray) -> Packed:
-    """Return an isotropic `DistributedModel` by its cells `[2, N]` and weights `[N]`, as `pack_maps` its model."""
-    cells = np.asarray(positions, dtype=float), np.asarray(weights, dtype=float)[None]
-    return Packed(CELLS, np.array([_any_law(elasto_plastic)]), cells_by_load(*cells, None), cells=len(weights))
+    """Return a `DistributedModel` by its cells `[2, N]` (or levers `[5, N]`) and weights `[N]`; see `pack_maps`."""
+    levers, shares = np.asarray(positions, dtype=float), np.asarray(weights, dtype=float)[None]
+    family = CELLS if len(levers) == 2 else TURNED_CELLS
+    if family is TURNED_CELLS:
+        levers = np.vstack([levers, np.zeros((2, levers.shape[1]))])  # no asymmetry
+    cells = levers, shares
+    return Packed(family, np.array([_any_law(elasto_plastic)]), cells_by_load(*cells, None), cells=len(weights))
 
 
 def _any_law(elasto_plastic: bool) -> LawNumbers:

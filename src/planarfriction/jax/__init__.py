@@ -14,14 +14,16 @@ except ImportError as error:
 
 from planarfriction.derivatives import Rollout
 from planarfriction.jax.distributed import DistributedModel, LawParameters
+from planarfriction.jax.moments import MomentModel, ReducedParameters
 from planarfriction.jax.published import PublishedParameters, ReducedModelPublished, Surface
-from planarfriction.jax.reduced import ReducedModel, ReducedParameters
+from planarfriction.jax.reduced import ReducedModel
 from planarfriction.jax.rollouts import rate, rest, rollout, simulate_scene, step, wrench
 from planarfriction.tensors.scenes import SceneMotion
 
 __all__ = [
     "DistributedModel",
     "LawParameters",
+    "MomentModel",
     "PublishedParameters",
     "ReducedModel",
     "ReducedModelPublished",

@@ -36,7 +36,7 @@ class DistributedModel(FrictionPytree):
     leaves = ("parameters", "positions", "weights")
     parameters: LawParameters
     positions: jax.Array
-    """Cells, x then y [m], `[2, N]`."""
+    """Cells, x then y [m], `[2, N]`; with a friction metric their levers (see `tensors.distributed.Cells`)."""
     weights: jax.Array
     """Share of the load that each cell carries [-], `[N]`."""
 
@@ -49,7 +49,7 @@ class DistributedModel(FrictionPytree):
     @property
     def state_shape(self) -> tuple[int, ...]:
         """Shape of the state of one contact, `(2, N)`."""
-        return self.positions.shape
+        return 2, self.positions.shape[1]
 
     def compiled(self) -> Packed:
         """Return the model as compiled rollouts take it."""

@@ -13,6 +13,7 @@ except ImportError:
 from planarfriction.derivatives import Rollout
 from planarfriction.tensors.scenes import SceneMotion
 from planarfriction.torch.distributed import DistributedModel
+from planarfriction.torch.moments import MomentModel
 from planarfriction.torch.published import ReducedModelPublished
 from planarfriction.torch.reduced import ReducedModel
 from planarfriction.torch.reduced_planar import ReducedPlanarLuGre
@@ -20,6 +21,7 @@ from planarfriction.torch.rollout import rollout, simulate_scene, tracking_loss
 
 __all__ = [
     "DistributedModel",
+    "MomentModel",
     "ReducedModel",
     "ReducedModelPublished",
     "ReducedPlanarLuGre",

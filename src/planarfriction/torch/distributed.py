@@ -34,7 +34,7 @@ class DistributedModel(FrictionModule):
 
     equations = distributed
     positions: Tensor
-    """Positions of the cells `[2, N]` [m]."""
+    """Positions of the cells `[2, N]` [m]; with a friction metric their levers (see `tensors.distributed.Cells`)."""
 
     def __init__(
         self,
@@ -53,7 +53,7 @@ class DistributedModel(FrictionModule):
         lever = float(patch.contact_radius(normal_force))
         physical = [name for name in chosen if name != "weights"]
         self._adopt({name: numbers[name] for name in LAW}, physical, lever, **kind)
-        self.register_buffer("positions", torch.tensor(cells.positions, **kind))
+        self.register_buffer("positions", torch.tensor(cells.levers, **kind))
         raw = torch.tensor(cells.weights, **kind).log()
         if "weights" in chosen:
             self.raw_weights = nn.Parameter(raw)
@@ -68,7 +68,7 @@ class DistributedModel(FrictionModule):
     @property
     def state_shape(self) -> tuple[int, ...]:
         """Shape of the state of one contact, `(2, N)`."""
-        return tuple(self.positions.shape)
+        return 2, self.positions.shape[1]
 
     def compiled(self) -> Compiled:
         """Return the model as compiled rollouts take it."""

@@ -20,7 +20,7 @@ from planarfriction.adapters.mujoco.friction import Report
 from planarfriction.adapters.mujoco.patches import PatchContact, Placed, check_once, memory
 from planarfriction.coupling import ITERATIONS, TOLERANCE
 from planarfriction.errors import InvalidValueError
-from planarfriction.jax import DistributedModel, ReducedModel, ReducedModelPublished
+from planarfriction.jax import DistributedModel, MomentModel, ReducedModelPublished
 from planarfriction.jax.base import FrictionPytree
 
 INTEGRATORS = {
@@ -284,7 +284,7 @@ def _in_jax(model: models.FrictionModel) -> FrictionPytree:
         raise InvalidValueError("model", rule, type(model).__name__)
     model = model.reduction
     if isinstance(model, models.MomentModel):
-        return ReducedModel(model.patch, model.law, parts=model.parts, segments=model.segments, speeds=model.speeds)
+        return MomentModel(model.patch, model.law, parts=model.parts, segments=model.segments, speeds=model.speeds)
     if isinstance(model, models.ReducedModelPublished):
         return ReducedModelPublished(model.patch, model.law, model.surface)
     if isinstance(model, models.DistributedModel):
