@@ -60,15 +60,20 @@ def step(xp, law: LawNumbers, z, by: Drive, dt, axis: int):
     norm = xp.norm(new, axis)
     along = _along(xp, new, norm, by, axis)
     if law.elasto_plastic:
-        back = back_onto(xp, norm * to_deflection, formulas.reachable_deflection(xp, deflection, law))
+        beyond = xp.where(deflection > _full(xp, deflection), deflection, 0.0)
+        back = back_onto(xp, norm * to_deflection, formulas.reachable_deflection(xp, beyond, law))
         new, norm = new * back, norm * back
     return new, u - _decay(xp, law, norm * to_deflection, along, by) * new
 
 
 def back_onto(xp, deflection, largest):
     """Return the factor that brings a bristle back onto the ball that it may not leave; rounding is no excess."""
-    margin = 1.0 + ROUNDING * xp.epsilon(deflection)
-    return formulas.cap(xp, xp.where(deflection > margin * largest, deflection, 0.0), largest)
+    return formulas.cap(xp, xp.where(deflection > _full(xp, deflection) * largest, deflection, 0.0), largest)
+
+
+def _full(xp, deflection):
+    """Return the deflection up to which a bristle is full, and no further, to rounding [-]."""
+    return 1.0 + ROUNDING * xp.epsilon(deflection)
 
 
 def _decay(xp, law: LawNumbers, deflection, along, by: Drive):

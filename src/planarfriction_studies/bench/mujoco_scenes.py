@@ -231,7 +231,7 @@ def disc(
         0.3,
         2.0 / 3.0 * 0.3 * 0.1 if touch == "point" else 0.0,
         (("disc", ("floor", "disc")),),
-        ReducedModel(ContactPatch.disc(radius=0.1, cells=31), _law(0.3, 1e5)),
+        ReducedModel(ContactPatch.disc(radius=0.1, cells=31), _law(0.3, 1e5), parts=1),
         lambda t: (),
         time=1.2,
         weightless=False,
