@@ -292,3 +292,23 @@ def test_machine_code_goes_by_all_that_a_law_uses(tmp_path):
         prints |= {fingerprint(["a", "b"], module.rate), fingerprint(["a", "b"], module.rate)}
     assert len(prints) == 3
     assert fingerprint(["b", "a"], module.rate) not in prints
+
+
+def test_machine_code_knows_numbers_of_one_name_apart(tmp_path):
+    """A number of the rate and one of the same name in another module, which a function that it calls reads."""
+    prints = set()
+    for i, (inner, outer) in enumerate([(1.0, 2.0), (2.0, 2.0), (1.0, 3.0), (2.0, 1.0)]):
+        texts = {
+            "inner": f"K = {inner}\ndef more(x):\n    return K * x\n",
+            "outer": f"K = {outer}\nmore = None\ndef rate(xp, law, z, v):\n    return v - K * more(z)\n",
+        }
+        modules = {}
+        for name, text in texts.items():
+            path = tmp_path / f"{name}{i}.py"
+            path.write_text(text)
+            spec = importlib.util.spec_from_file_location(name, path)
+            modules[name] = importlib.util.module_from_spec(spec)
+            spec.loader.exec_module(modules[name])
+        modules["outer"].more = modules["inner"].more
+        prints.add(fingerprint(["a"], modules["outer"].rate))
+    assert len(prints) == 4

@@ -8,16 +8,17 @@ from __future__ import annotations
 
 from planarfriction.compiler import kernel
 from planarfriction.kernels import bristle_step, cells
+from planarfriction.kernels.contacts import traction
 from planarfriction.kernels.general_cells import Bristle, slopes, slopes_of
 from planarfriction.kernels.law import grip, squared
 from planarfriction.kernels.steps import step_functions
-from planarfriction.kernels.vectors import norm, plus, put, three, times
+from planarfriction.kernels.vectors import norm, plus, put, three
 
 
 @kernel
 def _traction(law, new, k, u):
     """Return the traction of a cell at the end of its step, per unit load."""
-    return plus(plus(times(-law.sigma_0, new), -law.sigma_1, plus(u, -k, new)), -law.sigma_2, u)
+    return traction(law, new, plus(u, -k, new), u)
 
 
 @kernel

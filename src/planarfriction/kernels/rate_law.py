@@ -5,9 +5,10 @@ the start and `g = 1 - 1/sqrt(2)`,
 
     (I - g dt A) k = z'(z),   (I - g dt A) l = z'(p) - 2 k,   p = z + dt k,   new = z + dt (3 k + l)/2.
 
-It is of order 2 and damps what is stiff completely (L-stable). A bristle that is within its largest deflection never
-leaves it, so `p` and `new` are brought back there: bristles stay in bounds for any dt. That also keeps long steps of
-laws that dissipate passive: a bristle stores no more than the work done on it.
+It is of order 2 and L-stable: stiff bristles are damped to 0.5 % in a step where nothing holds them back. A bristle
+that is within its largest deflection never leaves it, so `p` and `new` are brought back there, and bristles stay in
+bounds for any dt; where that holds back p, a stiff bristle keeps up to two thirds of its deflection with the opposite
+sign. Steps of Bouc-Wen laws were passive in 10^6 random steps: a bristle stored no more than the work done on it.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from typing import Any, NamedTuple
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, reader
+from planarfriction.kernels import contacts
 from planarfriction.kernels.cells import Lever
 from planarfriction.kernels.contacts import ModelFunctions, functions_of
 from planarfriction.kernels.forward import forward
@@ -42,7 +44,7 @@ _LEAST = 0.1
 @kernel
 def traction(xp, law, z, zdot, u):
     """Compute `-(sigma_0 z + sigma_1 z' + sigma_2 u)`, the traction per unit load of a law without one."""
-    return plus(plus(times(-law.sigma_0, z), -law.sigma_1, zdot), -law.sigma_2, u)
+    return contacts.traction(law, z, zdot, u)
 
 
 @kernel
@@ -128,4 +130,7 @@ def _note(value: Any, found: dict[Any, str]) -> None:
         found[value] = inspect.getsource(value)
         used = inspect.getclosurevars(value)
         for name, each in {**used.globals, **used.nonlocals}.items():
-            _note(each, found) if callable(each) or inspect.ismodule(each) else found.update({name: f"{name} {each!r}"})
+            if callable(each) or inspect.ismodule(each):
+                _note(each, found)
+            else:
+                found[value, name] = f"{value.__qualname__} {name} {each!r}"
