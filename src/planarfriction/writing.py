@@ -45,12 +45,19 @@ def put(path: str, content: bytes) -> None:
         part = os.path.join(os.path.dirname(path), _part_name())
         try:
             with open(part, "xb", buffering=0) as file:
-                file.write(content)
+                write_all(file, content)
             os.replace(part, path)
         except BaseException:
             with contextlib.suppress(OSError):
                 os.unlink(part)
             raise
+
+
+def write_all(file: io.RawIOBase, content: bytes) -> None:
+    """Write all of `content`: a system may take fewer bytes than it is given, and say so without an error."""
+    left = memoryview(content)
+    while left:
+        left = left[file.write(left) or 0 :]
 
 
 def write_text(path: str | Path, text: str) -> None:

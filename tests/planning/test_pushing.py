@@ -213,3 +213,22 @@ def test_bad_input_is_refused_in_one_line():
 def test_sliders_take_outlines_of_either_sense():
     turned = dataclasses.replace(slider(), outline=SQUARE[::-1])
     assert turned.gaps(np.zeros(2)).max() == pytest.approx(-HALF)
+
+
+@pytest.mark.parametrize(("width", "length"), [(0.003, 0.25), (0.003, 10.0), (0.1, 10.0)])
+def test_long_paths_meet_thin_sliders(width, length):
+    """A point moves through a ruler far from its middle: it does not stay where it lies."""
+    half = 0.5 * np.array([0.15, width])
+    ruler = Slider(
+        pf.LimitSurfaceEllipsoid(pf.ContactPatch.rectangle(*(2 * half), cells=5)),
+        half * [[-1, -1], [1, -1], [1, 1], [-1, 1]],
+    )
+    found = push(ruler, Pusher(0.3), straight((0.03, -0.4 * length, np.pi / 2), (0.03, 0.6 * length, np.pi / 2)))
+    assert (found.mode != "free").any()
+    assert np.hypot(*found.end[:2]) > 0.02
+
+
+def test_a_path_beside_a_slider_is_free():
+    away = straight((-1.0, HALF + 1e-4, 0.0), (1.0, HALF + 1e-4, 0.0))
+    found = push(slider(), Pusher(0.3), away)
+    assert (found.mode == "free").all() and not found.pose.any()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from typing import NamedTuple
 
@@ -14,8 +13,8 @@ from planarfriction.planning.slider import Pusher, Slider
 
 END, CORNER, FACE = "end", "corner", "face"
 
-_LOOKS = 64
-"""Instants between two samples of a path at which a free pusher is looked at."""
+_LEAST = 1e-4
+"""Least displacement between two looks at a free pusher, as a share of the slider's size: it may miss a graze."""
 
 _NEAR = 1e-9
 """Distance that counts as touching, as a share of the slider's size."""
@@ -89,6 +88,23 @@ class Scenery:
     def gap(self, t: float, q: np.ndarray) -> float:
         """Return the distance of pusher and slider [m], negative where they overlap."""
         return min(each[0] for each in self.features(t, q))
+
+    @property
+    def path_end(self) -> float:
+        """Time at which the path ends [s]."""
+        return float(self._times[-1])
+
+    def not_before(self, t: float, q: np.ndarray) -> float:
+        """Return a time up to which a free pusher cannot have gone further than it is away from a slider at rest."""
+        import shapely
+
+        ends = [self.end(i, t, q) for i in range(len(self._ends))]
+        pusher = shapely.Point(ends[0]) if len(ends) == 1 else shapely.LineString(ends)
+        away = max(shapely.distance(shapely.Polygon(self.slider.outline), pusher), _LEAST * self.slider.size)
+        vx, vy, omega = self.rate(t, forward=True)
+        speed = math.hypot(vx, vy) + abs(omega) * float(np.hypot(*np.transpose(self._ends)).max())
+        end = self.piece_end(t)
+        return min(end, t + away / speed) if speed * (end - t) > away else end
 
     def closes(self, contact: Touch) -> bool:
         """Return True if something else may begin to touch."""
@@ -180,14 +196,10 @@ def touch_after(scenery: Scenery, t: float, q: np.ndarray) -> tuple[float, Touch
     """Return time and place at which a pusher that does not touch a slider at rest begins to, or None."""
     from scipy.optimize import brentq
 
-    times = scenery._times[scenery._times > t]
-    grid, last = [t], t
-    for each in times:
-        grid += np.linspace(last, each, _LOOKS + 1)[1:].tolist()
-        last = each
     off = lambda at: scenery.gap(at, q) + scenery.near  # noqa: E731
-    before = off(grid[0])
-    for low, high in itertools.pairwise(grid):
+    low, before = t, off(t)
+    while low < scenery.path_end:
+        high = scenery.not_before(low, q)
         after = off(high)
         if after < 0.0 <= before:
             at = brentq(off, low, high, xtol=1e-14 * max(abs(high), 1.0))
@@ -195,5 +207,5 @@ def touch_after(scenery: Scenery, t: float, q: np.ndarray) -> tuple[float, Touch
             if len(near) > 1:
                 return at, scenery.flush(near[0], at, q)  # pyright: ignore
             return at, min(scenery.features(at, q))[1]  # pyright: ignore
-        before = after
+        low, before = high, after
     return None

@@ -15,7 +15,7 @@ from planarfriction.scenes.solution import History
 from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, Index, check_names, difference, on_instants
 from planarfriction.sweeps.quantities import Grid
 from planarfriction.sweeps.records import FAILED, Record, failure, reason_of
-from planarfriction.writing import make_folder, put
+from planarfriction.writing import make_folder, put, write_all
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -54,7 +54,7 @@ class ZarrBookkeeper(Bookkeeper):
             raise FileError(f"{path}: no zarr store of a sweep, and none can be made: {reason_of(error)}") from None
         self._journal = (path / "run" / _JOURNAL).open("a+b", buffering=0)
         if self._journal.tell() and not self._ends_a_line():
-            self._journal.write(b"\n")
+            write_all(self._journal, b"\n")
 
     def close(self) -> None:
         """Close the journal."""
@@ -156,7 +156,7 @@ class ZarrBookkeeper(Bookkeeper):
             folder = make_folder(self.path.with_suffix(".failed"))
             put(str(folder / f"{key}.json"), failure(record.reason, scene).encode())
         line = json.dumps([index, key, record.status, record.reason])
-        self._journal.write(f"{line}\n".encode())
+        write_all(self._journal, f"{line}\n".encode())
         return record._replace(variables={})
 
     def _read_journal(self) -> None:
