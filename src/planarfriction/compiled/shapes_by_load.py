@@ -12,7 +12,7 @@ import numpy as np
 
 from planarfriction.compiler.memory import place_of
 from planarfriction.equality import by_parts
-from planarfriction.kernels.cells_rollout import LANES
+from planarfriction.kernels.cell_blocks import LANES
 
 
 @by_parts

@@ -63,25 +63,35 @@ def _along(z, size, u, per_h):
 
 
 @kernel
-def predict(law, z, u, v, per_h, q, dt):
-    """Return the deflection, and x: the mean decay over a step, from its start and a predicted end, times dt."""
+def begin(law, z, u, v, per_h, q):
+    """Return the deflection of a bristle, and its k."""
     to_deflection, size = q * per_h, norm(z)
     deflection = size * to_deflection
-    start = formulas.bristle_decay(xp, deflection, _along(z, size, u, per_h), v, q, law)
-    ahead = plus(z, dt, u)
-    far = norm(ahead)
-    reached = far * to_deflection / (1.0 + start * dt)
-    # the bound of the prediction is full deflection or more, where k no longer depends on the deflection
-    bounded = xp.minimum(reached, xp.maximum(deflection, 1.0))
-    end = formulas.bristle_decay(xp, bounded, _along(ahead, far, u, per_h), v, q, law)
-    return deflection, formulas.mean_decay(start, end, dt) * dt
+    return deflection, formulas.bristle_decay(xp, deflection, _along(z, size, u, per_h), v, q, law)
 
 
 @kernel
-def finish(law, z, u, v, per_h, q, dt, deflection, decay_dt):
-    """Return the new bristle and its k, from what `predict` finds."""
+def aim(law, z, u, v, per_h, q, dt, deflection, start):
+    """Return x: the mean decay over a step, from its start and a predicted end, times dt."""
+    ahead = plus(z, dt, u)
+    far = norm(ahead)
+    reached = far * (q * per_h) / (1.0 + start * dt)
+    # the bound of the prediction is full deflection or more, where k no longer depends on the deflection
+    bounded = xp.minimum(reached, xp.maximum(deflection, 1.0))
+    end = formulas.bristle_decay(xp, bounded, _along(ahead, far, u, per_h), v, q, law)
+    return formulas.mean_decay(start, end, dt) * dt
+
+
+@kernel
+def relax(z, u, dt, decay_dt):
+    """Return the bristle after dt, which may be beyond its cap."""
     left, mean = formulas.relaxation(xp, decay_dt)
-    free = plus(times(left, z), dt * mean, u)
+    return plus(times(left, z), dt * mean, u)
+
+
+@kernel
+def settle(law, free, u, v, per_h, q, deflection):
+    """Return the bristle within its cap, and its k; `deflection`: that at the start of the step."""
     size = norm(free)
     reached = size * q * per_h
     back = cap(reached, reachable(deflection, law))
@@ -92,5 +102,7 @@ def finish(law, z, u, v, per_h, q, dt, deflection, decay_dt):
 @kernel
 def step(law, z, u, v, per_h, q, dt):
     """Return the bristle after dt, and its k."""
-    deflection, decay_dt = predict(law, z, u, v, per_h, q, dt)
-    return finish(law, z, u, v, per_h, q, dt, deflection, decay_dt)
+    deflection, start = begin(law, z, u, v, per_h, q)
+    decay_dt = aim(law, z, u, v, per_h, q, dt, deflection, start)
+    free = relax(z, u, dt, decay_dt)
+    return settle(law, free, u, v, per_h, q, deflection)

@@ -1,9 +1,7 @@
 """Roll-outs of cells, their discrete adjoint and their derivatives, in vector code (see `rollouts` for the inputs).
 
-The cells of a contact lie in blocks of `LANES`, field after field, filled up with cells without load: loops over a
-block have a constant count and fields a constant distance, so that each is one vector and none is left over. A
-contact has one part, whose `shapes` are the weights of its cells at each load `[1, L, M]`, M a multiple of `LANES`;
-`data` holds the numbers of their levers, block after block.
+The cells of a contact lie in blocks (see `cell_blocks`). It has one part, whose `shapes` are the weights of its cells
+at each load `[1, L, M]`, M a multiple of `LANES`; `data` holds the numbers of their levers, block after block.
 """
 
 from __future__ import annotations
@@ -18,20 +16,27 @@ from planarfriction.compiler.memory import at
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import cells, distributed_step
 from planarfriction.kernels.bind import bind
+from planarfriction.kernels.cell_blocks import (
+    BAR,
+    BLOCK,
+    BY_LOAD,
+    LANES,
+    LAW_BAR,
+    OUT,
+    WEIGHT,
+    Z,
+    advance,
+    lever_at,
+    pair,
+    put_pair,
+    total,
+    totals,
+)
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.forward import forward
 from planarfriction.kernels.law import law_of, squared
 from planarfriction.kernels.rollouts import row_of
 from planarfriction.kernels.vectors import accumulate, dot, plus, put, scatter, three, times
-
-LANES = 8
-"""Cells of a block: the numbers of the longest vectors that processors have."""
-
-_Z, _WEIGHT, _BY_LOAD, _BAR, _OUT, _LAW = (LANES * n for n in (5, 7, 8, 9, 11, 15))
-"""Fields of a block behind the numbers of the levers: state, weights, their slopes by the load, cotangent or change of
-the state, what adds up over the cells (the wrench and its change; on the way back the cotangents of twist and load),
-and what adds up over the steps too: the cotangent of the law. Nothing is shared by blocks, so that each is seen to be
-free of dependences."""
 
 PARAMETERS = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
 """Numbers of the law that derivatives are taken by."""
@@ -40,49 +45,13 @@ COLUMNS = tuple(LawNumbers._fields.index(name) for name in PARAMETERS)
 """Their places in a row."""
 
 _COUNT = len(PARAMETERS)
-_BLOCK = _LAW + LANES * _COUNT
 _BY = ("z", "u", *(f"law.{name}" for name in PARAMETERS))
 _WRITTEN = derive(distributed_step.cell, _BY, ("z", "u"))
 _forth, _back = _WRITTEN.forth, _WRITTEN.back
 _pushed = forward(distributed_step.cell, _BY, ("z", "u"))
 
 
-class Block(NamedTuple):
-    """A block as `cells.Lever` reads it."""
-
-    cells: Any
-    count: int
-
-
 # ---------------------------------------------------------------------- blocks
-
-
-@kernel
-def _pair(block, field, i):
-    return block[field + i], block[field + LANES + i]
-
-
-@kernel
-def _put_pair(block, field, i, a):
-    block[field + i], block[field + LANES + i] = a
-
-
-@kernel
-def _total(w, blocks, field):
-    """Return the sum of a field over all cells."""
-    total = 0.0
-    for k in range(blocks):
-        block = at(w, k * _BLOCK + field)
-        for i in range(LANES):
-            total += block[i]
-    return total
-
-
-@kernel
-def _totals(w, blocks, field):
-    return (
-        _total(w, blocks, field), _total(w, blocks, field + LANES), _total(w, blocks, field + 2 * LANES)
-    )  # fmt: skip
 
 
 @kernel
@@ -90,8 +59,8 @@ def _lay(w, blocks, levers):
     """Write the numbers of the levers, states of zero and no cotangents."""
     per_block = levers.shape[0] // blocks
     for k in range(blocks):
-        block = at(w, k * _BLOCK)
-        for i in range(_BLOCK):
+        block = at(w, k * BLOCK)
+        for i in range(BLOCK):
             block[i] = 0.0
         for i in range(per_block):
             block[i] = levers[k * per_block + i]
@@ -101,7 +70,7 @@ def _lay(w, blocks, levers):
 def _write(w, field, values, n):
     """Write vectors [2 n] to a field of all blocks."""
     for k in range(-(-n // LANES)):
-        block, first = at(w, k * _BLOCK + field), k * LANES
+        block, first = at(w, k * BLOCK + field), k * LANES
         for i in range(min(LANES, n - first)):
             block[i], block[LANES + i] = values[first + i], values[n + first + i]
 
@@ -110,7 +79,7 @@ def _write(w, field, values, n):
 def _read(w, field, values, n):
     """Read vectors [2 n] from a field of all blocks."""
     for k in range(-(-n // LANES)):
-        block, first = at(w, k * _BLOCK + field), k * LANES
+        block, first = at(w, k * BLOCK + field), k * LANES
         for i in range(min(LANES, n - first)):
             values[first + i], values[n + first + i] = block[i], block[LANES + i]
 
@@ -118,7 +87,7 @@ def _read(w, field, values, n):
 @kernel
 def _forget(w, blocks, field):
     for k in range(blocks):
-        block = at(w, k * _BLOCK + field)
+        block = at(w, k * BLOCK + field)
         for i in range(2 * LANES):
             block[i] = 0.0
 
@@ -126,26 +95,12 @@ def _forget(w, blocks, field):
 @kernel
 def _weigh(w, blocks, weights, by_load):
     for k in range(blocks):
-        block, first = at(w, k * _BLOCK), k * LANES
+        block, first = at(w, k * BLOCK), k * LANES
         for i in range(LANES):
-            block[_WEIGHT + i], block[_BY_LOAD + i] = weights[first + i], by_load[first + i]
+            block[WEIGHT + i], block[BY_LOAD + i] = weights[first + i], by_load[first + i]
 
 
 # ---------------------------------------------------------------------- roll-outs
-
-
-@kernel
-def _advance_one(lever, law, block, i, twist, dt):
-    one = lever.of(Block(block, LANES), i)
-    new, traction = distributed_step.cell(law, _pair(block, _Z, i), lever.seen(one, twist), dt)
-    _put_pair(block, _Z, i, new)
-    scatter(block, _OUT + i, LANES, times(block[_WEIGHT + i], lever.wrench(one, traction)))
-
-
-@kernel
-def _advance(lever, law, block, twist, dt, lanes):
-    for i in range(lanes):
-        _advance_one(lever, law, block, i, twist, dt)
 
 
 @kernel
@@ -159,15 +114,14 @@ def _roll(lever, law, inputs, b, n, w, wrench, states):
             last = which[t]
             _weigh(w, blocks, weights[last], inputs.by_load[0, last])
         if kept:
-            _read(w, _Z, states[t], n)
+            _read(w, Z, states[t], n)
         load, twist, dt = loads[t], three(twists[t]), inputs.dt[t]
         if load == 0.0:
-            _forget(w, blocks, _Z)
+            _forget(w, blocks, Z)
             put(wrench[t], (0.0, 0.0, 0.0))
         else:
-            for k in range(blocks):
-                _advance(lever, law, at(w, k * _BLOCK), twist, dt, lanes)
-            put(wrench[t], times(load, _totals(w, blocks, _OUT)))
+            advance(lever, law, w, blocks, lanes, twist, dt)
+            put(wrench[t], times(load, totals(w, blocks, OUT, lanes)))
 
 
 @kernel
@@ -177,12 +131,12 @@ def _rollout(lever, inputs, span, z, wrench, states, w):
     for b in range(span[0], span[1]):
         law = law_of(rows[row_of(rows, b)])
         _lay(w, blocks, inputs.data)
-        _write(w, _Z, z[0, b], n)
+        _write(w, Z, z[0, b], n)
         if law.gamma == 2.0:
             _roll(lever, squared(law), inputs, b, n, w, wrench[b], states[0, b])
         else:
             _roll(lever, law, inputs, b, n, w, wrench[b], states[0, b])
-        _read(w, _Z, z[0, b], n)
+        _read(w, Z, z[0, b], n)
 
 
 def rollout(lever, inputs, span, z, wrench, states):
@@ -190,7 +144,7 @@ def rollout(lever, inputs, span, z, wrench, states):
 
     The state before each step goes into `states` [1, B, T, 2 n], unless that is empty.
     """
-    scratch = np.empty(inputs.shapes.shape[2] // LANES * _BLOCK)
+    scratch = np.empty(inputs.shapes.shape[2] // LANES * BLOCK)
     _rollout(lever, inputs, span, z, wrench, states, pointer(scratch))
 
 
@@ -200,14 +154,14 @@ def rollout(lever, inputs, span, z, wrench, states):
 @kernel
 def _retreat_one(lever, law, block, i, twist, dt, pull, load, loaded):
     """Carry the cotangent of a cell's bristle back; `pull` is that of the wrench."""
-    one, weight = lever.of(Block(block, LANES), i), block[_WEIGHT + i]
+    one, weight = lever_at(lever, block, i), block[WEIGHT + i]
     pulled = lever.seen(one, pull)
-    (_, traction), tape = _forth(law, _pair(block, _Z, i), lever.seen(one, twist), dt)
-    bars = _back(tape, (times(loaded, _pair(block, _BAR, i)), times(load * weight, pulled)))
-    _put_pair(block, _BAR, i, bars[0])
-    heavier = weight + load * block[_BY_LOAD + i]
-    scatter(block, _OUT + i, LANES, (lever.wrench(one, bars[1]), heavier * dot(pulled, traction)))
-    accumulate(block, _LAW + i, LANES, bars[2:])
+    (_, traction), tape = _forth(law, pair(block, Z, i), lever.seen(one, twist), dt)
+    bars = _back(tape, (times(loaded, pair(block, BAR, i)), times(load * weight, pulled)))
+    put_pair(block, BAR, i, bars[0])
+    heavier = weight + load * block[BY_LOAD + i]
+    scatter(block, OUT + i, LANES, (lever.wrench(one, bars[1]), heavier * dot(pulled, traction)))
+    accumulate(block, LAW_BAR + i, LANES, bars[2:])
 
 
 @kernel
@@ -226,13 +180,13 @@ def _pull(lever, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
         if which[t] != last:
             last = which[t]
             _weigh(w, blocks, weights[last], inputs.by_load[0, last])
-        _write(w, _Z, states[t], n)
+        _write(w, Z, states[t], n)
         load, pull, twist, dt = loads[t], three(pulls[t]), three(twists[t]), inputs.dt[t]
         loaded = 0.0 if load == 0.0 else 1.0
         for k in range(blocks):
-            _retreat(lever, law, at(w, k * _BLOCK), twist, dt, pull, load, loaded, lanes)
-        put(twist_bar[t], _totals(w, blocks, _OUT))
-        load_bar[t] = _total(w, blocks, _OUT + 3 * LANES)
+            _retreat(lever, law, at(w, k * BLOCK), twist, dt, pull, load, loaded, lanes)
+        put(twist_bar[t], totals(w, blocks, OUT, lanes))
+        load_bar[t] = total(w, blocks, OUT + 3 * LANES, lanes)
 
 
 @kernel
@@ -243,19 +197,19 @@ def _gradient(lever, inputs, states, wrench_bar, span, bars, w):
         law, before, pulls = law_of(rows[row_of(rows, b)]), states[0], wrench_bar[row_of(wrench_bar, b)]
         before, row_bar = before[row_of(before, b)], bars.rows[0, b]
         _lay(w, blocks, inputs.data)
-        _write(w, _BAR, bars.state[0, b], n)
+        _write(w, BAR, bars.state[0, b], n)
         if law.gamma == 2.0:
             _pull(lever, squared(law), inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b])
         else:
             _pull(lever, law, inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b])
-        _read(w, _BAR, bars.state[0, b], n)
+        _read(w, BAR, bars.state[0, b], n)
         for m in range(_COUNT):
-            row_bar[COLUMNS[m]] = _total(w, blocks, _LAW + m * LANES)
+            row_bar[COLUMNS[m]] = total(w, blocks, LAW_BAR + m * LANES, LANES)
 
 
 def gradient(lever, inputs, states, wrench_bar, span, bars):
     """Write the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
-    scratch = np.empty(inputs.shapes.shape[2] // LANES * _BLOCK)
+    scratch = np.empty(inputs.shapes.shape[2] // LANES * BLOCK)
     _gradient(lever, inputs, states, wrench_bar, span, bars, pointer(scratch))
 
 
@@ -265,15 +219,15 @@ def gradient(lever, inputs, states, wrench_bar, span, bars):
 @kernel
 def _push_one(lever, law, by, block, i, twist, turn, dt, load, push):
     """Step a cell and its change, for changes `by` of the law, `turn` of the twist and `push` of the load."""
-    one, weight = lever.of(Block(block, LANES), i), block[_WEIGHT + i]
+    one, weight = lever_at(lever, block, i), block[WEIGHT + i]
     new, traction, d_new, d_traction = _pushed(
-        law, _pair(block, _Z, i), lever.seen(one, twist), dt, _pair(block, _BAR, i), lever.seen(one, turn), *by
+        law, pair(block, Z, i), lever.seen(one, twist), dt, pair(block, BAR, i), lever.seen(one, turn), *by
     )
-    _put_pair(block, _Z, i, new)
-    _put_pair(block, _BAR, i, d_new)
-    heavier = (weight + load * block[_BY_LOAD + i]) * push
+    put_pair(block, Z, i, new)
+    put_pair(block, BAR, i, d_new)
+    heavier = (weight + load * block[BY_LOAD + i]) * push
     change = plus(times(load * weight, d_traction), heavier, traction)
-    scatter(block, _OUT + i, LANES, (times(weight, lever.wrench(one, traction)), lever.wrench(one, change)))
+    scatter(block, OUT + i, LANES, (times(weight, lever.wrench(one, traction)), lever.wrench(one, change)))
 
 
 @kernel
@@ -295,22 +249,22 @@ def _tangent(lever, inputs, span, z, changes, wrenches, slopes, w):
         which, last = which[row_of(which, b)], -1
         by = (*d_law[:7], d_law.breakaway_ratio)
         _lay(w, blocks, inputs.data)
-        _write(w, _Z, z[0, b], n)
-        _write(w, _BAR, changes.state[0, b], n)
+        _write(w, Z, z[0, b], n)
+        _write(w, BAR, changes.state[0, b], n)
         for t in range(inputs.dt.shape[0]):
             if which[t] != last:
                 last = which[t]
                 _weigh(w, blocks, weights[last], all_by_load[last])
             load, twist, turn, dt = loads[t], three(twists[t]), three(turns[t]), inputs.dt[t]
             for k in range(blocks):
-                _push(lever, law, by, at(w, k * _BLOCK), twist, turn, dt, load, pushes[t], lanes)
-            put(wrenches[b, t], times(load, _totals(w, blocks, _OUT)))
-            put(slopes[b, t], _totals(w, blocks, _OUT + 3 * LANES))
+                _push(lever, law, by, at(w, k * BLOCK), twist, turn, dt, load, pushes[t], lanes)
+            put(wrenches[b, t], times(load, totals(w, blocks, OUT, lanes)))
+            put(slopes[b, t], totals(w, blocks, OUT + 3 * LANES, lanes))
             if load == 0.0:
-                _forget(w, blocks, _Z)
-                _forget(w, blocks, _BAR)
-        _read(w, _Z, z[0, b], n)
-        _read(w, _BAR, changes.state[0, b], n)
+                _forget(w, blocks, Z)
+                _forget(w, blocks, BAR)
+        _read(w, Z, z[0, b], n)
+        _read(w, BAR, changes.state[0, b], n)
 
 
 def tangent(lever, inputs, span, z, changes, wrenches, slopes):
@@ -318,7 +272,7 @@ def tangent(lever, inputs, span, z, changes, wrenches, slopes):
 
     `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state in place.
     """
-    scratch = np.empty(inputs.shapes.shape[2] // LANES * _BLOCK)
+    scratch = np.empty(inputs.shapes.shape[2] // LANES * BLOCK)
     _tangent(lever, inputs, span, z, changes, wrenches, slopes, pointer(scratch))
 
 

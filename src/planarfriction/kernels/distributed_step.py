@@ -7,18 +7,29 @@ docs/physics.md, "Distributed model".
 from __future__ import annotations
 
 from planarfriction.compiler import kernel
+from planarfriction.compiler.memory import at
 from planarfriction.kernels import bristle_step, cells
-from planarfriction.kernels.contacts import traction
+from planarfriction.kernels.cell_blocks import (
+    BLOCK,
+    LANES,
+    OUT,
+    WEIGHT,
+    Z,
+    advance,
+    clear,
+    end_traction,
+    room,
+    totals,
+)
 from planarfriction.kernels.general_cells import Bristle, slopes, slopes_of
 from planarfriction.kernels.law import grip, squared
 from planarfriction.kernels.steps import step_functions
 from planarfriction.kernels.vectors import norm, plus, put, three
 
+_BLOCKS = 8
+"""Blocks that a step has in hand at a time: 17 kB."""
 
-@kernel
-def _traction(law, new, k, u):
-    """Return the traction of a cell at the end of its step, per unit load."""
-    return traction(law, new, plus(u, -k, new), u)
+_ROOM = _BLOCKS * BLOCK
 
 
 @kernel
@@ -26,25 +37,51 @@ def cell(law, z, u, dt):
     """Return the new bristle and the traction of a cell that moves at u."""
     speed = norm(u)
     new, k = bristle_step.step(law, z, u, speed, 1.0, grip(law, speed), dt)
-    return new, _traction(law, new, k, u)
+    return new, end_traction(law, new, k, u)
+
+
+@kernel
+def _copy(count, of, to):
+    for i in range(count):
+        to[i] = of[i]
+
+
+@kernel
+def _fill(lever, own, z, first, count, block):
+    n = own.count
+    _copy(count, at(z, first), at(block, Z))
+    _copy(count, at(z, n + first), at(block, Z + LANES))
+    _copy(count, at(own.weights, first), at(block, WEIGHT))
+    for m in range(len(lever.of(own, first))):
+        _copy(count, at(own.cells, m * n + first), at(block, m * LANES))
+
+
+@kernel
+def _empty(block, first, count, n, new):
+    _copy(count, at(block, Z), at(new, first))
+    _copy(count, at(block, Z + LANES), at(new, n + first))
 
 
 @kernel
 def _step(lever, law, own, z, twist, dt, new, out):
-    n, total = own.count, (0.0, 0.0, 0.0)
-    for i in range(n):  # apart: in one loop the vectors do not fit into the processor's registers
-        u = lever.seen(lever.of(own, i), twist)
-        speed = norm(u)
-        new[i] = bristle_step.predict(law, (z[i], z[n + i]), u, speed, 1.0, grip(law, speed), dt)[1]
-    for i in range(n):
-        one, bristle = lever.of(own, i), (z[i], z[n + i])
-        u = lever.seen(one, twist)
-        speed = norm(u)
-        q = grip(law, speed)
-        moved, k = bristle_step.finish(law, bristle, u, speed, 1.0, q, dt, norm(bristle) * q, new[i])
-        new[i], new[n + i] = moved
-        total = plus(total, own.weights[i], lever.wrench(one, _traction(law, moved, k, u)))
-    put(out, total)
+    n, all_of, w = own.count, (0.0, 0.0, 0.0), room(_ROOM)
+    lanes = min(LANES, n + LANES)
+    for first in range(0, n, _BLOCKS * LANES):
+        count = min(_BLOCKS * LANES, n - first)
+        full, rest = count // LANES, count % LANES
+        last, blocks = at(w, full * BLOCK), full + (1 if rest else 0)
+        for k in range(full):  # of a constant count, which is copied in vectors
+            _fill(lever, own, z, first + k * LANES, LANES, at(w, k * BLOCK))
+        if rest:
+            clear(last, WEIGHT + LANES)
+            _fill(lever, own, z, first + full * LANES, rest, last)
+        advance(lever, law, w, blocks, lanes, twist, dt)
+        all_of = plus(all_of, 1.0, totals(w, blocks, OUT, lanes))
+        for k in range(full):
+            _empty(at(w, k * BLOCK), first + k * LANES, LANES, n, new)
+        if rest:
+            _empty(last, first + full * LANES, rest, n, new)
+    put(out, all_of)
 
 
 def step(lever, contact, z, v, dt, new, out):
