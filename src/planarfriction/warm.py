@@ -65,7 +65,7 @@ def _parts() -> list[Part]:
     patch, law = ContactPatch.disc(radius=0.01, cells=5), LuGre(mu_s=1.2, elasto_plastic=0.9)
     kinds = {name: MODELS[name](patch, law) for name in ("distributed", "reduced", "reduced-published")}
     in_parts = models.ReducedModel(patch, law, parts=1)
-    three_states = {"reduced in one part": in_parts, "reduced-published": kinds["reduced-published"]}
+    rolled = {name: kinds[name] for name in ("distributed", "reduced-published")} | {"reduced in one part": in_parts}
     sum_of_parts = models.ReducedModel(patch, law, parts=2)
     grooved = models.DistributedModel(patch.with_friction_metric(friction_metric(0.0, along=1.0, across=0.8)), law)
     return [
@@ -75,7 +75,7 @@ def _parts() -> list[Part]:
         *(Part(f"steps, {name}", functools.partial(_step, model)) for name, model in kinds.items()),
         Part("coupled patches", functools.partial(_couple, [*kinds.values(), grooved])),
         *([Part("steps inside MuJoCo", _host)] if find_spec("mujoco") else []),
-        *(Part(f"roll-outs, {name}", functools.partial(_roll, model)) for name, model in three_states.items()),
+        *(Part(f"roll-outs, {name}", functools.partial(_roll, model)) for name, model in rolled.items()),
         *(Part(f"derivatives of scenes, {name}", functools.partial(_derive, model)) for name, model in kinds.items()),
         Part("derivatives of scenes in reverse", functools.partial(_reverse, kinds["reduced"])),
         Part("limit surfaces", functools.partial(_surfaces, patch)),
