@@ -18,7 +18,7 @@ from planarfriction.cli import main as planarfriction
 from planarfriction_studies.measured import TASKS
 
 MARK = re.compile(r"<!-- measured: (?P<name>.+?) -->\n\n(?:(?:\|.*\n)+\n)?")
-PICTURES = {"measured-slides.png", "measured-pushes.png", "measured-series.png"}
+PICTURES = {"measured-slides.png", "measured-pushes.png", "measured-series.png", "measured-onsets.png"}
 
 
 def scores(task: str, stored: Mapping[str, Any]) -> list[list[str]]:
@@ -80,6 +80,7 @@ TABLES: dict[str, tuple[str, Callable[[str, Mapping[str, Any]], list[list[str]]]
     **{task: (task, scores) for task in TASKS},
     **{f"{task} minus": (task, differences) for task in TASKS},
     "slides fitted": ("slides", fitted),
+    "onsets fitted": ("onsets", fitted),
     "slides checked": ("slides", checked),
     "slides regions": ("slides", regions),
 }

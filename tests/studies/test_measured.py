@@ -20,6 +20,7 @@ from planarfriction_studies.measured import (
     Benchmark,
     contactnets,
     models,
+    onsets,
     push_series,
     pushes,
     slide_integrator,
@@ -27,7 +28,7 @@ from planarfriction_studies.measured import (
 from planarfriction_studies.measured.end_regions import EndRegions, shares
 from planarfriction_studies.measured.figures import draw, ellipse
 from planarfriction_studies.measured.mujoco_box import MujocoBox
-from planarfriction_studies.measured.scores import angles, drawings, interval, mean
+from planarfriction_studies.measured.scores import angles, drawings, interval, mean, median
 from planarfriction_studies.measured.tables import TABLES, shipped
 from tests.support.repository import script
 
@@ -181,7 +182,75 @@ def test_a_quartic_learns_from_pushes(cases):
     assert angle < 8.0  # the uniform face is 10 deg off
 
 
+# ------------------------------------------------------------------------------------------------ pushes from touch
+
+
+def touched(case, **changes):
+    """A push from touch through the centre of a flat square, straight against its left edge."""
+    square = pf.ContactPatch.rectangle(0.1, cells=7)
+    outline = 0.05 * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+    question = replace(
+        case.question,
+        patch=square,
+        outline=outline,
+        edge=3,
+        start=np.array([0.2, 0.1, np.pi / 2]),
+        place=np.array([-0.05, 0.0]),
+        velocity=np.array([0.0, 2.5e-3]),
+    )
+    return case._replace(question=replace(question, **changes), board="flat")
+
+
+def test_a_push_through_the_centre_goes_straight(cases):
+    question = touched(cases["onsets"][0]).question
+    end = models.SurfaceModel(pf.LimitSurfaceExact)(question)
+    assert end == pytest.approx([0.2, 0.1 + question.travel, np.pi / 2, 1.0], abs=1e-7)
+    assert question.normal == pytest.approx([1.0, 0.0])
+
+
+def test_the_peak_of_a_force_in_closed_form():
+    time = np.linspace(-0.1, 1.0, 1101)
+    force = np.where(time < 0.2, 2.0 * time, 0.25)[:, None] * [1.0, 2.0]
+    assert onsets.peak(time, force) == pytest.approx(np.array([1.6, 1.6]), rel=1e-2)  # 0.2 s at 2 N/s over 0.25 N
+    assert np.isnan(onsets.peak(time[:300], force[:300])).all()
+
+
+def test_the_static_friction_of_made_breakaways_comes_back(cases):
+    """Straight pushes of a flat square: all cells break away at once, and the whole ratio is seen."""
+    every = [case for case in cases["onsets"] if case.board == "feet"][:3]
+    made = [touched(cases["onsets"][0], stiffness=k) for k in (1e4, 2e4, 4e4)]
+    model = models.BristleModel(pf.ReducedModel)
+    flat = model._peaks([case.question for case in made], (1.0, 1.3))
+    feet = model._peaks([case.question for case in every], (1.15, 1.0))
+    # bristles and damper add 0.03, with static friction and without
+    assert flat == pytest.approx(1.3, abs=0.05)
+    assert model._peaks([made[0].question], (1.0, 1.0)) == pytest.approx(1.0, abs=0.05)
+    answered = [
+        case._replace(answer=np.append(case.answer[:3], peak))
+        for case, peak in zip([*every, *made], [*feet, *flat], strict=True)
+    ]
+    fitted = model.fit(answered)
+    # peaks are linear between tried ratios 0.2 apart to some 0.02
+    assert list(fitted.fitted_values().values()) == pytest.approx([1.15, 1.3], abs=0.03)
+
+
+def test_ends_of_measured_pushes(cases):
+    """Medians over every fifth push, nothing fitted: the exact surface beats the ellipsoid, and either no motion."""
+    some = cases["onsets"][::5]
+    surfaces = [models.SurfaceModel(make) for make in (pf.LimitSurfaceExact, pf.LimitSurfaceEllipsoid)]
+    answers = [*(model.answer_all([case.question for case in some]) for model in surfaces)]
+    answers.append([np.append(case.question.start, 1.0) for case in some])
+    off = [np.median([onsets.errors(c, a)[0, :2] for c, a in zip(some, each, strict=True)], axis=0) for each in answers]
+    assert (off[0] < off[1]).all() and (off[1] < 0.3 * off[2]).all()
+
+
 # ------------------------------------------------------------------------------------------------ scores
+
+
+def test_medians_count_weights():
+    values = np.array([3.0, 1.0, 2.0])
+    assert median(values) == 2.0
+    assert median(values, np.array([[1.0, 1.0, 1.0], [3.0, 1.0, 0.0], [0.0, 2.0, 1.0]])).tolist() == [2.0, 3.0, 1.0]
 
 
 def test_bootstrap_draws_whole_groups():
@@ -296,7 +365,7 @@ def test_an_interrupt_keeps_what_is_done(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("options", "word"),
     [
-        (["--task", "throws"], "task must be one of slides, pushes, series"),
+        (["--task", "throws"], "task must be one of slides, pushes, series, onsets"),
         (["--only", "magic"], "--only must be one of"),
         (["--own", "none.py"], "--own must be FILE.py:NAME"),
         (["--own", "none.py:predict"], "none.py: no such file"),
@@ -327,6 +396,13 @@ def test_bad_options_are_one_line_and_exit_code_2(options, word, tmp_path, capsy
         ("supports", lambda t: t[1:], "needs three rows for hard_10_130_10"),
         ("supports", lambda t: t.assign(load_fraction=np.nan), "column load_fraction"),
         ("series", lambda t: t.assign(fx_N=np.inf), "column fx_N"),
+        ("onsets", lambda t: t.assign(config="hard"), "push hard 1 has no layout"),
+        (
+            "forces",
+            lambda t: t[1:][t.push[1:] != 1],
+            "push hard_10_130_10 1 has no layout in the table of pushes or no f",
+        ),
+        ("forces", lambda t: t.assign(t_s=0.0), "push hard_10_130_10 1 needs forces from 0 to 0.3 s"),
     ],
 )
 def test_bad_tables_are_one_line_and_exit_code_2(name, change, word, tmp_path, capsys):

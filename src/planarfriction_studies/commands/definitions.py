@@ -57,11 +57,12 @@ def bench(only: tuple[str, ...], full: bool, as_json: bool) -> None:
 
 @click.command(
     short_help="Compare friction models on measured data.",
-    help="""Compare friction models on published measurements, which come with the package: three tasks, fixed splits.
+    help="""Compare friction models on published measurements, which come with the package: four tasks, fixed splits.
 
     slides: the path and final pose of a cube on a table, from its first 8 poses. pushes: the twist of an object that is
-    pushed slowly, from the wrench. series: twists and wrenches during whole pushes. Each model is fitted to the
-    training cases and scored on the others, with bootstrap intervals. --own adds your own function (docs/measured.md).
+    pushed slowly, from the wrench. series: twists and wrenches during whole pushes. onsets: the final pose of a push
+    from its touch, and the peak of the force at breakaway. Each model is fitted to the training cases and scored on
+    the others, with bootstrap intervals. --own adds your own function (docs/measured.md).
 
     \b
     Examples:

@@ -115,7 +115,9 @@ class Benchmark:
                 except NotImplementedError:
                     continue  # a model need not answer every task
                 errors = tuple(task.errors(case, answer) for case, answer in zip(test, answers, strict=True))
-                values = fitted.fitted_values() if hasattr(fitted, "fitted_values") and name == "slides" else {}
+                # friction coefficients cancel in the other tasks
+                told = name == "slides" or (name == "onsets" and fitted is not model)
+                values = fitted.fitted_values() if told and hasattr(fitted, "fitted_values") else {}
                 checked = fitted.check(test) if hasattr(fitted, "check") else {}
                 regions = fitted.regions([case.question for case in test]) if hasattr(fitted, "regions") else None
                 seconds = time.perf_counter() - begun
@@ -153,11 +155,10 @@ def score(task: Task, cases: Sequence[Case], errors: Sequence[np.ndarray], seed:
 
 def rows_of(task: Task, measure: Measure, cases: Sequence[Case], errors: Sequence[np.ndarray]):
     """Return errors `[N]` that a measure counts, and the groups that they belong to."""
-    column = task.measures.index(measure) if task.name == "slides" else 0
     values, groups = [], []
     for case, rows in zip(cases, errors, strict=True):
         if measure.board in ("", case.board):
-            values.append(rows[:, column])
+            values.append(rows[:, measure.column])
             one_each = task.name == "pushes"  # there each row is a push, in the others a case is one
             groups += [f"{case.name} {i}" for i in range(len(rows))] if one_each else [case.group] * len(rows)
     return (np.concatenate(values) if values else np.zeros(0)), groups

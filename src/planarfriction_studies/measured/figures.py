@@ -20,6 +20,10 @@ COLOURS: dict[str, str] = dict(zip(DRAWN, (style.OTHER, style.ELLIPSOID, style.E
 """Model -> its colour; the others take what is left, one after the other."""
 
 
+PEAKS = (0.8, 1.6)
+"""Peaks of the force over its level that are drawn; a few lie outside."""
+
+
 def draw(benchmark: Benchmark, task: str) -> style.PlotFigure:
     """Draw the picture of a task."""
     rows = len(benchmark.results[task])
@@ -33,7 +37,7 @@ def draw(benchmark: Benchmark, task: str) -> style.PlotFigure:
     else:
         left, right = parts(1, 2, width_ratios=(1.5, 1.0))
         _dots(left, benchmark, task)
-        (_draw_centres if task == "pushes" else _draw_series)(right, benchmark)
+        {"pushes": _draw_centres, "series": _draw_series, "onsets": _draw_onsets}[task](right, benchmark)
     return figure
 
 
@@ -187,3 +191,19 @@ def _draw_series(part: Any, benchmark: Benchmark) -> None:
     axes[1].set(xlabel="time [s]", ylabel="torque against force [deg]")
     axes[0].set_title(case.name.removesuffix(", wrenches"), fontsize="small", loc="left")
     _finish(part, axes, 2)
+
+
+def _draw_onsets(part: Any, benchmark: Benchmark) -> None:
+    """Draw the peak of the force at breakaway over its level: measured against predicted, feet and flat faces."""
+    test, axes = benchmark.test("onsets"), part.subplots()
+    results = benchmark.results["onsets"]
+    name = next((name for name in ("distributed", "reduced") if name in results), list(results)[-1])
+    for board, colour in (("feet", style.OTHER), ("flat", style.PARTS)):
+        rows = [i for i, case in enumerate(test) if case.board == board]
+        pairs = np.array([[results[name].answers[i][3], test[i].answer[3]] for i in rows])
+        axes.plot(*pairs.T, ".", color=colour, label=board)
+        axes.plot(*np.median(pairs, axis=0), "o", color=colour, markersize=9, markeredgecolor="0.1")
+    axes.plot(PEAKS, PEAKS, color="0.7", linewidth=0.8, zorder=1)
+    axes.set(xlim=PEAKS, ylim=PEAKS, aspect="equal", xlabel=f"peak over level, {name}", ylabel="measured")
+    axes.set_title("breakaway; rings: medians", fontsize="small", loc="left")
+    _finish(part, [axes], 2)

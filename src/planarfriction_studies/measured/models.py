@@ -21,7 +21,8 @@ from planarfriction.limit_surface import LimitSurface, LimitSurfaceExact, LimitS
 from planarfriction.limit_surface.base import scaling
 from planarfriction.limit_surface.comparison import directions
 from planarfriction.patch import ContactPatch
-from planarfriction_studies.measured.questions import BatchModel, Case, SlideQuestion
+from planarfriction_studies.measured.onset_simulation import breaking, peaks, pushed_end
+from planarfriction_studies.measured.questions import BatchModel, Case, OnsetQuestion, SlideQuestion
 from planarfriction_studies.measured.slide_integrator import MU, TURNS, fit_slides, parabolas, slides
 
 
@@ -50,7 +51,12 @@ class SlideFit(BatchModel):
 
 @dataclass(frozen=True)
 class SurfaceModel(SlideFit):
-    """A limit surface of the given patch, friction normal to it; on slides times a fitted friction coefficient."""
+    """A limit surface of the given patch, friction normal to it; on slides times a fitted friction coefficient.
+
+    Without bristles the force has no peak at breakaway.
+    """
+
+    tasks = (*BatchModel.tasks, "onsets")
 
     surface: Callable[[ContactPatch], LimitSurface]
     mu: float = MU
@@ -59,6 +65,8 @@ class SurfaceModel(SlideFit):
         if questions[0].task == "slides":
             wrench = quick(made(self.surface, questions[0].patch))
             return slides(lambda twist, _: self.mu * wrench(twist), questions)
+        if questions[0].task == "onsets":
+            return [np.append(pushed_end(made(self.surface, each.patch), each), 1.0) for each in questions]
         return [_direction(made(self.surface, question.patch), question) for question in questions]
 
 
@@ -201,13 +209,49 @@ class BristleModel(SlideFit):
     """One of the library's friction models with stiff bristles, simulated as it stands.
 
     A push in time is followed from rest with its measured twist. A twist of a wrench is searched among those whose
-    steady wrench has that direction.
+    steady wrench has that direction. Pushes from touch end where those on the exact surface end; the ratio of static to
+    kinetic friction, which makes their peak, is fitted to feet and to flat faces.
     """
+
+    tasks = (*BatchModel.tasks, "onsets")
 
     build: Callable[[ContactPatch, LuGre], Any]
     mu: float = MU
+    ratios: tuple[float, float] | None = None
+    """Static over kinetic friction of feet and of flat faces."""
+
+    def _fitted(self, cases: Sequence[Case]) -> BatchModel:
+        if cases[0].question.task != "onsets":
+            return super()._fitted(cases)
+        tried, fine = np.linspace(1.0, LARGEST, 5), np.linspace(1.0, LARGEST, 81)
+        ratios = []
+        for board in ("feet", "flat"):
+            own = [case for case in cases if case.board == board]
+            found = np.stack([self._peaks([case.question for case in own], [ratio] * 2) for ratio in tried])
+            off = _between(tried, found, fine) - [case.answer[3] for case in own]
+            ratios.append(float(fine[np.argmin(np.abs(np.median(off, axis=1)))]))
+        return dataclasses.replace(self, ratios=tuple(ratios))
+
+    def fitted_values(self) -> dict[str, float]:
+        """Return the fitted numbers by name."""
+        if self.ratios is None:
+            return super().fitted_values()
+        return dict(zip(("mu_s/mu_c, feet", "mu_s/mu_c, flat face"), self.ratios, strict=True))
+
+    def _peaks(self, questions: Sequence[OnsetQuestion], ratios: Sequence[float]) -> np.ndarray:
+        """Return simulated peaks `[K]` for static over kinetic friction of feet and of flat faces."""
+        found = np.empty(len(questions))
+        for patch in {id(each.patch): each.patch for each in questions}.values():
+            rows = [i for i, each in enumerate(questions) if each.patch is patch]
+            law = breaking(ratios[len(patch.positions) > FEET])
+            found[rows] = peaks(made(self.build, patch, law), [questions[i] for i in rows])
+        return found
 
     def _answers(self, questions: Sequence[Any]) -> list[np.ndarray]:
+        if questions[0].task == "onsets":
+            ends = SurfaceModel(LimitSurfaceExact).answer_all(questions)
+            both = zip(ends, self._peaks(questions, self.ratios or (1.0, 1.0)), strict=True)
+            return [np.append(end[:3], each) for end, each in both]
         answers, law = [], stiff(self.mu)
         for question in questions:
             model = made(self.build, question.patch, law)
@@ -232,6 +276,15 @@ def _slide(model: Any, question: SlideQuestion) -> np.ndarray:
     noise = np.array([1.0, 1.0, 1.0 / np.sqrt(question.inertia / question.mass)])
     begun = improve_start(model, body, part, begun, noise, TURNS - 1)
     return slide_poses(model, body, question.time, begun[:3], begun[3:])
+
+
+LARGEST, FEET = 1.8, 3
+"""Largest ratio of static to kinetic friction that is tried, and number of feet; flat faces have more cells."""
+
+
+def _between(nodes: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return the columns of `values` `[N, K]` at `nodes`, linear in between, `[A, K]`."""
+    return np.stack([np.interp(at, nodes, column) for column in values.T], axis=1)
 
 
 # ---------------------------------------------------------------------- steady motions

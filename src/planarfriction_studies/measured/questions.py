@@ -74,14 +74,50 @@ class SeriesQuestion:
     task: Literal["series"] = field(default="series", init=False)
 
 
-Question = SlideQuestion | PushQuestion | SeriesQuestion
+@dataclass(frozen=True, eq=False)
+class OnsetQuestion:
+    """Question of one push from touch. Answer `[4]`: the final pose, and the first peak of the force over its level.
+
+    Peak and level are those of `onsets.peak`; the pose is x, y, theta of the centre of mass, world axes [m, m, rad].
+    """
+
+    patch: ContactPatch
+    """The feet with their shares of the load, or the flat face under uniform pressure."""
+    outline: np.ndarray
+    """Corners of the object about the centre of mass, counter-clockwise [m], `[M, 2]`."""
+    edge: int
+    """Number of the edge that is touched, which begins at the corner of that number."""
+    start: np.ndarray
+    """First pose x, y, theta of the centre of mass, world axes [m, m, rad], `[3]`."""
+    place: np.ndarray
+    """Place of the touch, in the axes of the object [m], `[2]`."""
+    velocity: np.ndarray
+    """Velocity of the pusher, world axes [m/s], `[2]`."""
+    travel: float
+    """Way of the pusher from touch to its end, less the deflection of robot and finger [m]."""
+    stiffness: float
+    """Stiffness of robot and finger, from the rise of the force at touch [N/m]: a nuisance."""
+    mass: float
+    """Mass [kg]."""
+    inertia: float
+    """Moment of inertia about the vertical through the centre of mass [kg m^2]."""
+    task: Literal["onsets"] = field(default="onsets", init=False)
+
+    @property
+    def normal(self) -> np.ndarray:
+        """Unit normal of the touched edge, into the object `[2]`."""
+        x, y = self.outline[(self.edge + 1) % len(self.outline)] - self.outline[self.edge]
+        return np.array([-y, x]) / np.hypot(x, y)
+
+
+Question = SlideQuestion | PushQuestion | SeriesQuestion | OnsetQuestion
 
 
 class Case(NamedTuple):
     """A question together with the measured answer."""
 
     question: Any
-    """One of the three kinds."""
+    """One of the four kinds."""
     answer: np.ndarray
     """The measured answer, of the same shape as a model's."""
     name: str

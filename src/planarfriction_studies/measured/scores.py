@@ -19,9 +19,11 @@ class Measure(NamedTuple):
     heading: str
     """Heading in the table."""
     total: Callable[..., Any]
-    """`rms` or `mean`."""
+    """`rms`, `mean` or `median`."""
     board: str = ""
     """Board whose cases count; all cases if empty."""
+    column: int = 0
+    """Column of the errors of a case."""
 
 
 def rms(values: np.ndarray, weights: np.ndarray | None = None) -> Any:
@@ -32,6 +34,15 @@ def rms(values: np.ndarray, weights: np.ndarray | None = None) -> Any:
 def mean(values: np.ndarray, weights: np.ndarray | None = None) -> Any:
     """Return the mean of values `[N]`, with weights `[..., N]`."""
     return np.mean(values) if weights is None else weights @ values / weights.sum(axis=-1)
+
+
+def median(values: np.ndarray, weights: np.ndarray | None = None) -> Any:
+    """Return the median of values `[N]`, or the values at half of all weights `[..., N]`."""
+    if weights is None:
+        return np.median(values)
+    order = np.argsort(values)
+    sums = np.cumsum(weights[..., order], axis=-1)
+    return values[order][np.argmax(sums >= 0.5 * sums[..., -1:], axis=-1)]
 
 
 def angles(first: np.ndarray, second: np.ndarray, length: float) -> np.ndarray:

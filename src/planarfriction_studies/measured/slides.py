@@ -22,9 +22,9 @@ CELLS = 11
 
 MEASURES = (
     Measure("path_mm", "along the way [mm]", rms),
-    Measure("path_deg", "along the way [deg]", rms),
-    Measure("end_mm", "at the end [mm]", rms),
-    Measure("end_deg", "at the end [deg]", rms),
+    Measure("path_deg", "along the way [deg]", rms, column=1),
+    Measure("end_mm", "at the end [mm]", rms, column=2),
+    Measure("end_deg", "at the end [deg]", rms, column=3),
 )
 """RMS over tosses of the error in position and yaw: RMS over the samples of a toss, and at its last sample."""
 

@@ -18,6 +18,8 @@ TABLES = {
     "supports": "zhou_icra16_supports.csv",
     "published": "zhou_icra16_published_errors.csv",
     "series": "mlab_pushes.csv.gz",
+    "onsets": "mlab_onsets_pushes.csv",
+    "forces": "mlab_onsets.csv.gz",
 }
 """Files of the tables by name."""
 

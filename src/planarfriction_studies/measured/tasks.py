@@ -1,4 +1,4 @@
-"""The three tasks: what is asked, which cases are there to fit to, and how answers are scored."""
+"""The four tasks: what is asked, which cases are there to fit to, and how answers are scored."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction_studies.measured import push_series, pushes, slides
+from planarfriction_studies.measured import onsets, push_series, pushes, slides
 from planarfriction_studies.measured.questions import Case
 from planarfriction_studies.measured.scores import Measure
 
@@ -33,6 +33,7 @@ TASKS = {
         ("slides", "Free slides of a cube: path and end from the first 8 poses", slides, slides.refused),
         ("pushes", "Slow pushes on known feet: angle to the measured twist", pushes),
         ("series", "Pushes over time: angles to the measured twist and wrench", push_series),
+        ("onsets", "Pushes from touch: final pose, and peak of the force at breakaway", onsets),
     )
 }
 """Task by name."""

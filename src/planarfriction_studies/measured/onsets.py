@@ -1,0 +1,94 @@
+"""Single pushes with the force in time: the end of the object, and how far its force overshoots when it breaks away.
+
+The pushes are those of the task `pushes`. The pusher touches at a known place and moves on in a known straight line.
+The object's motion in time was not recorded, only its rest before and after. Robot and finger are a nuisance that is
+stated: a spring whose stiffness is the rise of the force at touch over the speed of the robot, push by push.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from planarfriction_studies.measured import pushes
+from planarfriction_studies.measured.questions import Case, OnsetQuestion
+from planarfriction_studies.measured.replayed_pushes import TRIANGLE
+from planarfriction_studies.measured.scores import Measure, median
+from planarfriction_studies.measured.tables import read_table, refuse
+
+MASS, LEG = 1.518, 0.15
+"""Mass of the triangle [kg], and its legs [m]."""
+
+INERTIA = MASS * LEG**2 / 9.0
+"""Moment of inertia of a right triangle with equal legs about the vertical through its centroid [kg m^2]."""
+
+TRAVEL = 17.5e-3
+"""Commanded way of the robot [m]; its log ends 1.2 mm before."""
+
+EDGES = {0: 2, 1: 0, 2: 1}
+"""Edges of the table (x leg, y leg, hypotenuse) as edges of the outline."""
+
+PEAK, LEVEL = (0.0, 0.25), (0.3, 1.0)
+"""Times after touch in which the peak and the level of the force are taken [s]."""
+
+MEASURES = (
+    Measure("end_mm", "end [mm]", median),
+    Measure("end_deg", "end [deg]", median, column=1),
+    Measure("peak_flat", "breakaway peak, flat face", median, "flat", 2),
+    Measure("peak_feet", "breakaway peak, feet", median, "feet", 2),
+)
+"""Medians over pushes of the distance and angle of the predicted end, and of the error of the peak over the level."""
+
+
+def read(folder: Path | None = None) -> list[Case]:
+    """Read all pushes; answers are the final pose x, y, theta [m, m, rad] and the peak of the force over its level."""
+    start, end = (["obj_x0_m", "obj_y0_m", "obj_yaw0_rad"], ["obj_x1_m", "obj_y1_m", "obj_yaw1_rad"])
+    numbers = ["push", "edge", "pcx_m", "pcy_m", "ux", "uy", "speed_mps", "t_start_s", "t_contact_s", *start, *end]
+    table = read_table("onsets", [*numbers, "rise_N_per_s", "f_sustained_N"], ["config"], folder=folder)
+    rows = ["t_s", "fx_N", "fy_N"]
+    forces = read_table("forces", ["push", *rows], ["config", "row"], folder=folder, optional=rows)
+    series = dict(list(forces[forces["row"] == "F"].groupby(["config", "push"])))
+    patches = {case.question.layout: (case.question.patch, case.board) for case in pushes.read(folder)}
+    cases = []
+    for i, row in enumerate(table.itertuples()):
+        name = f"{row.config} {row.push:g}"
+        if row.config not in patches or (row.config, row.push) not in series:
+            raise refuse("onsets", folder, f"push {name} has no layout in the table of pushes or no force in time")
+        patch, board = patches[row.config]
+        stiffness = row.rise_N_per_s / row.speed_mps
+        gone = row.speed_mps * (row.t_contact_s - row.t_start_s) + row.f_sustained_N / stiffness
+        question = OnsetQuestion(
+            patch,
+            TRIANGLE,
+            EDGES[int(row.edge)],
+            np.array([getattr(row, each) for each in start]),
+            np.array([row.pcx_m, row.pcy_m]),
+            np.array([row.ux, row.uy]) * row.speed_mps,
+            TRAVEL - gone,
+            stiffness,
+            MASS,
+            INERTIA,
+        )
+        force = series[row.config, row.push]
+        over = peak(force["t_s"].to_numpy() - row.t_contact_s, np.hypot(force["fx_N"], force["fy_N"]).to_numpy())
+        if not np.isfinite(over):
+            raise refuse("forces", folder, f"push {name} needs forces from 0 to {LEVEL[0]:g} s after touch and later")
+        answer = np.array([*(getattr(row, each) for each in end), over])
+        kind = "flat" if board == "flat" else "feet"
+        cases.append(Case(question, answer, name, f"{4 * i + i % 2}", np.arange(1), kind))  # half of them to fit to
+    return cases
+
+
+def peak(time: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Return the largest force `[T, ...]` in `PEAK` over its median in `LEVEL`, NaN where either has no samples."""
+    first, later = ((time > begin) & (time < end) for begin, end in (PEAK, LEVEL))
+    if not (first.any() and later.any()):
+        return np.full(force.shape[1:], np.nan)
+    return force[first].max(axis=0) / np.median(force[later], axis=0)
+
+
+def errors(case: Case, answer: np.ndarray) -> np.ndarray:
+    """Return one row: distance [mm] and angle [deg] of the end, and the difference of the peak, `[1, 3]`."""
+    off = np.abs(answer - case.answer)
+    return np.array([[1e3 * np.hypot(off[0], off[1]), np.degrees(off[2]), off[3]]])
