@@ -23,9 +23,9 @@ REPEATS = 5
 
 RUNGS: dict[str, Callable[[Any, Any], Any]] = {
     "distributed": DistributedModel,
-    "distributed, few cells": lambda patch, law: DistributedModel(patch.compressed(), law),
-    "reduced, 4 parts": lambda patch, law: ReducedModel(patch, law, parts=4),
     "reduced": ReducedModel,
+    "reduced, 4 parts": lambda patch, law: ReducedModel(patch, law, parts=4),
+    "reduced, 1 part": lambda patch, law: ReducedModel(patch, law, parts=1),
     "reduced, as published": lambda patch, law: ReducedModelPublished(patch, law),
 }
 """Models of the ladder, from the reference down to three states."""

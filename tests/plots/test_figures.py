@@ -566,6 +566,7 @@ def test_a_model_has_its_colour_in_every_figure():
         "b": pf.DistributedModel(patch, law),
         "c": pf.ReducedModelPublished(patch, law),
         "d": pf.ReducedModel(patch, law, parts=2),
+        "e": pf.ReducedModel(patch, law),
     }
     scene = synthetic.scene()
     runs = {
@@ -573,8 +574,8 @@ def test_a_model_has_its_colour_in_every_figure():
         for name, model in models.items()
     }
     drawn = [line.get_color() for line in plots.plot_histories(runs).axes[0].get_lines()]
-    assert drawn == [style.MOMENTS, style.DISTRIBUTED, style.PUBLISHED, style.PARTS]
-    assert tuple(drawn) == (looks.MOMENTS, looks.DISTRIBUTED, looks.REDUCED, looks.PARTS)
+    assert drawn == [style.MOMENTS, style.DISTRIBUTED, style.PUBLISHED, style.PARTS, style.FEW]
+    assert tuple(drawn) == (looks.MOMENTS, looks.DISTRIBUTED, looks.REDUCED, looks.PARTS, looks.FEW)
 
 
 def test_a_body_that_is_tiny_beside_its_path_is_drawn_larger_and_says_so():

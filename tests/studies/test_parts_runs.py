@@ -74,7 +74,7 @@ def test_the_largest_error_on_three_feet_is_that_of_feet_without_parts():
     ratios = new_shapes.ratios(errors)
     for quantity in new_shapes.QUANTITIES:
         # each foot breaks away by itself; one part has one threshold for all
-        assert max(ratios["auto"][quantity]) < 0.5 < max(ratios["reduced"][quantity])
+        assert max(ratios["auto"][quantity]) < 0.5 < max(ratios["one part"][quantity])
 
 
 @pytest.mark.slow

@@ -19,14 +19,17 @@ from planarfriction.families import MODELS
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Line colours that colour-blind readers tell apart (Okabe and Ito), the most distinct first."""
 
-DISTRIBUTED, PUBLISHED, ELLIPSOID, MOMENTS, PARTS, OTHER, EXACT = PALETTE
+DISTRIBUTED, PUBLISHED, ELLIPSOID, MOMENTS, PARTS, FEW, EXACT = PALETTE
 """Colours in every figure: sums over cells and their model, the published table and its model, the ellipsoid and its
-model, `ReducedModel` with one part, with several, something else, what is exact."""
+model, `ReducedModel` with one part, with several, by default, what is exact."""
+
+OTHER = FEW
+"""Colour of something else, where no `ReducedModel` is."""
 
 MEASURED = "0.6"
 """Colour of what was measured, drawn as a broad line below the rest."""
 
-OF_MODEL = {"distributed": DISTRIBUTED, "reduced": MOMENTS, "reduced-published": PUBLISHED}
+OF_MODEL = {"distributed": DISTRIBUTED, "reduced": FEW, "reduced-published": PUBLISHED}
 """Name of a model -> its colour."""
 
 LINE_STYLES = ("-", (0, (5, 1.5)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)))
@@ -117,7 +120,9 @@ def unit_for(kind: str, *values) -> Unit:
 def model_colour(model: Any) -> str | None:
     """Return the colour of a friction model; None if it is not one of the library's."""
     name = MODELS.name_of(model)
-    return PARTS if name == "reduced" and model.parts and model.parts > 1 else OF_MODEL.get(name or "")
+    if name == "reduced" and model.parts is not None:
+        return PARTS if model.parts > 1 else MOMENTS
+    return OF_MODEL.get(name or "")
 
 
 def show_lengths(axes: Any, largest: float) -> None:

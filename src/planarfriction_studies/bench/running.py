@@ -32,6 +32,7 @@ BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
     "step.distributed.loop": steps.distributed_loop,
     "step.published.call": steps.published_call,
     "step.reduced.loop": steps.reduced_loop,
+    "step.reduced.parts1.loop": partial(steps.reduced_loop, parts=1),
     "step.reduced.parts4.loop": partial(steps.reduced_loop, parts=4),
     "step.reduced.call": steps.reduced_call,
     "step.reduced.slopes": steps.reduced_slopes,

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction.coupling import CoupledPatches, CoupledStep, HostStep
+from planarfriction.derivatives import rollout
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
@@ -27,12 +28,7 @@ FEET = ((0.05, 0.03), (0.05, -0.03), (-0.05, 0.03), (-0.05, -0.03))
 
 def _compiled_loop(model: ReducedModel | ReducedModelPublished, twists: np.ndarray) -> float:
     """Measure the time of a model's steps through `twists`, compiled [s]."""
-    from planarfriction.derivatives.inputs import checked
-
-    inputs = checked(model, None, twists, 1.0, 1e-4, None)
-    compiled, family = inputs.compiled(), inputs.model.family
-    wrench, states = np.empty((1, *twists.shape)), np.empty((len(inputs.rows), 1, 0, 3))
-    return median(lambda: family.rollout(compiled, (0, 1), inputs.state.copy(), wrench, states), 9)
+    return median(lambda: rollout(model, None, twists, 1.0, 1e-4), 9)
 
 
 def published_loop(full: bool) -> Measurement:
@@ -69,8 +65,8 @@ def published_call(full: bool) -> Measurement:
     return line(_python_step(model, 2000) * 1e6, "us", "one Python call of rate", rate * 1e6)
 
 
-def reduced_loop(full: bool, parts: int = 1) -> Measurement:
-    """Measure a step of `ReducedModel`, in a compiled loop."""
+def reduced_loop(full: bool, parts: int | None = None) -> Measurement:
+    """Measure a step of `ReducedModel` in a compiled loop; with `parts`, of its moments."""
     twists = mixed_twists(20_000)
     models = ReducedModel(disc(), law(), parts=parts), ReducedModelPublished(disc(), law())
     ours, theirs = (_compiled_loop(model, twists) for model in models)
@@ -86,13 +82,13 @@ def reduced_call(full: bool) -> Measurement:
 def reduced_slopes(full: bool) -> Measurement:
     """Measure the derivatives of a step of `ReducedModel`, in one Python call."""
     model = ReducedModel(disc(), law())
-    return _beside_a_step(model, lambda: model.step_jacobians(np.zeros(3), (0.01, 0.0, 1.0), 1.0, 1e-3))
+    return _beside_a_step(model, lambda: model.step_jacobians(model.rest(), (0.01, 0.0, 1.0), 1.0, 1e-3))
 
 
 def reduced_four(full: bool) -> Measurement:
     """Measure the steps of four contacts, in one Python call."""
     model = ReducedModel(disc(), law())
-    states, twists, loads = np.zeros((4, 3)), np.tile((0.01, 0.0, 1.0), (4, 1)), np.ones(4)
+    states, twists, loads = np.stack([model.rest()] * 4), np.tile((0.01, 0.0, 1.0), (4, 1)), np.ones(4)
     return _beside_a_step(model, lambda: model.step(states, twists, loads, 1e-3))
 
 

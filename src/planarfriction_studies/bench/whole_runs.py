@@ -74,15 +74,16 @@ def load_family(full: bool) -> Measurement:
     """Measure a run with maps of a load family beside one with a fixed map, in turns: noise disturbs both alike."""
     soft = _soft()
     fixed = ContactPatch(soft.positions, soft.areas, soft.weights(IN_HAND_LOADS[1, 1][0]), soft.grid)
-    family, rebuilt = ReducedModel(soft, law()), ReducedModel(soft, law(), load_error=0.0)
-    scenes = [in_hand(family), in_hand(ReducedModel(fixed, law()))]
+    family, rebuilt = ReducedModel(soft, law(), parts=1), ReducedModel(soft, law(), parts=1, load_error=0.0)
+    scenes = [in_hand(family), in_hand(ReducedModel(fixed, law(), parts=1))]
     simulate(scenes[1], t_end=0.02)
     built = once(lambda: simulate(scenes[0]))
     every = once(lambda: simulate(in_hand(rebuilt)))
     times = np.array([[once(lambda scene=scene: simulate(scene)) for scene in scenes] for _ in range(25)])
     value, theirs = np.median(times, axis=0).tolist()
+    maps = len(family.reduction.load_rungs)
     words = (
-        f"the same with a fixed shape (both: all of simulate); building the family's {len(family.load_rungs)} maps "
+        f"the same with a fixed shape (both: all of simulate); building the family's {maps} maps "
         f"first took {built:.2g} s; with a map built for every load, the run takes {every:.2g} s"
     )
     return line(value, "s", words, theirs)

@@ -124,16 +124,16 @@ def plateau_comparisons(angles: dict[str, float]) -> list[Comparison]:
 
 
 def load_family(quick: bool) -> dict[str, float]:
-    """Compute the number of maps that `ReducedModel` builds in the in-hand run of a finger whose pressure flattens with
-    the load (k = 2 f_N), and the error of blending them.
+    """Compute the number of maps that one part of `ReducedModel` builds in the in-hand run of a finger whose pressure
+    flattens with the load (k = 2 f_N), and the error of blending them.
 
     That is the largest distance of steady wrenches at 1 N [N, N m] from a model that builds a map at every load (at
     few loads, for it is slow).
     """
     patch, t_end = soft_patch(2), QUICK_TIME if quick else TIME
-    model, rebuilt = ReducedModel(patch, LAW), ReducedModel(patch, LAW, load_error=0.0)
+    model, rebuilt = ReducedModel(patch, LAW, parts=1), ReducedModel(patch, LAW, parts=1, load_error=0.0)
     scenes.simulate(scenes.in_hand(model), t_end=t_end)
-    maps = len(model.load_rungs)
+    maps = len(model.reduction.load_rungs)
     apart = np.array([_steady_apart(model, rebuilt, load) for load in LOADS]).max(axis=0)
     return {
         "maps": maps,

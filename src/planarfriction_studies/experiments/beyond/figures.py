@@ -20,7 +20,7 @@ COLOURS = dict(
     zip(KINDS, (looks.REDUCED, looks.MOMENTS, looks.DISTRIBUTED, looks.QUARTIC, looks.ELLIPSOID), strict=True)
 )
 
-MODEL_COLOURS = dict(zip(MOVED, (looks.REDUCED, looks.MOMENTS, looks.PARTS, looks.DISTRIBUTED), strict=True))
+MODEL_COLOURS = dict(zip(MOVED, (looks.REDUCED, looks.FEW, looks.MOMENTS, looks.PARTS, looks.DISTRIBUTED), strict=True))
 
 
 def surface_errors(errors: dict[str, Arrays]) -> PlotFigure:
@@ -72,12 +72,12 @@ def driven_boxes(errors: dict[str, dict[str, dict[str, float]]]) -> PlotFigure:
     for axes, (before, label, linear) in zip(panels, rows, strict=True):
         axes.set_yscale("symlog", linthresh=linear, linscale=0.4)
         for place, each in enumerate(errors.values()):
-            for offset, (model, colour) in zip((-0.3, -0.1, 0.1, 0.3), MODEL_COLOURS.items(), strict=True):
+            for offset, (model, colour) in zip((-0.32, -0.16, 0.0, 0.16, 0.32), MODEL_COLOURS.items(), strict=True):
                 values = [1e3 * each[model][before + name] for name in boxes.COLUMNS]
-                looks.box(axes, place + offset, values, colour, 0.16)
+                looks.box(axes, place + offset, values, colour, 0.13)
         axes.set(ylabel=label, ylim=(0.0, None))
     key = looks.box_key({MOVED[model]: colour for model, colour in MODEL_COLOURS.items()})
-    looks.legend(figure, [*key, looks.line_key(**looks.MAXIMUM)], 5, fontsize="small")
+    looks.legend(figure, [*key, looks.line_key(**looks.MAXIMUM)], 6, fontsize="small")
     return figure
 
 
@@ -89,7 +89,7 @@ def grooves(numbers: dict[str, Any]) -> PlotFigure:
     fine = np.linspace(slopes[0], slopes[-1], 100)
     closed = np.degrees([contacts.closed_drift(slope) for slope in fine])
     axes.plot(np.degrees(fine), closed, color=looks.EXACT, label="closed form")
-    colours = (looks.DISTRIBUTED, looks.MOMENTS, looks.REDUCED)
+    colours = (looks.DISTRIBUTED, looks.FEW, looks.REDUCED)
     for kind, marker, colour in zip(contacts.GROOVED_MODELS, "ox+", colours, strict=True):
         look = {"color": colour, "label": kind, "fillstyle": "none", "ms": 7}
         axes.plot(np.degrees(slopes), np.degrees(numbers[kind]), marker, **look)
@@ -116,7 +116,8 @@ class Family(NamedTuple):
 
 FAMILIES = (
     Family("published reduced model", {"published": ""}, looks.REDUCED, "^"),
-    Family("ReducedModel, its parts", {"reduced": "1", **{f"{n} parts": f"{n}" for n in (4, 6, 16)}}, looks.MOMENTS,
+    Family("ReducedModel", {"reduced": "few cells"}, looks.FEW, "s", (6, -3)),
+    Family("ReducedModel, its parts", {"one part": "1", **{f"{n} parts": f"{n}" for n in (4, 6, 16)}}, looks.MOMENTS,
            "o", (4, -11)),
     Family("distributed, its cells", {"degree 3": "28", "degree 5": "45", "full": "all"}, looks.DISTRIBUTED, "D"),
 )  # fmt: skip

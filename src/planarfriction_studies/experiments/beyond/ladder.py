@@ -25,7 +25,7 @@ DEGREES = (3, 5)
 """Degrees of the compressed patches: 28 and 45 cells."""
 
 PARTS = (1, 4, 6, 16)
-"""Parts of `ReducedModel`."""
+"""Parts of `ReducedModel`, beside the few cells that it has by default."""
 
 AUTO = "auto"
 """Value of `parts` with which the model chooses their number, and the name of that model."""
@@ -51,6 +51,7 @@ REPEATS, LONG, SHORT = 3, 0.05, 0.02
 MOVED = {
     "published": "published reduced",
     "reduced": "ReducedModel",
+    "one part": "ReducedModel, 1 part",
     AUTO: 'ReducedModel, parts="auto"',
     "full": "distributed, 21 x 21",
 }
@@ -71,6 +72,7 @@ deflection."""
 ENDS = {
     "published": "published reduced",
     "reduced": "ReducedModel",
+    "one part": "ReducedModel, 1 part",
     "4 parts": "ReducedModel, 4 parts",
     AUTO: 'ReducedModel, parts="auto"',
 }
@@ -89,7 +91,7 @@ class Row(NamedTuple):
 
     case: str
     model: str
-    """"published", the same with another surface, "reduced", "n parts", "auto", "degree d", or "full"."""
+    """"published", the same with another surface, "reduced", "one part", "n parts", "auto", "degree d", or "full"."""
     states: int
     """Bristle states."""
     errors: dict[str, float]
@@ -119,6 +121,7 @@ def models(shape: str) -> dict[str, Any]:
         "published": ReducedModelPublished(patch, LAW),
         "published, smooth": ReducedModelPublished(patch, LAW, surface=LimitSurfaceTable(patch)),
         "published, ellipsoid": ReducedModelPublished(patch, LAW, surface=LimitSurfaceEllipsoid(patch)),
+        "reduced": ReducedModel(patch, LAW),
     }
     parts = {count: ReducedModel(patch, LAW, parts=count) for count in PARTS}
     result |= {name_of_parts(count): model for count, model in parts.items()}
@@ -135,7 +138,7 @@ def models(shape: str) -> dict[str, Any]:
 
 def name_of_parts(parts: Any) -> str:
     """Return the name of `ReducedModel` with so many parts, or with `AUTO`."""
-    return {1: "reduced", AUTO: AUTO}.get(parts, f"{parts} parts")
+    return {1: "one part", AUTO: AUTO}.get(parts, f"{parts} parts")
 
 
 def scenes_of(shape: str) -> dict[str, Callable[[Any], Scene]]:
@@ -219,7 +222,7 @@ def driven_errors(rows: list[Row]) -> dict[str, dict[str, dict[str, float]]]:
 
 
 def ratios(
-    errors: dict[str, dict[str, dict[str, float]]], model: str = "reduced", over: str = "published"
+    errors: dict[str, dict[str, dict[str, float]]], model: str, over: str = "published"
 ) -> dict[str, dict[str, float]]:
     """Return the error of a model of the ladder over that of another, by shape and statistic, force and torque."""
     names = [f"{before}{name}" for before in ("", "torque ") for name in STATISTICS]
@@ -231,7 +234,7 @@ def step_costs(shape: str = "Circle") -> dict[str, Any]:
     patch = PUBLISHED_PATCHES[shape]()
     directions = np.random.default_rng(7).normal(size=(STEPS, 3)) * [1.0, 1.0, 150.0]
     twists = directions * 10.0 ** np.random.default_rng(8).uniform(-4.0, -1.5, size=(STEPS, 1))
-    models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW)}
+    models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW), "reduced": ReducedModel(patch, LAW)}
     models |= {name_of_parts(count): ReducedModel(patch, LAW, parts=count) for count in TIMED_PARTS}
     times = {name: np.empty(ROUNDS) for name in models}
     for turn in range(-1, ROUNDS):  # the first compiles
@@ -254,7 +257,7 @@ def step_numbers(times: Arrays) -> dict[str, dict[str, list[float]]]:
 def spin_up(shape: str) -> dict[str, float]:
     """Return the largest error of the torque [N m] of a spin from rest, from the patch's own cells, by model."""
     patch = PUBLISHED_PATCHES[shape]()
-    models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW)}
+    models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW), "reduced": ReducedModel(patch, LAW)}
     models |= {name_of_parts(parts): ReducedModel(patch, LAW, parts=parts) for parts in (1, AUTO)}
     dt = SPIN_STEP / (SPIN * patch.contact_radius())
     wanted = _spun(DistributedModel(patch, LAW), dt)
@@ -299,7 +302,7 @@ def end_distances(rows: list[Row], shifts: dict[str, float]) -> dict[str, dict[s
     return result
 
 
-def score(ends: dict[str, dict[str, float]], load: int, model: str = "reduced") -> dict[str, Any]:
+def score(ends: dict[str, dict[str, float]], load: int, model: str) -> dict[str, Any]:
     """Count the runs under a load in which a model ends nearer than the published one, and compute the ratios."""
     ratios = {case: each[model] / each["published"] for case, each in ends.items() if case.endswith(f"load {load}")}
     return {"runs": len(ratios), "nearer": sum(ratio < 1.0 for ratio in ratios.values()), "ratios": ratios}

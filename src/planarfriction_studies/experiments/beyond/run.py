@@ -104,7 +104,7 @@ def _runs_of(shape: str) -> Numbers:
 def _ends_figure(ends: Numbers) -> Any:
     """Draw the ends of the in-hand runs, and how far a change of friction moves them."""
     words = ladder.ENDS | {ladder.SHIFT: "0.1 % of friction"}
-    colours = (looks.REDUCED, looks.MOMENTS, looks.OTHERS[3], looks.PARTS)
+    colours = (looks.REDUCED, looks.FEW, looks.MOMENTS, looks.OTHERS[3], looks.PARTS)
     return end_shifts(
         {case: {words[name]: each[name] for name in words} for case, each in ends.items()},
         dict(zip(ladder.ENDS.values(), colours, strict=True)),
@@ -126,13 +126,13 @@ def _numbers(rows: list[ladder.Row], shifts: dict[str, float], errors: Numbers) 
         },
         "quartic installed": surfaces.has_quartic(),
         "driven": moved,
-        "driven ratios": ladder.ratios(moved),
+        "driven ratios": ladder.ratios(moved, "one part"),
         "driven ratios, auto": ladder.ratios(moved, ladder.AUTO),
-        "driven ratios, parts": ladder.ratios(moved, ladder.AUTO, "reduced"),
+        "driven ratios, parts": ladder.ratios(moved, ladder.AUTO, "one part"),
         "in hand": ends,
         "in hand score": {
             model: {f"load {load}": ladder.score(ends, load, model) for load in (1, 2)}
-            for model in ("reduced", ladder.AUTO)
+            for model in ("reduced", "one part", ladder.AUTO)
         },
         # median over all runs of the time in the solver over that of the distributed model
         "run costs": {name: float(np.median([row.time for row in rows if row.model == name])) for name in models},
@@ -173,17 +173,20 @@ def _template_values(numbers: Numbers) -> Numbers:
             "twists": len(next(iter(unseen.values()))["reduced"]["force"]),
             "worst": {
                 model: {name: max(max(each[model][name]) for each in unseen.values()) for name in new_shapes.QUANTITIES}
-                for model in ("reduced", "4 parts", ladder.AUTO)
+                for model in ("reduced", "one part", "4 parts", ladder.AUTO)
             },
         },
         "held": {
             model: {load: _score(each) for load, each in found.items()}
             for model, found in numbers["in hand score"].items()
         },
-        "friction": {model: _friction_shares(ends, model) for model in ("reduced", ladder.AUTO, "published")},
+        "friction": {
+            model: _friction_shares(ends, model) for model in ("reduced", "one part", ladder.AUTO, "published")
+        },
+        "furthest": {model: max(each[model] for each in ends.values()) for model in ("reduced", "published")},
         "few": {
             model: max(each[model] for each in few)
-            for model in ("degree 5", "published", "reduced", ladder.AUTO, "16 parts")
+            for model in ("degree 5", "published", "reduced", "one part", ladder.AUTO, "16 parts")
         },
         "quartile": [each["degree 5"]["third quartile"] / each["full"]["third quartile"] for each in moved],
         "grooves": {"models": len(misses), "miss": float(np.abs(misses).max())},

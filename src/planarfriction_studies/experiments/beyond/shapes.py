@@ -18,7 +18,7 @@ from planarfriction_studies.experiments.experiment import Table
 from planarfriction_studies.experiments.runs import LAW, at_centre_of_pressure, simulated
 
 PARTS, SEEDS = (1, 4, AUTO), tuple(range(10))
-"""Numbers of parts of `ReducedModel`, and seeds of the twists."""
+"""Numbers of parts of `ReducedModel`, beside its few cells, and seeds of the twists."""
 
 T_END, DT, WAVES = 2.0, 5e-3, 5
 """End of a twist and time between its samples [s], linear in between, and its half waves over that time, at most."""
@@ -87,7 +87,7 @@ def largest_errors(shape: str, seeds: tuple[int, ...] = SEEDS) -> dict[str, np.n
     """
     patch = SHAPES[shape]()
     fine = patch.refined(FINER) if (patch.cell_extents() > 0.0).any() else patch
-    models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW)}
+    models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW), "reduced": ReducedModel(patch, LAW)}
     models |= {name_of_parts(parts): ReducedModel(patch, LAW, parts=parts) for parts in PARTS}
     reference = DistributedModel(fine, LAW)
     result = {}
@@ -117,7 +117,7 @@ def ratios(errors: dict[str, np.ndarray]) -> dict[str, dict[str, list[float]]]:
 def table(found: dict[str, dict[str, np.ndarray]]) -> Table:
     """Return the largest errors over the published model's: the median twist and the worst."""
     models = [name for name in next(iter(found.values())) if name != "published"]
-    words = {"reduced": "1 part"}
+    words = {"reduced": "few cells", "one part": "1 part"}
     columns = {
         f"{quantity}, {words.get(model, model)}": lambda each, m=model, q=quantity: (
             f"{np.median(each[m][q]):.2f} / {max(each[m][q]):.2f}"

@@ -20,6 +20,7 @@ MODEL_WORDS = {
     "published, smooth": "published reduced, LimitSurfaceTable",
     "published, ellipsoid": "published reduced, ellipsoid",
     "reduced": "ReducedModel",
+    "one part": "ReducedModel, 1 part",
     **{f"{count} parts": f"ReducedModel, {count} parts" for count in (4, 6, 16)},
     "auto": 'ReducedModel, parts="auto"',
     "degree 3": "distributed, 28 compressed cells",
@@ -58,7 +59,7 @@ def tables(rows: list[Row], numbers: Numbers) -> tuple[Table, ...]:
             },
             "run",
         ),
-        _ratios(numbers["driven ratios"], "Error of ReducedModel over the published reduced model's"),
+        _ratios(numbers["driven ratios"], "Error of ReducedModel with one part over the published reduced model's"),
         _ratios(numbers["driven ratios, parts"], 'Error of ReducedModel with parts="auto" over that with one part'),
         table(
             "In hand: distance of the end from the distributed model's",
