@@ -32,11 +32,13 @@ class ReducedModel(FrictionPytree):
             speeds: int = 16,
         ) -> None: ...
 
-    def __new__(cls, *given: Any, parts: Any = None, **settings: Any) -> Self:
+    def __new__(
+        cls, patch: Any = None, law: Any = None, normal_force: Any = None, *, parts: Any = None, **settings: Any
+    ) -> Self:
         """Return a model of the member that the settings ask for."""
         if cls is not ReducedModel:
             return super().__new__(cls)
         from planarfriction.jax.few_cells import FewCells
         from planarfriction.jax.moments import MomentModel
 
-        return super().__new__(FewCells if parts is None else MomentModel)  # pyright: ignore[reportReturnType]
+        return super().__new__(FewCells if parts is None else MomentModel)  # pyright: ignore

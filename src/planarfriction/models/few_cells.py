@@ -64,7 +64,8 @@ def _by_kind(patch: ContactPatch, kinds: np.ndarray, count: int) -> ContactPatch
     """Return the patch with the cells of each kind of friction compressed by themselves."""
     groups = [np.flatnonzero(kinds == kind) for kind in range(kinds.max() + 1)]
     weights = patch.weights()
-    few = [few_cells(ContactPatch(patch.positions[g], patch.areas[g], weights[g]), count) for g in groups]
+    pressure = weights / patch.areas
+    few = [few_cells(ContactPatch(patch.positions[g], patch.areas[g], pressure[g]), count) for g in groups]
     shares = np.concatenate([weights[g].sum() * each.weights() for g, each in zip(groups, few, strict=True)])
     first = np.repeat([g[0] for g in groups], [each.cells for each in few])
     metric = None if patch.metric is None else np.broadcast_to(patch.metric, (patch.cells, 2, 2))[first]
@@ -116,7 +117,7 @@ class Gathered(ByValue, Pressure):
         """Index of the few cell that is nearest to each cell of the patch, `[N]`."""
         from scipy.spatial import KDTree
 
-        return KDTree(self.patch.positions[self.chosen]).query(self.patch.positions)[1]
+        return np.asarray(KDTree(self.patch.positions[self.chosen]).query(self.patch.positions)[1])
 
     @property
     def depends_on_load(self) -> bool:

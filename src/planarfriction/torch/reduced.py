@@ -39,11 +39,13 @@ class ReducedModel(FrictionModule):
             device: torch.device | str | None = None,
         ): ...
 
-    def __new__(cls, *given: Any, parts: Any = None, **settings: Any) -> Self:
+    def __new__(
+        cls, patch: Any = None, law: Any = None, normal_force: Any = None, *, parts: Any = None, **settings: Any
+    ) -> Self:
         """Return a module of the member that the settings ask for."""
         if cls is not ReducedModel:
             return super().__new__(cls)
         from planarfriction.torch.few_cells import FewCells
         from planarfriction.torch.moments import MomentModel
 
-        return super().__new__(FewCells if parts is None else MomentModel)  # pyright: ignore[reportReturnType]
+        return super().__new__(FewCells if parts is None else MomentModel)  # pyright: ignore
