@@ -339,3 +339,22 @@ def test_the_written_json_is_plain(tmp_path):
     data = json.loads((tmp_path / "again.json").read_text())
     assert data == scene.to_dict()
     assert list(data) == ["name", "t_end", "save_every", "rtol", "atol", "body", "contact"]
+
+
+@pytest.mark.parametrize("name", ["a", '"a b"', "'a.b'"])
+def test_a_key_of_many_names_is_refused_at_once(tmp_path, name):
+    """The reader of the standard library would take minutes and gigabytes."""
+    path = tmp_path / "scene.toml"
+    path.write_text(f"{'.'.join([name] * 50_000)} = 1\n")
+    with pytest.raises(pf.FrictionError, match=r"scene\.toml: not valid TOML: a key of more than 100 names$"):
+        pf.Scene.from_file(path)
+
+
+@pytest.mark.parametrize("width", ['"0.02"', "[0.02]", "true"])
+def test_published_patches_check_their_width(tmp_path, width):
+    path = tmp_path / "scene.toml"
+    patch = f'{{ shape = "published", name = "Circle", width = {width} }}'
+    contact = f"[[contact]]\nnormal_force = 1.0\nlaw = {{}}\npatch = {patch}\n"
+    path.write_text(f"t_end = 0.1\n[body]\nmass = 1.0\ninertia = 1.0\n{contact}")
+    with pytest.raises(pf.FrictionError, match=r"\[contact\.patch\]: width must be a number"):
+        pf.Scene.from_file(path)

@@ -23,7 +23,7 @@ def square(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
 
 def circle(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return a uniform disc, as the published mask on a grid `width` [m] wide."""
-    return ContactPatch.disc_published(width / 2, cells, name="Circle")
+    return ContactPatch.disc_published(validation.positive("width", width) / 2, cells, name="Circle")
 
 
 def line(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -28,6 +29,11 @@ from planarfriction.writing import write_text
 SCENE_KEYS = (
     "name", "t_end", "save_every", "stop_speed", "rtol", "atol", "start", "body", "force", "velocity", "contact"
 )  # fmt: skip
+_MOST_NAMES = 100
+"""Names of a dotted key that are read: the time of the reader grows with their square."""
+
+_LONG_KEY = re.compile(rf"""(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{_MOST_NAMES}}}""")
+
 _OPTIONS = ("save_every", "stop_speed", "rtol", "atol", "name", "start")
 BODY_KEYS = ("mass", "inertia", "position", "angle", "velocity", "gravity", "outline", "size")
 CONTACT_KEYS = (
@@ -142,6 +148,8 @@ def read_table(path: Path) -> dict[str, Any]:
         missing = "" if os.path.exists(path) else ", and there is no such file"
         raise FileError(f"{path}: a scene file ends in .toml or .json{missing}")
     text = read_text(path, "a scene file")
+    if kind == ".toml" and _LONG_KEY.search(text):
+        raise FileError(f"{path}: not valid TOML: a key of more than {_MOST_NAMES} names")
     try:
         return tomllib.loads(text) if kind == ".toml" else json.loads(text, object_pairs_hook=_table)
     except (ValueError, RecursionError) as error:  # ValueError: also a number of more digits than Python converts
