@@ -27,6 +27,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LARGEST
 from planarfriction.kernels import coupling as kernels
 from planarfriction.kernels.coupling_rows import Patches, layout
+from planarfriction.kernels.following import Followers
 from planarfriction.kernels.steps import WORDS
 from planarfriction.models import FrictionModel
 
@@ -41,8 +42,8 @@ PASSES = 10
 _WORTH_A_THREAD = 200
 """Patches below which starting a thread costs more than it saves."""
 
-_INPUTS = ("state", "dt", "twist", "normal_force", "wrench", "twist_response", "load_response")
-_PLACES = ("state", "dt", "free_twist", "free_load", "guess", "response", "load_response")
+_INPUTS = ("state", "dt", "twist", "normal_force", "wrench", "twist_response", "load_response", "moments")
+_PLACES = ("state", "dt", "free_twist", "free_load", "guess", "response", "load_response", "moments")
 
 
 @by_parts
@@ -63,6 +64,9 @@ class HostStep(NamedTuple):
     """d twist / d wrench, `[..., 3k, 3k]`: for rigid bodies `dt J M^-1 J'`; `W.twist_response W >= 0`."""
     load_response: Any = None
     """d normal_force / d wrench, `[..., k, 3k]`; None if the loads do not depend on the wrenches."""
+    moments: Any = None
+    """Moments (m_x, m_y) of the normal forces for the guess, about the patches' origins, `[..., k, 2]` [N m]: pressures
+    follow them (see `ContactPatch.weights`) and are held for the step; None if they do not follow."""
 
 
 @by_parts
@@ -153,8 +157,11 @@ class CoupledPatches(ByValue):
         tolerance = validation.positive("tolerance", tolerance)
         iterations = validation.count("iterations", iterations, 0)
         given = dict(zip(_INPUTS, (state, dt, *host), strict=True))
-        if host.load_response is None:
-            del given["load_response"]
+        for name in ("load_response", "moments"):
+            if given[name] is None:
+                del given[name]
+        if host.moments is not None:
+            self.check_follows()
         arrays = {name: validation.numbers(name, value) for name, value in given.items()}
         problems, batch = self._problems(arrays)
         parts = self._parts
@@ -172,7 +179,7 @@ class CoupledPatches(ByValue):
         k, n = len(self.models), 3 * len(self.models)
         inner = {
             "state": self.state_shape, "dt": (), "twist": (k, 3), "normal_force": (k,), "wrench": (k, 3),
-            "twist_response": (n, n), "load_response": (k, n),
+            "twist_response": (n, n), "load_response": (k, n), "moments": (k, 2),
         }  # fmt: skip
         axes = {}
         for name, array in arrays.items():
@@ -196,7 +203,15 @@ class CoupledPatches(ByValue):
         for name, place in zip(_INPUTS, _PLACES, strict=True):
             if name in arrays:
                 problems[..., self._parts[place]] = arrays[name].reshape(*axes[name], -1)
+        problems[..., self._parts["follows"]] = float("moments" in arrays)
         return problems.reshape(count, words), batch
+
+    def check_follows(self, patches: Sequence[int] | None = None) -> None:
+        """Raise InvalidValueError for `patches`, all if None, whose pressure cannot follow moments."""
+        for p in range(len(self.models)) if patches is None else patches:
+            if self._packed.counts[p] == 0:
+                rule = "be None: parts of a patch that change with the load cannot follow it"
+                raise InvalidValueError("moments", rule, f"model {p}: {type(self.models[p]).__name__}")
 
     def _solve(self, problems: np.ndarray) -> np.ndarray:
         """Solve all problems; the iterations that each took, negative for invalid ones."""
@@ -250,11 +265,15 @@ class CoupledPatches(ByValue):
         step = CoupledStep(new, wrench, twist, load, counts.reshape(batch), residual, converged > 0.0)
         return step if len(problems) == 1 else CoupledStep(*map(np.ascontiguousarray, step))
 
-    def _blank_problem(self) -> np.ndarray:
-        """Return the row of a problem without inputs, for compiled hosts, with patches of fixed shape."""
+    def _blank_problem(self, follows: Sequence[bool]) -> np.ndarray:
+        """Return the row of a problem without inputs, for compiled hosts, with patches of fixed shape.
+
+        The host gives the moments of those whose pressure `follows` them.
+        """
+        self.check_follows([p for p, follow in enumerate(follows) if follow])
         row, parts = np.zeros((1, self._packed.words)), self._parts
         row.view(np.int64)[:, parts["records"]], row[:, parts["shares"]] = self._packed.records, self._packed.shares
-        row[:, parts["tolerance"]], row[:, parts["most"]] = TOLERANCE, ITERATIONS
+        row[:, parts["tolerance"]], row[:, parts["most"]], row[:, parts["follows"]] = TOLERANCE, ITERATIONS, follows
         return row
 
     # ------------------------------------------------------------------ what is packed once
@@ -291,6 +310,8 @@ class _PackedPatches(NamedTuple):
     """`[pieces]`"""
     following: list[tuple[int, slice]]
     """Patches whose pieces follow their loads, and these pieces."""
+    counts: np.ndarray
+    """Points of each patch that share its load; 0 of one that cannot follow moments, `[k]`."""
     kept: list[Any]
     """Objects behind the addresses, which have to be kept alive."""
 
@@ -312,7 +333,8 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
         records[own], shares[own] = steps.addresses[0], steps.shares[0]
     # all cells, whatever load they carry: a lever arm that does not follow the load
     radius = np.array([np.sqrt((model.patch.positions**2).sum(1).mean()) for model in models])
-    rows = layout(len(models), ends[-1], int(bounds[-1]))
+    followers = _followers(models, np.array(ends[:-1]))
+    rows = layout(len(models), ends[-1], int(bounds[-1]), len(followers.x), int(followers.words.sum()))
     patches = Patches(
         count=len(models),
         pieces=ends[-1],
@@ -322,10 +344,24 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
         owners=owners,
         firsts=firsts,
         radius=radius,
+        followers=followers,
         row=rows.offsets,
     )
-    kept = [functions, owners, firsts, radius, *known.values()]
-    return _PackedPatches(row_of(patches), rows.slices, rows.size, records, shares, following, kept)
+    kept, counts = [functions, owners, firsts, radius, *followers, *known.values()], np.diff(followers.firsts)
+    return _PackedPatches(row_of(patches), rows.slices, rows.size, records, shares, following, counts, kept)
+
+
+def _followers(models: Sequence[FrictionModel], pieces: np.ndarray) -> Followers:
+    """Return the points of the patches, of which `pieces` are the first pieces."""
+    places, words = zip(*(model.compiled.points() for model in models), strict=True)
+    x, y = (np.ascontiguousarray(each) for each in np.concatenate(places).T)
+    firsts = np.cumsum([0, *map(len, places)])
+    return Followers(x, y, firsts, np.array(words, np.int64), pieces.astype(np.int64))
+
+
+def follows(model: FrictionModel) -> bool:
+    """Return True if the pressure of a patch with this model can follow moments."""
+    return len(model.compiled.points()[0]) > 0
 
 
 def _refuse(arrays: dict[str, np.ndarray]) -> None:

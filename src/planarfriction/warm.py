@@ -102,12 +102,13 @@ def _step(model: Any) -> None:
     for method in (model.step, model.step_jacobians):
         method(state, twist, 1.0, 1e-4)
         method(state, np.tile(twist, (2, 1)), 1.0, 1e-4)
+        method(state, twist, 1.0, 1e-4, moments=(0.0, 0.0))
 
 
 def _couple(kinds: list[Any]) -> None:
     patches = coupling.CoupledPatches(kinds)
     k = len(kinds)
-    host = coupling.HostStep(np.ones((k, 3)), np.ones(k), np.zeros((k, 3)), np.eye(3 * k))
+    host = coupling.HostStep(np.ones((k, 3)), np.ones(k), np.zeros((k, 3)), np.eye(3 * k), moments=np.zeros((k, 2)))
     patches.step(patches.rest(), host, 1e-4)
 
 

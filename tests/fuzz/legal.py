@@ -110,7 +110,8 @@ def objects() -> dict[str, Any]:
         "twist": TWISTS[9], "wrench": np.array([0.5, 0.1, 0.001]), "state": Fresh(lambda: np.zeros(3)),
         "about": (0.0, 0.0), "options": pf.scenes.SolverOptions(rtol=1e-4, atol=1e-3),
         "wrenches_bar": np.ones((20, 3)), "state_bar": np.zeros(3), "metric": np.eye(2) * 0.25, "asymmetry": (0.1, 0.0),
-        "motion": TWISTS, "pose": pose, "breaks": [0.0, 0.1, 0.2], "noise": (1e-3, 1e-3, 0.02), "window": 7,
+        "moments": (1e-3, -2e-3), "motion": TWISTS, "pose": pose, "breaks": [0.0, 0.1, 0.2],
+        "noise": (1e-3, 1e-3, 0.02), "window": 7,
         "velocity_weight": 1.0, "kept": np.array([True, False, True]), "coefficients": None,
         # choices and texts
         "hold": "previous", "name": "name", "mounted_on": "world", "at": "origin", "bristles": "none",

@@ -17,6 +17,7 @@ import numpy as np
 from planarfriction.compiled.packed import PackedModel, PackedParts
 from planarfriction.compiled.rates import rates
 from planarfriction.equality import by_parts
+from planarfriction.geometry import twist_at, wrench_at
 from planarfriction.kernels.steps import UNFIT, StepFunctions, jacobians, ready, step_many, step_one
 
 _ARRAY, _FLOAT, _EMPTY, _MAKE = np.ndarray, np.dtype(float), np.empty, np.array
@@ -44,6 +45,16 @@ class StepJacobians(NamedTuple):
     """d wrench / d twist, `[..., 3, 3]`; an implicit simulator adds this, times `dt`, to its mass matrix."""
     wrench_load: np.ndarray
     """d wrench / d normal_force, `[..., 3]`."""
+
+
+def _seen(twist: np.ndarray, moved: np.ndarray | None) -> np.ndarray:
+    """Return the twists that parts see which have moved, in C order."""
+    return twist if moved is None else np.ascontiguousarray(twist_at(twist, moved))
+
+
+def _pull(wrench: np.ndarray, moved: np.ndarray | None) -> np.ndarray:
+    """Return their wrenches about the origin."""
+    return wrench if moved is None else wrench_at(wrench, -moved)
 
 
 class CompiledModel:
@@ -81,6 +92,30 @@ class CompiledModel:
         """Yield rows of the flat batch, and the model at the load of each of them or at the one load of all of them.
 
         Rows without load may be left out; their results are zero.
+        """
+        raise NotImplementedError
+
+    def pressed(
+        self, load: np.ndarray, centre: np.ndarray | None
+    ) -> Iterator[tuple[Any, PackedParts, np.ndarray | None]]:
+        """Yield what `at_each_load` does with pressures about the centres `[..., 2]` [m], and how far parts have moved.
+
+        Those move `[rows, 2]` [m] whose pressure does not follow further; None if none does.
+        """
+        if centre is None:
+            for rows, contact in self.at_each_load(load):
+                yield rows, contact, None
+            return
+        yield from self._following(load, centre.reshape(-1, 2))
+
+    def _following(self, load: np.ndarray, centre: np.ndarray) -> Iterator[tuple[Any, PackedParts, np.ndarray | None]]:
+        raise NotImplementedError
+
+    def points(self) -> tuple[np.ndarray, int]:
+        """Return the cells, or else the parts, that share the load, `[n, 2]` [m], and the words of the record of cells.
+
+        The last of these is the address of their weights; there are none for parts. Parts that change with the load
+        cannot follow its moments in `coupling`: no points.
         """
         raise NotImplementedError
 
@@ -186,37 +221,66 @@ class CompiledModel:
 
     # ------------------------------------------------------------------ batches, load by load
 
-    def evaluate(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the rates of the states, and wrenches per unit load `[..., 3]`."""
+    def evaluate(
+        self, state: np.ndarray, twist: np.ndarray, load: np.ndarray, centre: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the rates of the states, and wrenches per unit load `[..., 3]`; `centre` as in `pressed`."""
         z, v = state.reshape(-1, self._size), twist.reshape(-1, 3)
         rate, unit = np.zeros(z.shape), np.zeros(v.shape)
-        for rows, contact in self.at_each_load(load):
-            rate[rows], unit[rows] = rates(contact.joined, z[rows], v[rows])
+        for rows, contact, moved in self.pressed(load, centre):
+            rate[rows], pull = rates(contact.joined, z[rows], _seen(v[rows], moved))
+            unit[rows] = _pull(pull, moved)
         return rate.reshape(state.shape), unit.reshape(twist.shape)
 
     def step(
-        self, state: np.ndarray, twist: np.ndarray, load: np.ndarray, dt: np.ndarray
+        self,
+        state: np.ndarray,
+        twist: np.ndarray,
+        load: np.ndarray,
+        dt: np.ndarray,
+        centre: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return new states and wrenches `[..., 3]`."""
+        """Return new states and wrenches `[..., 3]`; `centre` as in `pressed`."""
         z, v, f, h = state.reshape(-1, self._size), twist.reshape(-1, 3), load.reshape(-1), dt.reshape(-1)
         new, wrench = np.zeros(z.shape), np.zeros(v.shape)
-        for rows, contact in self.at_each_load(load):
+        for rows, contact, moved in self.pressed(load, centre):
             end, pull = np.empty_like(z[rows]), np.empty_like(v[rows])
-            table = self.step_table(contact)
-            ready(step_many)(table, z[rows], v[rows], f[rows], h[rows], end, pull, np.empty(3))
-            new[rows], wrench[rows] = end, pull
+            table, seen = self.step_table(contact), _seen(v[rows], moved)
+            ready(step_many)(table, z[rows], seen, f[rows], h[rows], end, pull, np.empty(3))
+            new[rows], wrench[rows] = end, _pull(pull, moved)
         return new.reshape(state.shape), wrench.reshape(twist.shape)
 
-    def step_jacobians(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray, dt: np.ndarray) -> StepJacobians:
-        """Differentiate steps."""
+    def step_jacobians(
+        self,
+        state: np.ndarray,
+        twist: np.ndarray,
+        load: np.ndarray,
+        dt: np.ndarray,
+        centre: np.ndarray | None = None,
+    ) -> StepJacobians:
+        """Differentiate steps, with the pressure held; `centre` as in `pressed`."""
         given = np.concatenate([twist, load[..., None], dt[..., None]], axis=-1).reshape(load.size, 5)
         z, found = state.reshape(-1, self._size), np.zeros((load.size, self._per_contact))
-        for rows, contact in self.at_each_load(load):
+        for rows, contact, moved in self.pressed(load, centre):
             held = given[rows]
+            held[:, :3] = _seen(held[:, :3], moved)
             result = np.empty(len(held) * self._per_contact + self._scratch)
             ready(jacobians)(self._jacobian_table(contact), z[rows].ravel(), held.ravel(), result)
             found[rows] = result[: -self._scratch].reshape(len(held), self._per_contact)
+            if moved is not None:
+                self._move(found, rows, moved)
         return StepJacobians(*(found[:, place].reshape(*load.shape, *shape) for place, shape in self._derivatives))
+
+    def _move(self, found: np.ndarray, rows: Any, moved: np.ndarray) -> None:
+        """Bring the derivatives of parts that have moved to the twist and the wrench about the origin, in place."""
+        at = np.tile(np.eye(3), (len(moved), 1, 1))
+        at[:, 0, 2], at[:, 1, 2] = -moved[:, 1], moved[:, 0]
+        back, (_, state_twist, wrench_state, wrench_twist, wrench_load) = at.mT, (p for p, _ in self._derivatives)
+        for place, left, right in ((state_twist, None, at), (wrench_state, back, None), (wrench_twist, back, at)):
+            block = found[rows, place].reshape(len(moved), *((-1, 3) if left is None else (3, -1)))
+            block = block if right is None else block @ right
+            found[rows, place] = (block if left is None else left @ block).reshape(len(moved), -1)
+        found[rows, wrench_load] = (back @ found[rows, wrench_load][..., None])[..., 0]
 
     # ------------------------------------------------------------------ for the loops of others
 

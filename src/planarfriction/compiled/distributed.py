@@ -13,13 +13,14 @@ from planarfriction.compiled.base import CompiledModel
 from planarfriction.compiled.packed import PackedModel, PackedParts
 from planarfriction.compiled.rates import linearised
 from planarfriction.compiled.shapes_by_load import ShapesByLoad, cells_by_load
-from planarfriction.compiler.memory import places_of, rows_of
+from planarfriction.compiler.memory import places_of, rows_of, size_of
 from planarfriction.kernels import cells as contacts
 from planarfriction.kernels import distributed_step as steps
 from planarfriction.kernels.contacts import ModelFunctions
 from planarfriction.kernels.general_cells import ROWS_OF_A_CELL
 from planarfriction.kernels.leaning_cells import RATES_OF_LEANING, STEPS_OF_LEANING
 from planarfriction.kernels.steps import StepFunctions
+from planarfriction.patch.tilt import tilted
 
 LOAD_STEP = 1e-5
 """Step of the central differences of weights by the load, as a share of it [-]; their relative error is 1e-10."""
@@ -55,6 +56,14 @@ class CompiledDistributed(CompiledModel):
     def at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, PackedParts]]:
         """See `CompiledModel`; all rows at once, each with its own weights."""
         yield slice(None), self.fixed or _alone(self._packed(self.patch.weights(load.reshape(-1))))
+
+    def points(self) -> tuple[np.ndarray, int]:
+        """See `CompiledModel`."""
+        return self.patch.positions, size_of(type(self._record(np.zeros((2, 1)), np.zeros(1))[0]))
+
+    def _following(self, load: np.ndarray, centre: np.ndarray) -> Iterator[tuple[Any, PackedParts, np.ndarray | None]]:
+        weights = tilted(self.patch.positions, self.patch.weights(load.reshape(-1)), centre)
+        yield slice(None), _alone(self._packed(weights)), None
 
     def linearisation(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
         """Return linearisations `[..., L, N]` as `kernels.cells.LinearCells`, or those of `kernels.general_cells`."""

@@ -15,6 +15,7 @@ from planarfriction.compiled.packed import PackedModel, PackedParts
 from planarfriction.compiled.rates import linearised
 from planarfriction.compiled.shapes_by_load import Part, ShapesByLoad, shapes_by_load
 from planarfriction.kernels.steps import StepFunctions
+from planarfriction.patch.tilt import tilted
 
 
 class Kind(NamedTuple):
@@ -44,6 +45,16 @@ class Shapes(Protocol):
     def arrays(self, shape: Any) -> tuple[np.ndarray, ...]:
         """Return the large arrays of a shape."""
         ...
+
+
+def places_of_parts(parts: Sequence[Part]) -> np.ndarray:
+    """Return the centre of pressure of each part, `[P, 2]` [m]."""
+    places = []
+    for part in parts:
+        lever = part.shape.lever  # its first two rows: the velocity at the centre, in the axes of the friction metric
+        y, x = np.linalg.solve(lever[:2, :2], lever[:2, 2])
+        places.append((x, -y))
+    return np.reshape(places, (-1, 2))
 
 
 class CompiledThreeStates(CompiledModel):
@@ -81,6 +92,20 @@ class CompiledThreeStates(CompiledModel):
         """See `CompiledModel`."""
         for rows, parts in self.parts_at_each_load(load):
             yield rows, self._at(parts)
+
+    def points(self) -> tuple[np.ndarray, int]:
+        """See `CompiledModel`."""
+        parts = () if self.shapes.depends_on_load else next(iter(self.shapes.at([None])))
+        return places_of_parts(parts), 0
+
+    def _following(self, load: np.ndarray, centre: np.ndarray) -> Iterator[tuple[Any, PackedParts, np.ndarray | None]]:
+        """Shift load among the parts, as if they were cells, and move them where that does not reach the centre."""
+        for rows, parts in self.parts_at_each_load(load):
+            asked, contact, places = centre[rows], self._at(parts), places_of_parts(parts)
+            shares = np.tile([part.share for part in parts], (len(asked), 1))
+            shares = tilted(places, shares, asked)
+            own = [part._replace(records=np.repeat(part.records, len(asked), axis=0)) for part in contact.parts]
+            yield rows, PackedParts(own, shares), asked - shares @ places
 
     def linearisation(self, parts: tuple[Part, ...], state: np.ndarray, twist: np.ndarray) -> np.ndarray:
         """Return linearisations of the parts `[B, P, L]` at flat states and twists (see the kernels of the model)."""

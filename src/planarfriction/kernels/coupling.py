@@ -23,6 +23,7 @@ from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import address_of, call, pointer
 from planarfriction.compiler.memory import arrays_at, at, doubles
 from planarfriction.kernels.coupling_rows import INVALID, read
+from planarfriction.kernels.following import follow
 from planarfriction.kernels.small_matrices import leave_out_rising, solved
 
 DOWNHILL = 0.5
@@ -48,6 +49,17 @@ def _applied(m, i, n, x, start):
 
 
 @kernel
+def _bring_back(step, dx, dy):
+    """Bring the wrench of a patch that has moved, and its slopes, to the twist and the wrench about the origin."""
+    for i in range(3):  # slopes by the spin: it moves the patch
+        row = at(step, 3 + 3 * i)
+        row[2] += dx * row[1] - dy * row[0]
+    step[2] += dx * step[1] - dy * step[0]
+    for j in range(3):
+        step[9 + j] += dx * step[6 + j] - dy * step[3 + j]
+
+
+@kernel
 def step_all(own, p):
     """Step all pieces at the twists of a problem: write the new state, and wrenches with their slopes per unit load."""
     for i in range(3 * own.count):
@@ -55,10 +67,15 @@ def step_all(own, p):
     for i in range(9 * own.count):
         p.unit_slopes[i] = 0.0
     for c in range(own.pieces):
-        k, first, record, share = own.owners[c], own.firsts[c], p.records[c], p.shares[c]
+        k, first, record, share = own.owners[c], own.firsts[c], p.acting[c], p.acting_shares[c]
         if record == 0:
             continue
-        call(own.functions[c], (record, at(p.state, first), at(p.twist, 3 * k), p.dt[0], at(p.new, first), p.step))
+        seen, dx, dy = p.seen, p.moved[2 * k], p.moved[2 * k + 1]
+        spin = p.twist[3 * k + 2]
+        seen[0], seen[1], seen[2] = p.twist[3 * k] - spin * dy, p.twist[3 * k + 1] + spin * dx, spin
+        call(own.functions[c], (record, at(p.state, first), seen, p.dt[0], at(p.new, first), p.step))
+        if dx != 0.0 or dy != 0.0:
+            _bring_back(p.step, dx, dy)
         for i in range(3):
             p.unit[3 * k + i] += share * p.step[i]
         for i in range(9):
@@ -231,6 +248,7 @@ def solve(patches, problem):
     p.iterations[0], p.residual[0] = INVALID, math.inf
     if not _valid(own, p, doubles(problem)):
         return
+    follow(own, p, problem)
     tolerance = xp.maximum(p.tolerance[0], ROUNDING * _prepare(own, p))
     misfit, rest = _start(own, p, tolerance)
     best, iterations = math.inf, 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from planarfriction.compiler.memory import Doubles, Integers, Layout, offsets_of, reader
+from planarfriction.kernels.following import Followers
 from planarfriction.kernels.steps import SLOPES
 
 
@@ -27,6 +28,10 @@ class Problem(NamedTuple):
     """N_0, [k]."""
     guess: Doubles
     """W_0, [3k]."""
+    moments: Doubles
+    """Moments of the normal forces at W_0, about the patches' origins, [2k] (see `following`)."""
+    follows: Doubles
+    """1 of patches whose pressure follows these, -1 of those that keep that of the last solution, else 0, [k]."""
     state: Doubles
     """State at the start of the step."""
     records: Integers
@@ -75,8 +80,20 @@ class Problem(NamedTuple):
     """Matrix of the Newton step, [3k, 3k]."""
     step: Doubles
     """Result of a piece's step (see `steps.StepFunctions`)."""
+    seen: Doubles
+    """Twist that a piece sees, [3]."""
     turned: Doubles
     """Scratch of `leave_out_rising`, [2, 9]."""
+    acting: Integers
+    """Addresses of the records that act in this step, [pieces]."""
+    acting_shares: Doubles
+    """Shares of the pieces that act in this step, [pieces]."""
+    moved: Doubles
+    """Displacements of patches whose pressure cannot follow any further otherwise, [2k]."""
+    weights: Doubles
+    """Weights of the points of all patches that can follow."""
+    copies: Integers
+    """Records of the patches among these whose points are cells."""
 
 
 Offsets = offsets_of(Problem)
@@ -86,15 +103,17 @@ INVALID = -1.0
 """Stands in place of a number of iterations."""
 
 
-def layout(patches: int, pieces: int, states: int) -> Layout:
-    """Return the layout of rows for k patches."""
+def layout(patches: int, pieces: int, states: int, points: int, copies: int) -> Layout:
+    """Return the layout of rows for k patches, of so many `points` to share loads, and words of records to copy."""
     k, n = patches, 3 * patches
     shapes = dict.fromkeys(Problem._fields, n)
     shapes |= dict.fromkeys(("dt", "tolerance", "most", "iterations", "residual", "converged"), 1)
-    shapes |= dict.fromkeys(("free_load", "load", "load_0", "best_load"), k)
-    shapes |= dict.fromkeys(("state", "new"), states) | dict.fromkeys(("records", "shares"), pieces)
+    shapes |= dict.fromkeys(("free_load", "load", "load_0", "best_load", "follows"), k)
+    shapes |= dict.fromkeys(("moments", "moved"), 2 * k) | {"weights": points, "copies": copies}
+    shapes |= dict.fromkeys(("records", "shares", "acting", "acting_shares"), pieces)
+    shapes |= dict.fromkeys(("state", "new"), states)
     shapes |= dict.fromkeys(("unit_slopes", "slopes"), 9 * k) | dict.fromkeys(("response", "matrix"), n * n)
-    return Layout(Problem, **shapes | {"load_response": k * n, "step": SLOPES, "turned": 18})
+    return Layout(Problem, **shapes | {"load_response": k * n, "step": SLOPES, "turned": 18, "seen": 3})
 
 
 class Patches(NamedTuple):
@@ -116,6 +135,7 @@ class Patches(NamedTuple):
     """First state of each piece, [pieces]."""
     radius: Doubles
     """Lever arms of the patches that turn spins into speeds [m], [k]."""
+    followers: Followers
     row: Offsets
 
 

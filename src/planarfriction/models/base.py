@@ -18,6 +18,7 @@ from planarfriction.equality import ByValue, by_parts, unusual
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
 from planarfriction.patch import ContactPatch
+from planarfriction.patch.tilt import centre_of, moments_of
 
 
 @by_parts
@@ -103,44 +104,58 @@ class FrictionModel(ByValue):
 
     # ------------------------------------------------------------------ equations
 
-    def rate(self, state: Any, twist: Any, normal_force: Any) -> np.ndarray:
+    def rate(self, state: Any, twist: Any, normal_force: Any, *, moments: Any = None) -> np.ndarray:
         """Return the rates of the state, shape `[..., *state_shape]`, in its units per second.
 
-        Raises InvalidValueError as `step` does.
+        `moments` as in `step`. Raises InvalidValueError as `step` does.
         """
-        return self.compiled.evaluate(*self._inputs(state, twist, normal_force))[0]
+        return self._evaluated(state, twist, normal_force, moments)[0]
 
-    def wrench(self, state: Any, twist: Any, normal_force: Any) -> np.ndarray:
+    def wrench(self, state: Any, twist: Any, normal_force: Any, *, moments: Any = None) -> np.ndarray:
         """Return the friction wrench on the moving body, shape `[..., 3]` [N, N, N m].
 
-        Raises InvalidValueError as `step` does.
+        `moments` as in `step`. Raises InvalidValueError as `step` does.
         """
-        state, twist, load = self._inputs(state, twist, normal_force)
-        return load[..., None] * self.compiled.evaluate(state, twist, load)[1]
+        return self._evaluated(state, twist, normal_force, moments)[1]
 
-    def step(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.ndarray]:
+    def _evaluated(self, state: Any, twist: Any, normal_force: Any, moments: Any) -> tuple[np.ndarray, np.ndarray]:
+        state, twist, load, centre = self._inputs(state, twist, normal_force, moments)
+        rate, unit = self.compiled.evaluate(state, twist, load, centre)
+        return rate, load[..., None] * unit
+
+    def step(
+        self, state: Any, twist: Any, normal_force: Any, dt: Any, *, moments: Any = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Advance by `dt` [s] at a held twist; return the new state and the wrench at the end. Stable at any `dt`.
 
         Plain LuGre is linear in z, and its step is exact. Elasto-plastic bristles use an exponential step with the mean
         of the decay at the start and at the predicted end: second order, and limited to the largest deflection so that
         nothing overshoots.
 
+        With `moments` `[..., 2]` [N m] of the normal forces about the origin, on the moving body, the pressure follows
+        them (see `ContactPatch.weights`); bristles keep their deflections. Reduced models of parts shift load among
+        these, as if they were cells, and move them as far as that does not reach the centre of pressure.
+
         Raises InvalidValueError for shapes that do not fit, numbers that are not finite, and a load or time below zero.
         """
         compiled = self.compiled
+        if moments is not None:
+            return compiled.step(*self._inputs(state, twist, normal_force, moments, dt=dt))
         return (
             compiled.step_one(state, twist, normal_force, dt)
             or compiled.step_batch(state, twist, normal_force, dt)
             or compiled.step(*self._inputs(state, twist, normal_force, dt=dt))
         )
 
-    def step_jacobians(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> StepJacobians:
+    def step_jacobians(self, state: Any, twist: Any, normal_force: Any, dt: Any, moments: Any = None) -> StepJacobians:
         """Return the analytic derivatives of `step` (see `StepJacobians`); one-sided at kinks.
+
+        With `moments` those at the pressure that they cause, which is held.
 
         Raises InvalidValueError as `step` does.
         """
-        done = self.compiled.jacobians_one(state, twist, normal_force, dt)
-        return done or self.compiled.step_jacobians(*self._inputs(state, twist, normal_force, dt=dt))
+        done = None if moments is not None else self.compiled.jacobians_one(state, twist, normal_force, dt)
+        return done or self.compiled.step_jacobians(*self._inputs(state, twist, normal_force, moments, dt=dt))
 
     # ------------------------------------------------------------------ machine form
 
@@ -184,11 +199,14 @@ class FrictionModel(ByValue):
 
     # ------------------------------------------------------------------ inputs
 
-    def _inputs(self, state: ArrayLike, twist: ArrayLike, normal_force: ArrayLike, **more) -> list[np.ndarray]:
-        """Check the inputs and broadcast their batch axes against each other.
+    def _inputs(
+        self, state: ArrayLike, twist: ArrayLike, normal_force: ArrayLike, moments: Any = None, **more
+    ) -> list[Any]:
+        """Check the inputs and broadcast their batch axes against each other; last, the centre of pressure, or None.
 
         All come out in C order and writable: compiled loops know no other arrays, and sums run the same way.
         """
+        held = None if moments is None else moments_of(moments)
         state, twist = validation.numbers("state", state), validation.numbers("twist", twist)
         inner = self.state_shape
         if state.shape[state.ndim - len(inner) :] != inner:
@@ -199,6 +217,7 @@ class FrictionModel(ByValue):
         scalars = {"normal_force": normal_force, **more}
         arrays = {name: validation.numbers(name, value) for name, value in scalars.items()}
         batches = {state.shape[: state.ndim - len(inner)], twist.shape[:-1], *(v.shape for v in arrays.values())}
+        batches |= set() if held is None else {held.shape[:-1]}
         try:
             batch = batches.pop() if len(batches) == 1 else np.broadcast_shapes(*batches)
         except ValueError:
@@ -213,10 +232,11 @@ class FrictionModel(ByValue):
                 raise InvalidValueError(name, "be >= 0", float(value.min()))
         wanted = [batch + inner, (*batch, 3), *(batch for _ in arrays)]
         given = [state, twist, *arrays.values()]
-        return [
+        inputs: list[Any] = [
             a if a.shape == shape and a.flags.carray else np.broadcast_to(a, shape).copy()
             for a, shape in zip(given, wanted, strict=True)
         ]
+        return [*inputs, None if held is None else centre_of(np.broadcast_to(held, (*batch, 2)), inputs[2])]
 
 
 def _named(law: FrictionLaw) -> str:

@@ -51,7 +51,7 @@ class DistributedModel(FrictionModel):
 
         Raises InvalidValueError as `step` does.
         """
-        state, twist, load = self._inputs(state, twist, normal_force)
+        state, twist, load, _ = self._inputs(state, twist, normal_force)
         lever, share = self.compiled.lever, (load[..., None] * self.patch.weights(load))[..., None, None, :]
         rate_state, rate_velocity, pull_state, pull_velocity = self.compiled.slopes(state, twist, load)
         return ModelJacobians(

@@ -54,7 +54,7 @@ class ThreeStateModel(FrictionModel):
         With a part's rate f and `W = -G' (sigma_0 z + sigma_1 f + sigma_2 H V)`: `dW/dz = -G' (sigma_0 + sigma_1
         df/dz)`, `dW/dV = -G' (sigma_1 df/dV + sigma_2 H)`.
         """
-        state, twist, load = self._inputs(state, twist, normal_force)
+        state, twist, load, _ = self._inputs(state, twist, normal_force)
         law, inner, count, parts = self.law.numbers, self.state_shape, load.size, self.compiled.parts
         z, v, f = state.reshape(count, 3 * parts), twist.reshape(count, 3), load.reshape(count)
         rate_state, rate_twist = np.zeros((count, parts, 3, 3)), np.zeros((count, parts, 3, 3))

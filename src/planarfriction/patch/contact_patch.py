@@ -27,6 +27,7 @@ from planarfriction.patch.pressure import (
     pressure_array,
 )
 from planarfriction.patch.pressure_maps import read_maps
+from planarfriction.patch.tilt import weights_under
 from planarfriction.pictures import picture
 
 _UNIT_BOX = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
@@ -314,11 +315,17 @@ class ContactPatch(Moments):
         """True if the weights change with the normal force."""
         return self.pressure.depends_on_load
 
-    def weights(self, normal_force: ArrayLike | None = None) -> np.ndarray:
+    def weights(self, normal_force: ArrayLike | None = None, moments: ArrayLike | None = None) -> np.ndarray:
         """Return the share of the normal force on each cell, `w_i = p_i a_i / sum(p a)`, shape `[..., N]` [-].
+
+        With `moments` `[..., 2]` [N m] of the normal forces `N_i` on the moving body about the origin, `(m_x, m_y) =
+        (sum(y N), -sum(x N))`, the pressure follows them: `w_i max(0, c + a x_i + b y_i)`, whose centre is `(-m_y, m_x)
+        / f_N`. A centre beyond all cells comes to the nearest point of their convex hull, so that an edge carries all.
 
         Raises InvalidValueError without a load that is needed.
         """
+        if moments is not None:
+            return weights_under(self, normal_force, moments)
         if normal_force is None:
             if self._fixed_weights is None:
                 raise InvalidValueError("normal_force", "be given: the shape of this patch depends on it", "None")

@@ -62,6 +62,16 @@ def _through(root, x, y):
     return (x, y) if root is None else (root[0, 0] * x + root[0, 1] * y, root[0, 1] * x + root[1, 1] * y)
 
 
+def centre(shape: PublishedNumbers) -> tuple[Any, Any]:
+    """Return the centre of pressure [m]."""
+    x, y = shape.centre_x[..., 0], shape.centre_y[..., 0]
+    if shape.root is None:
+        return x, y
+    (a, b), (_, d) = shape.root
+    one = a * d - b * b
+    return (a * x + b * y) / one, (b * x + d * y) / one
+
+
 def scale(xp, shape: PublishedNumbers):
     """Return `S = diag(1, 1, r)` as a vector `[..., 3]`: bristles are scaled by 1/S for a step, their rates by S."""
     one = xp.ones_like(shape.contact_radius)

@@ -105,6 +105,13 @@ def dot(a, b):
 # ---------------------------------------------------------------------- the map
 
 
+def centre(shape: ReducedNumbers) -> tuple[Any, Any]:
+    """Return the centre of pressure of a part [m], from its F."""
+    f = shape.factor
+    x = f[..., 1, 2] / f[..., 1, 1]
+    return x, (f[..., 0, 1] * x - f[..., 0, 2]) / f[..., 0, 0]
+
+
 def _spot(xp, direction, stretch, faces: int):
     """Return face, place on it and sign of the value there (see `kernels.cube.locate`) for unit vectors, `[...]`."""
     x, y, s = direction[..., 0], direction[..., 1], stretch * direction[..., 2]

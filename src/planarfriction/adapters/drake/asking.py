@@ -55,7 +55,9 @@ class Asking:
 
     def __init__(self, shadow: Shadow, coupled: CoupledPatches, size: int) -> None:
         k = len(coupled.models)
-        self._shadow, self._row, self._normals = shadow, CouplingRow(coupled, shadow.dt), np.zeros((k, 3))
+        self._shadow, self._row, self._normals = shadow, CouplingRow(coupled, shadow), np.zeros((k, 3))
+        self._moments = np.zeros((k, 2, 6))
+        """Maps of forces and their moments about the world's origin to the moments about the patches' origins."""
         self._touching, self._levers = [False] * k, np.ones(3 * k)
         self._levers[2::3] = [math.sqrt((model.patch.positions**2).sum(axis=1).mean()) for model in coupled.models]
         self._rows, self._moved = np.zeros((3 * k, size)), np.zeros((size, 3 * k))
@@ -77,15 +79,17 @@ class Asking:
         """
         row, passes, iterations, solved, misfit = self._row, 0, 0, False, np.inf
         self._forget()
+        np.copyto(row.follows, abs(row.follows))
         while True:
             velocity = self._shadow.step(applied + force)
             pushes = self._shadow.pushes(first=passes == 0)
             passes += 1
             if self._touch(pushes):
+                np.copyto(row.follows, abs(row.follows))
                 if passes == 1:
                     self._answer_as_before(answers)
                 wrench, owed, solved, misfit = self._pressed(wrench), self._pressed(owed), False, np.inf
-            twist, load = self._rows @ velocity + owed, np.maximum((self._normals * pushes) @ _ONES, 0.0)
+            twist, load = self._rows @ velocity + owed, np.maximum((self._normals * pushes[:, :3]) @ _ONES, 0.0)
             if solved:
                 off = twist - row.twist
                 last, misfit = misfit, self._speed(off, load - row.load)
@@ -97,7 +101,9 @@ class Asking:
                     self._learn(wrench - row.guess, twist - row.free_twist, load - row.free_load)
             turned = self._moved.T @ (wrench @ self._rows - force)  # the axes have, since the last step
             row.free_twist[:], row.free_load[:], row.guess[:], row.state[:] = twist + turned, load, wrench, bristles
+            row.moments[:] = np.einsum("kij,kj->ki", self._moments, pushes).ravel()
             iterations += row.solve()
+            np.copyto(row.follows, -abs(row.follows))  # pressures stay for the rest of the step
             change, wrench, solved = row.wrench - wrench, row.wrench.copy(), True
             force = wrench @ self._rows
             moved = self._speed(turned + row.response @ change)
@@ -117,9 +123,9 @@ class Asking:
         """Place patches that touch for the first time in this step; return True if there are any."""
         if all(self._touching):
             return False
-        new = [p for p, touching in enumerate(self._touching) if not touching and pushes[p] @ pushes[p] > 0.0]
+        new = [p for p, touching in enumerate(self._touching) if not touching and pushes[p, :3].any()]
         for p in new:
-            self._rows[3 * p : 3 * p + 3], self._normals[p] = self._shadow.rows(p, pushes[p])
+            self._rows[3 * p : 3 * p + 3], self._normals[p], self._moments[p] = self._shadow.rows(p, pushes[p, :3])
             self._touching[p] = True
         if new:
             self._moved = self._shadow.moved(self._rows)
@@ -171,11 +177,11 @@ class Asking:
 class CouplingRow(SimpleNamespace):
     """Arrays of a `kernels.coupling_rows.Problem`, solved in place: a step of Drake has no time for more."""
 
-    def __init__(self, coupled: CoupledPatches, dt: float) -> None:
-        words, k = coupled._blank_problem(), len(coupled.models)
+    def __init__(self, coupled: CoupledPatches, shadow: Shadow) -> None:
+        words, k = coupled._blank_problem(shadow.follows), len(coupled.models)
         super().__init__(**{name: words[0, place] for name, place in coupled._packed.parts.items()})
         self.response, self.load_response = self.response.reshape(3 * k, 3 * k), self.load_response.reshape(k, 3 * k)
-        self.dt[:] = dt
+        self.dt[:] = shadow.dt
         self._coupled, self._words = coupled, words
 
     def solve(self) -> int:
@@ -195,5 +201,6 @@ class CouplingRow(SimpleNamespace):
         """Let the public step say what is wrong."""
         k = len(self.free_load)
         twist, guess = self.free_twist.reshape(k, 3), self.guess.reshape(k, 3)
-        host = HostStep(twist, self.free_load, guess, self.response, self.load_response)
+        moments = self.moments.reshape(k, 2) if self.follows.any() else None
+        host = HostStep(twist, self.free_load, guess, self.response, self.load_response, moments)
         self._coupled.step(self.state, host, self.dt[0])

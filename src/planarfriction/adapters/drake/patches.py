@@ -8,16 +8,28 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pydrake.geometry import GeometryId, ProximityProperties, Role, RoleAssign
+from pydrake.geometry import (
+    Capsule,
+    Ellipsoid,
+    GeometryId,
+    ProximityProperties,
+    Role,
+    RoleAssign,
+    Sphere,
+)
 from pydrake.multibody.plant import CoulombFriction
 from pydrake.multibody.tree import BodyIndex, FrameIndex
 
 from planarfriction import validation
+from planarfriction.coupling import follows
 from planarfriction.equality import Checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.models import FrictionModel
 
-CENTRES = ("frame", "contact")
+CENTRES, PRESSURES = ("frame", "contact"), ("auto", "follows", "fixed")
+
+_ROUND = Sphere, Capsule, Ellipsoid
+"""Shapes that touch in points, not faces."""
 
 _MATERIAL = ("material", "coulomb_friction")
 
@@ -39,6 +51,9 @@ class PatchContact(Checked):
     """Names of the two collision geometries in contact, or of bodies, which stand for all their geometries."""
     centre: str = "frame"
     """Origin of the patch: that of the "frame", or the middle of Drake's points of "contact"."""
+    pressure: str = "auto"
+    """Pressure that "follows" the moments of the contact forces (see `ContactPatch.weights`), or is "fixed" to the
+    patch; "auto" is fixed if one side is a single sphere, capsule or ellipsoid."""
 
     def __post_init__(self) -> None:
         validation.instance("model", self.model, FrictionModel, "a friction model")
@@ -48,6 +63,7 @@ class PatchContact(Checked):
             raise InvalidValueError("geometries", "be the names of two geometries or bodies", self.geometries)
         self._set(geometries=tuple(validation.text("geometries", name) for name in self.geometries))
         validation.choice("centre", self.centre, CENTRES)
+        validation.choice("pressure", self.pressure, PRESSURES)
 
 
 class Placed:
@@ -66,7 +82,11 @@ class Placed:
         self.other = bodies[1 - own].body_frame()
         self.pairs = {(a.get_value(), b.get_value()) for a, b in itertools.product(sides[own], sides[1 - own])}
         """Pairs of ids of geometries, the owner's first."""
-        self._check_friction(scene_graph.model_inspector(), sides)
+        inspector = scene_graph.model_inspector()
+        self._check_friction(inspector, sides)
+        faces = not any(len(side) == 1 and isinstance(inspector.GetShape(side[0]), _ROUND) for side in sides)
+        self.follows = patch.pressure == "follows" or (patch.pressure == "auto" and faces and follows(patch.model))
+        """True if the pressure follows the contact forces."""
 
     def _check_friction(self, inspector: Any, sides: list[list[GeometryId]]) -> None:
         """Refuse pairs with friction of their own, and those that never touch."""

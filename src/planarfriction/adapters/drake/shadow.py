@@ -41,7 +41,7 @@ class Shadow:
         self._damping = self.dt * _damping(self.plant)
         self._frames = [self.plant.get_frame(each.frame.index()) for each in placed]
         self._others = [self.plant.get_frame(each.other.index()) for each in placed]
-        self._centres = [each.patch.centre for each in placed]
+        self._centres, self.follows = [each.patch.centre for each in placed], [each.follows for each in placed]
         self._pairs = {}
         for p, each in enumerate(placed):
             for own, other in each.pairs:
@@ -69,22 +69,32 @@ class Shadow:
         return self.plant.GetVelocities(self._end)
 
     def pushes(self, *, first: bool) -> np.ndarray:
-        """Return the normal forces in the step taken last on the bodies that own the patches, in the world `[k, 3]`.
+        """Return the normal forces in the step taken last on the bodies that own the patches, in the world `[k, 6]`.
 
-        Which contacts are the patches' depends on where the step begins alone: found in its `first`.
+        With their moments about the origin of the world behind. Which contacts are the patches' depends on where the
+        step begins alone: found in its `first`.
         """
         results = self._contacts()
         if first:
             self._find(results)
-        forces = np.zeros((len(self._frames), 3))
+        forces = np.zeros((len(self._frames), 6))
         for i, p, sign in self._points:
-            forces[p] += sign * results.point_pair_contact_info(i).contact_force()
+            info = results.point_pair_contact_info(i)
+            force, place = info.contact_force(), info.contact_point()
+            forces[p, :3] += sign * force
+            forces[p, 3:] += sign * _cross(place, force)
         for i, p, sign in self._surfaces:
-            forces[p] -= sign * results.hydroelastic_contact_info(i).F_Ac_W().translational()
+            info = results.hydroelastic_contact_info(i)
+            spatial, place = info.F_Ac_W(), info.contact_surface().centroid()
+            forces[p, :3] -= sign * spatial.translational()
+            forces[p, 3:] -= sign * (spatial.rotational() + _cross(place, spatial.translational()))
         return forces
 
-    def rows(self, p: int, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the Jacobian of the twist of a patch `[3, nv]`, in the axes of its frame, and the normal."""
+    def rows(self, p: int, force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the Jacobian of the twist of a patch `[3, nv]`, in the axes of its frame, the normal, and moments.
+
+        These are the maps `[2, 6]` of what `pushes` returns to (m_x, m_y) about the origin of the patch.
+        """
         normal = force / math.sqrt(force @ force)
         frame, world, origin = self._frames[p], self.plant.world_frame(), np.zeros(3)
         x = frame.CalcRotationMatrixInWorld(self._begin).matrix()[:, 0]
@@ -94,9 +104,9 @@ class Shadow:
             origin = frame.CalcPoseInWorld(self._begin).inverse().multiply(self._centre(p))
         measured = JacobianWrtVariable.kV, frame, origin, self._others[p], world
         spatial = self.plant.CalcJacobianSpatialVelocity(self._begin, *measured)
-        a, b, c, d, e, f = *normal.tolist(), *x.tolist()
-        y = np.array([b * f - c * e, c * d - a * f, a * e - b * d])
-        return np.array([x @ spatial[3:], y @ spatial[3:], normal @ spatial[:3]]), normal
+        y, place = _cross(normal, x), frame.CalcPoseInWorld(self._begin).multiply(origin)
+        moments = np.array([np.concatenate([_cross(place, x), x]), np.concatenate([_cross(place, y), y])])
+        return np.array([x @ spatial[3:], y @ spatial[3:], normal @ spatial[:3]]), normal, moments
 
     def moved(self, jacobian: np.ndarray) -> np.ndarray:
         """Return the velocities that wrenches cause in a step without contact `[nv, 3k]`: `dt (M + dt D)^-1 J'`."""
@@ -138,6 +148,12 @@ class Shadow:
                 places.append(info.contact_surface().centroid())
                 weights.append(np.linalg.norm(info.F_Ac_W().translational()))
         return np.average(places, axis=0, weights=weights)
+
+
+def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return the cross product, which NumPy's own takes as long for as a contact."""
+    (a, b, c), (d, e, f) = one.tolist(), other.tolist()
+    return np.array([b * f - c * e, c * d - a * f, a * e - b * d])
 
 
 def _damping(plant: Any) -> np.ndarray:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
@@ -41,6 +41,8 @@ class _Search(NamedTuple):
     active: responses.Active
     wrench: jax.Array
     """`[3k]`"""
+    centre: jax.Array
+    """Centres of pressure at the wrenches from which the search began `[k, 2]` [m]."""
     acceleration: jax.Array
     iterations: jax.Array
     passes: jax.Array
@@ -57,6 +59,8 @@ class _Fixed:
     places: responses.PatchPlaces
     which: tuple[int, ...]
     """The model of each patch."""
+    follows: tuple[bool, ...]
+    """True for patches whose pressure follows their contact forces."""
     shapes: tuple[tuple[int, ...], ...]
     """Shapes of the states."""
     radius: np.ndarray
@@ -88,7 +92,8 @@ class Friction:
         which = tuple(next(i for i, model in enumerate(known) if model is patch.model) for patch in patches)
         radius = np.array([np.sqrt((patch.model.patch.positions**2).sum(1).mean()) for patch in patches])
         shapes = tuple(self.models[i].state_shape for i in which)
-        self._fixed = _Fixed(responses.places(placed), which, shapes, radius, at, m.nuserdata)
+        follows = tuple(each.follows for each in placed)
+        self._fixed = _Fixed(responses.places(placed), which, follows, shapes, radius, at, m.nuserdata)
 
     def replace(self, models: Sequence[FrictionPytree]) -> Self:
         """Return the same patches with other models, which must be of the same kinds in the same order.
@@ -174,18 +179,20 @@ class Friction:
         given, dt, at = d, m.opt.timestep, self._fixed.memory
         states, guess = self.states(d), self._now(d, at.wrench, at.guess, 3 * len(self._fixed.which))
         d = _moved(m, d)
-        jacobian, rows, touching = responses.geometry(m, d, self._fixed.places)
-        guess = jnp.where(jnp.repeat(touching, 3), guess, 0.0)
-        found = self._search(*jax.lax.stop_gradient((self.models, m, d, jacobian, rows, states, guess)))
-        answer = responses.answer(m, d, jacobian, rows, found.active)
+        where = responses.geometry(m, d, self._fixed.places)
+        guess = jnp.where(jnp.repeat(where.touching, 3), guess, 0.0)
+        found = self._search(*jax.lax.stop_gradient((self.models, m, d, where, states, guess)))
+        answer = responses.answer(m, d, where.jacobian, where.rows, found.active)
+        centre = where.centres(answer.forces(d, guess))  # that of the search, with its derivatives
+        pressed = self._pressed(self.models, found.centre + centre - jax.lax.stop_gradient(centre))
 
         def unit(twist):
-            return self._evaluate(self.models, states, twist, jnp.ones(len(rows)), dt)[1]
+            return self._evaluate(self.models, pressed, states, twist, jnp.ones(len(where.rows)), dt)[1]
 
         wrench = newton.fitting(unit, answer.host, found.wrench)
         twist, load = answer.host.twists(wrench), answer.host.loads(wrench)
-        new, _ = self._evaluate(self.models, states, twist, load, dt)
-        d = self._integrated(m, d, jacobian, wrench, answer)
+        new, _ = self._evaluate(self.models, pressed, states, twist, load, dt)
+        d = self._integrated(m, d, where.jacobian, wrench, answer)
         kept = {"state": states, "new": new, "guess": guess, "wrench": wrench, "twist": twist, "load": load}
         kept |= {"time": given.time, "next": d.time, "iterations": found.iterations, "passes": found.passes}
         kept |= {"residual": found.residual, "converged": found.converged & (found.slack <= SLACK)}
@@ -193,39 +200,53 @@ class Friction:
         # in double precision MJX makes long integers of some that came in short, at which `lax.scan` would stop
         return jax.tree.map(lambda after, before: after.astype(before.dtype), d, given)
 
-    def _search(self, models, m, d, jacobian, rows, states, guess) -> _Search:
+    def _search(self, models, m, d, where: responses.Geometry, states, guess) -> _Search:
         """Find the constraints that are active in the end, and the wrenches, without derivatives."""
         applied, dt, radius = d.qfrc_applied, m.opt.timestep, jnp.asarray(self._fixed.radius)
 
-        def unit(twist):
-            return self._evaluate(models, states, twist, jnp.ones(len(rows)), dt)[1]
-
         def body(last: _Search) -> _Search:
-            pushed = mjx.fwd_acceleration(m, d.replace(qfrc_applied=applied + last.wrench @ jacobian))
+            pushed = mjx.fwd_acceleration(m, d.replace(qfrc_applied=applied + last.wrench @ where.jacobian))
             active = responses.active_rows(mjx.solve(m, pushed.replace(qacc_warmstart=last.acceleration)))
-            answer = responses.answer(m, d, jacobian, rows, active)
+            answer = responses.answer(m, d, where.jacobian, where.rows, active)
+            centre = jnp.where(last.passes == 0, where.centres(answer.forces(d, last.wrench)), last.centre)
+            pressed = self._pressed(models, centre)
+
+            def unit(twist):
+                return self._evaluate(models, pressed, states, twist, jnp.ones(len(where.rows)), dt)[1]
+
             solved = newton.solve(unit, answer.host, last.wrench, radius, TOLERANCE, ITERATIONS)
             acceleration = answer.acceleration(solved.wrench)
             slack = responses.slack(d, active, responses.active_at(d, acceleration), acceleration, dt)
             iterations, passes = last.iterations + solved.iterations, last.passes + 1
             ends = solved.residual, solved.converged, slack
-            return _Search(active, solved.wrench, acceleration, iterations, passes, *ends)
+            return _Search(active, solved.wrench, centre, acceleration, iterations, passes, *ends)
 
         def unsettled(last: _Search) -> jax.Array:
             return (last.passes == 0) | ((last.slack > SLACK) & (last.passes < PASSES))
 
-        none, zero, count = jnp.zeros(rows.shape[1]), jnp.asarray(0.0), jnp.asarray(0)
+        none, zero, count = jnp.zeros(where.rows.shape[1]), jnp.asarray(0.0), jnp.asarray(0)
         active = responses.Active(none > 0.0, none)
-        start = _Search(active, guess, d.qacc_warmstart, count, count, zero, zero > 0.0, zero)
+        middle = jnp.zeros((len(where.rows), 2))
+        start = _Search(active, guess, middle, d.qacc_warmstart, count, count, zero, zero > 0.0, zero)
         return jax.lax.while_loop(unsettled, body, start)
 
-    def _evaluate(self, models, states, twist, load, dt) -> tuple[list[jax.Array], jax.Array]:
+    def _groups(self) -> Iterator[tuple[int, bool, list[int]]]:
+        """Yield patches that are evaluated side by side: their model, and True if their pressures follow."""
+        kinds = list(zip(self._fixed.which, self._fixed.follows, strict=True))
+        for kind in dict.fromkeys(kinds):
+            yield *kind, [p for p, each in enumerate(kinds) if each == kind]
+
+    def _pressed(self, models, centre: jax.Array) -> list[Any]:
+        """Return the models of each group with pressures about the centres `[k, 2]`, None if they are fixed."""
+        return [models[i].pressed(centre[np.array(own)]) if follows else None for i, follows, own in self._groups()]
+
+    def _evaluate(self, models, pressed, states, twist, load, dt) -> tuple[list[jax.Array], jax.Array]:
         """Return the new states and wrenches of steps; patches of the same model side by side."""
         new, wrenches = [jnp.empty(0)] * len(states), [jnp.empty(0)] * len(states)
-        for number, model in enumerate(models):
-            own = [p for p, i in enumerate(self._fixed.which) if i == number]
-            index = np.array(own)
-            after, wrench = model.step(jnp.stack([states[p] for p in own]), twist[index], load[index], dt)
+        for (number, _, own), followed in zip(self._groups(), pressed, strict=True):
+            model, index = models[number], np.array(own)
+            given = jnp.stack([states[p] for p in own]), twist[index], load[index], dt
+            after, wrench = model.step(*given) if followed is None else model.step_pressed(followed, *given)
             for i, p in enumerate(own):
                 new[p], wrenches[p] = after[i], wrench[i]
         return new, jnp.stack(wrenches)

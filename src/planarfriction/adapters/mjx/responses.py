@@ -19,6 +19,7 @@ from mujoco import mjx
 
 from planarfriction.adapters.mjx.newton import HostResponse
 from planarfriction.adapters.mujoco.patches import Placed
+from planarfriction.jax.pressure import centre_of
 
 
 class Active(NamedTuple):
@@ -142,8 +143,25 @@ def places(placed: Sequence[Placed]) -> PatchPlaces:
     return PatchPlaces(*map(np.array, zip(*numbers, strict=True)))
 
 
-def geometry(m: Any, d: Any, where: PatchPlaces) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """Return the Jacobian of the twists `[3k, nv]`; 1 for contacts of a patch `[k, nefc]`; 1 for patches in contact."""
+class Geometry(NamedTuple):
+    """Contacts of k patches."""
+
+    jacobian: jax.Array
+    """Jacobian of the twists `[3k, nv]`."""
+    rows: jax.Array
+    """1 for the contacts of a patch, `[k, nefc]`."""
+    levers: jax.Array
+    """Moments (m_x, m_y) of unit forces of these about the origin of the patch, `[k, 2, nefc]` [m]."""
+    touching: jax.Array
+    """True for patches in contact, `[k]`."""
+
+    def centres(self, force: jax.Array) -> jax.Array:
+        """Return the centres of pressure `[k, 2]` [m] of forces of constraints `[nefc]`."""
+        return centre_of(self.levers @ force, self.rows @ force)
+
+
+def geometry(m: Any, d: Any, where: PatchPlaces) -> Geometry:
+    """Return the geometry of the contacts of patches."""
     contact = d._impl.contact
     single = jnp.asarray(contact.dim == 1) & (contact.dist < contact.includemargin)
     frames = contact.frame.reshape(-1, 3, 3)
@@ -163,12 +181,14 @@ def geometry(m: Any, d: Any, where: PatchPlaces) -> tuple[jax.Array, jax.Array, 
             own - other
             for own, other in zip(mjx.jac(m, d, centre, place.owner), mjx.jac(m, d, centre, place.support), strict=True)
         )
-        jacobian = jnp.stack([moves @ x, moves @ jnp.cross(normal, x), turns @ normal])
-        return jnp.where(touching, jacobian, 0.0), jnp.where(chosen, 1.0, 0.0), touching
+        y = jnp.cross(normal, x)
+        jacobian, away = jnp.stack([moves @ x, moves @ y, turns @ normal]), contact.pos - centre
+        own = jnp.where(chosen, jnp.stack([jnp.ones(len(away)), away @ y, -away @ x]), 0.0)
+        return jnp.where(touching, jacobian, 0.0), own, touching
 
-    jacobian, chosen, touching = jax.vmap(one)(jax.tree.map(jnp.asarray, where))
-    rows = jnp.zeros((len(where.site), d._impl.efc_J.shape[0])).at[:, contact.efc_address].set(chosen)
-    return jacobian.reshape(-1, m.nv), rows, touching
+    jacobian, own, touching = jax.vmap(one)(jax.tree.map(jnp.asarray, where))
+    rows = jnp.zeros((len(where.site), 3, d._impl.efc_J.shape[0])).at[:, :, contact.efc_address].set(own)
+    return Geometry(jacobian.reshape(-1, m.nv), rows[:, 0], rows[:, 1:], touching)
 
 
 def _unit(vector: jax.Array, given: jax.Array) -> jax.Array:

@@ -164,7 +164,10 @@ class Friction:
     def _row(self) -> np.ndarray:
         """Record of the model for compiled steps."""
         packed, k = self.coupled._packed, len(self.patches)
-        problem, scratch = self.coupled._blank_problem(), scratch_layout(packed.words, k, self.m.nv)
+        problem, scratch = (
+            self.coupled._blank_problem([each.follows for each in self.placed]),
+            scratch_layout(packed.words, k, self.m.nv),
+        )
         chosen = [
             (each.site, each.own, each.other, *reversed(each.bodies), each.patch.centre == "contact")
             for each in self.placed

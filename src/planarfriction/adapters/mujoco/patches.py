@@ -21,6 +21,11 @@ from planarfriction.models import FrictionModel
 
 CENTRES = ("site", "contact")
 
+PRESSURES = ("auto", "follows", "fixed")
+
+_ROUND = {int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("SPHERE", "CAPSULE", "ELLIPSOID")}
+"""Geoms that touch in points, not faces."""
+
 
 @dataclass(frozen=True)
 class PatchContact(Checked):
@@ -39,6 +44,9 @@ class PatchContact(Checked):
     """Names of the two geoms in contact; one is on the site's body."""
     centre: str = "site"
     """Origin of the patch: that of the "site", or the middle of the points of "contact"."""
+    pressure: str = "auto"
+    """Pressure that "follows" the moments of the contact forces (see `ContactPatch.weights`), or is "fixed" to the
+    patch; "auto" is fixed if one of the geoms is a sphere, a capsule or an ellipsoid."""
 
     def __post_init__(self) -> None:
         validation.instance("model", self.model, FrictionModel, "a friction model")
@@ -47,6 +55,7 @@ class PatchContact(Checked):
             raise InvalidValueError("geoms", "be the names of two geoms", self.geoms)
         self._set(geoms=tuple(validation.text("geoms", name) for name in self.geoms))
         validation.choice("centre", self.centre, CENTRES)
+        validation.choice("pressure", self.pressure, PRESSURES)
 
 
 def memory(patches: Sequence[PatchContact], nv: int, nuserdata: int) -> Any:
@@ -105,6 +114,9 @@ class Placed:
         own = int(bodies[1] == owner)
         self.own, self.other = int(self.geoms[own]), int(self.geoms[1 - own])
         self.bodies = int(bodies[1 - own]), int(owner)
+        faces = not _ROUND.intersection(m.geom_type[self.geoms].tolist())
+        self.follows = patch.pressure == "follows" or (patch.pressure == "auto" and faces)
+        """True if the pressure follows the contact forces."""
         for pair in range(m.npair):
             if {int(m.pair_geom1[pair]), int(m.pair_geom2[pair])} == set(self.geoms.tolist()):
                 if m.pair_dim[pair] > 1:

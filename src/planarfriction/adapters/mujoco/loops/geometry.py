@@ -11,13 +11,19 @@ from planarfriction.kernels.vectors import dot, norm, plus, square, three, times
 @kernel
 def take(host, d, nefc):
     """Take scratch from the data's own stack, until it is freed."""
-    return arrays_at(host.scratch, call_c(host.functions.mj_stackAllocNum, (d, host.scratch_words + 2 * nefc)))
+    return arrays_at(host.scratch, call_c(host.functions.mj_stackAllocNum, (d, host.scratch_words + 4 * nefc)))
 
 
 @kernel
 def owners_of(s, nefc):
     """Return the patches of the constraints, behind the numbers of these in the scratch."""
     return integers(at(s.misses, nefc))
+
+
+@kernel
+def places_of(s, nefc):
+    """Return x and y of the points of the constraints in the frames of their patches, `[2, nefc]`, behind these."""
+    return at(s.misses, 2 * nefc)
 
 
 @kernel
@@ -66,8 +72,20 @@ def _axes(own, d, frame, site):
 
 
 @kernel
-def _rows(own, m, d, s, p):
-    """Write the three rows of patch p into the Jacobian."""
+def _put_places(own, d, s, nefc, p, centre, x, y):
+    """Write the places of the contacts of patch p, from its centre along its axes."""
+    contacts, owners, places = integers(d + own.data.contact)[0], owners_of(s, nefc), places_of(s, nefc)
+    for c in range(integers32(d + own.data.ncon)[0]):
+        contact = contacts + own.contact.size * c
+        row = integers32(contact + own.contact.efc_address)[0]
+        if row >= 0 and owners[row] == p:
+            away = plus(three(doubles(contact + own.contact.pos)), -1.0, three(centre))
+            places[row], places[nefc + row] = dot(x, away), dot(y, away)
+
+
+@kernel
+def _rows(own, m, d, s, nefc, p):
+    """Write the three rows of patch p into the Jacobian, and the places of its contacts."""
     nv, frame, site = own.nv, at(s.frames, 6 * p), integers(own.sites)[p]
     x, y, normal = _axes(own, d, frame, site)
     centre, rows = at(s.frames, 6 * p + 3), at(s.jacobian, 3 * nv * p)
@@ -76,6 +94,7 @@ def _rows(own, m, d, s, p):
             frame[3 + i] /= s.counts[p]
     else:
         centre = at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site)
+    _put_places(own, d, s, nefc, p, centre, x, y)
     for i in range(3 * nv):
         rows[i] = 0.0
     moves, turns = s.moves, s.turns
@@ -99,7 +118,7 @@ def place(own, m, d, s, nefc):
     touching = 0
     for p in range(own.count):
         if s.counts[p] > 0:
-            _rows(own, m, d, s, p)
+            _rows(own, m, d, s, nefc, p)
             touching += 1
         else:
             for i in range(3 * own.nv):

@@ -123,7 +123,8 @@ class Scratch(NamedTuple):
     frames: Doubles
     """Sums over these: normals into the own body, and positions, [k, 6]."""
     misses: Doubles
-    """J qacc - aref, [nefc]; behind them `owners_of` finds the patch of each constraint, -1 of others."""
+    """J qacc - aref, [nefc]; behind them `owners_of` finds the patch of each constraint, -1 of others, and `places_of`
+    the points of contacts."""
 
 
 Places = offsets_of(Scratch)

@@ -8,7 +8,7 @@ twists answer with `A = dt J Mh^-1 M X`, loads with `B = -sum D Jc X` over the r
 from __future__ import annotations
 
 from planarfriction.adapters.mujoco.loops.elimination import backward, eliminate, multiply
-from planarfriction.adapters.mujoco.loops.geometry import owners_of
+from planarfriction.adapters.mujoco.loops.geometry import owners_of, places_of
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call_c
@@ -166,11 +166,12 @@ def _metric(own, m, d, s):
 
 @kernel
 def _loads(own, d, sparse, nefc):
-    """Write loads and their responses into the problem."""
+    """Write loads, their moments and their responses into the problem."""
     host, s, k, columns = own.host, own.scratch, own.host.count, 3 * own.host.count + 1
     load, answers, owners = own.problem.free_load, own.problem.load_response, owners_of(own.scratch, nefc)
+    moments, points = own.problem.moments, places_of(own.scratch, nefc)
     for p in range(k):
-        load[p] = 0.0
+        load[p], moments[2 * p], moments[2 * p + 1] = 0.0, 0.0, 0.0
         for i in range(3 * k):
             answers[3 * k * p + i] = 0.0
     states, weights = integers32(integers(d + host.data.efc_state)[0]), doubles(integers(d + host.data.efc_D)[0])
@@ -180,6 +181,8 @@ def _loads(own, d, sparse, nefc):
         if p < 0:
             continue
         load[p] += force[r]
+        moments[2 * p] += points[nefc + r] * force[r]
+        moments[2 * p + 1] -= points[r] * force[r]
         if states[r] != host.constants.QUADRATIC:
             continue
         count, numbers, places = row_of(host, d, sparse, r)

@@ -21,6 +21,7 @@ from planarfriction.compiler.memory import arrays_at, doubles, integers, integer
 from planarfriction.kernels.coupling import step_all
 from planarfriction.kernels.coupling_rows import Problem
 from planarfriction.kernels.coupling_rows import read as read_patches
+from planarfriction.kernels.following import hold
 
 PASSES = 10
 """Largest number of solutions of a step, again after it has activated other constraints."""
@@ -168,6 +169,7 @@ def _solve(own, patches, m, d, nefc):
                 _accelerate(host, m, d)
                 continue
         call(host.solve, (host.patches, own.scratch.problem))
+        hold(patches, problem)
         passes += 1
         if problem.iterations[0] < 0.0:
             _clear(problem.wrench, 3 * host.count)

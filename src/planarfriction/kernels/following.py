@@ -1,0 +1,75 @@
+"""Patches of a step in contact space whose pressure follows the moments of their loads (the rule: `kernels.tilt`).
+
+The pressure is that of the load and the moments at the guess of the wrenches, and held while the step is solved: a host
+that steps on gives the next step the moments that came out.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from planarfriction.compiler import kernel
+from planarfriction.compiler.memory import Doubles, Integers, at, doubles, integers
+from planarfriction.kernels.tilt import centre, tilt
+
+
+class Followers(NamedTuple):
+    """Points of each patch that share its load: its cells, or its parts."""
+
+    x: Doubles
+    """Coordinates of the points of all patches [m]."""
+    y: Doubles
+    firsts: Integers
+    """First point of each patch, and behind the last the count of all, [k + 1]."""
+    words: Integers
+    """Words of the record of a patch whose points are cells, of which the last is the address of the weights; 0 of one
+    whose points are parts, [k]."""
+    pieces: Integers
+    """First piece of each patch, [k]."""
+
+
+@kernel
+def _press(own, p, problem, k, n, first):
+    """Write the shares of n points of patch k, which begin at `first`, and how far its pressure has to move beyond."""
+    x, y, c = at(own.followers.x, first), at(own.followers.y, first), own.followers.pieces[k]
+    cx, cy = centre(p.moments[2 * k], p.moments[2 * k + 1], p.free_load[k])
+    words, out = own.followers.words[k], at(p.weights, first)
+    if words == 0:
+        tilt(x, y, at(p.shares, c), n, cx, cy, out)
+        for i in range(n):
+            p.acting_shares[c + i] = out[i]
+            cx, cy = cx - out[i] * x[i], cy - out[i] * y[i]
+        p.moved[2 * k], p.moved[2 * k + 1] = cx, cy
+    elif p.records[c] != 0:
+        record, copied = integers(p.records[c]), 0
+        tilt(x, y, doubles(record[words - 1]), n, cx, cy, out)
+        for j in range(k):
+            copied += own.followers.words[j]
+        target = at(p.copies, copied)
+        for i in range(words - 1):
+            target[i] = record[i]
+        target[words - 1] = at(problem, own.row.weights + first)
+        p.acting[c] = at(problem, own.row.copies + copied)
+
+
+@kernel
+def hold(own, p):
+    """Keep the pressures of the last solution in further ones of the same step."""
+    for k in range(own.count):
+        p.follows[k] = -abs(p.follows[k])
+
+
+@kernel
+def follow(own, p, problem):
+    """Write the records and shares of the pieces that act in the problem, whose address is `problem`."""
+    for c in range(own.pieces):
+        if p.follows[own.owners[c]] >= 0.0:
+            p.acting[c], p.acting_shares[c] = p.records[c], p.shares[c]
+    for k in range(own.count):
+        if p.follows[k] < 0.0:
+            continue
+        p.moved[2 * k], p.moved[2 * k + 1] = 0.0, 0.0
+        first = own.followers.firsts[k]
+        n = own.followers.firsts[k + 1] - first
+        if p.follows[k] > 0.0 and p.free_load[k] > 0.0 and n > 0:
+            _press(own, p, problem, k, n, first)

@@ -1,0 +1,60 @@
+"""Pressure that follows the moments of the load (the rule: `kernels.tilt`)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+
+
+def moments_of(value: Any) -> np.ndarray:
+    """Return moments `[..., 2]` [N m], checked."""
+    moments = validation.numbers("moments", value)
+    if moments.shape[-1:] != (2,):
+        raise InvalidValueError("moments", "have shape [..., 2]", f"shape {list(moments.shape)}")
+    validation.within_range("moments", moments.min(initial=0.0), moments.max(initial=0.0))
+    return moments
+
+
+def centre_of(moments: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """Return the centre of pressure `(-m_y, m_x)/f_N` `[..., 2]` [m]; 0 without load."""
+    from planarfriction.kernels.tilt import REACH  # compiled code, which a patch alone does not need
+
+    loaded = load > 0.0
+    with np.errstate(over="ignore"):
+        x, y = (each / np.where(loaded, load, 1.0) for each in (-moments[..., 1], moments[..., 0]))
+    return np.where(loaded[..., None], np.clip(np.stack([x, y], -1), -REACH, REACH), 0.0)
+
+
+def tilted(positions: np.ndarray, weights: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Return weights `[B, N]` of cells at `positions` `[N, 2]` times planes that bring their centres to `[B, 2]`."""
+    from planarfriction.kernels.tilt import tilt_many
+
+    x, y = (np.array(each)[None] for each in positions.T)  # writable, all of them: compiled once
+    out = np.empty(weights.shape)
+    tilt_many(x, y, np.array(weights, order="C"), np.array(centre, order="C"), out)
+    return out
+
+
+def weights_under(patch: Any, normal_force: Any, moments: Any) -> np.ndarray:
+    """Return the weights `[..., N]` of the cells of a patch under a load and its moments."""
+    if normal_force is None:
+        raise InvalidValueError("normal_force", "be given with moments: they are of its size", "None")
+    load, moments = validation.non_negative_numbers("normal_force", normal_force), moments_of(moments)
+    try:
+        batch = np.broadcast_shapes(load.shape, moments.shape[:-1])
+    except ValueError:
+        shapes = f"shapes {list(load.shape)}, {list(moments.shape)}"
+        raise InvalidValueError("moments", "broadcast with normal_force", shapes) from None
+    if math.prod(batch) * patch.cells > validation.MOST_NUMBERS:
+        rule = f"be at most {validation.MOST_NUMBERS // patch.cells} pairs for {patch.cells} cells"
+        raise InvalidValueError("moments", rule, math.prod(batch))
+    weights = np.broadcast_to(patch.weights(load), (*batch, patch.cells)).reshape(-1, patch.cells)
+    centre = np.broadcast_to(centre_of(moments, load), (*batch, 2)).reshape(-1, 2)
+    loaded = np.broadcast_to(load, batch).reshape(-1, 1) > 0.0
+    found = np.where(loaded, tilted(patch.positions, weights, centre), weights)
+    return found.reshape(*batch, patch.cells)
