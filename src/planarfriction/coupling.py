@@ -161,7 +161,7 @@ class CoupledPatches(ByValue):
             if given[name] is None:
                 del given[name]
         if host.moments is not None:
-            self.check_follows()
+            self._check_follows()
         arrays = {name: validation.numbers(name, value) for name, value in given.items()}
         problems, batch = self._problems(arrays)
         parts = self._parts
@@ -206,7 +206,7 @@ class CoupledPatches(ByValue):
         problems[..., self._parts["follows"]] = float("moments" in arrays)
         return problems.reshape(count, words), batch
 
-    def check_follows(self, patches: Sequence[int] | None = None) -> None:
+    def _check_follows(self, patches: Sequence[int] | None = None) -> None:
         """Raise InvalidValueError for `patches`, all if None, whose pressure cannot follow moments."""
         for p in range(len(self.models)) if patches is None else patches:
             if self._packed.counts[p] == 0:
@@ -270,7 +270,7 @@ class CoupledPatches(ByValue):
 
         The host gives the moments of those whose pressure `follows` them.
         """
-        self.check_follows([p for p, follow in enumerate(follows) if follow])
+        self._check_follows([p for p, follow in enumerate(follows) if follow])
         row, parts = np.zeros((1, self._packed.words)), self._parts
         row.view(np.int64)[:, parts["records"]], row[:, parts["shares"]] = self._packed.records, self._packed.shares
         row[:, parts["tolerance"]], row[:, parts["most"]], row[:, parts["follows"]] = TOLERANCE, ITERATIONS, follows

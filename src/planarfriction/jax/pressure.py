@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from planarfriction.kernels.tilt import FARTHEST, NARROW, OVERSHOT, REACH, SHORTENINGS, SOFTNESS, STEPS
-from planarfriction.tensors.distributed import Cells
+from planarfriction.tensors.distributed import Cells, positions_of
 from planarfriction.tensors.steps import Part
 
 
@@ -145,7 +145,7 @@ def follow(equations: Any, parts: Sequence[Part], centre: jax.Array) -> Pressed:
     """
     if isinstance(parts[0].shape, Cells):
         part = parts[0]
-        weights = tilted(part.shape.positions, part.shape.weights, centre)[..., None, :]
+        weights = tilted(positions_of(jnp, part.shape), part.shape.weights, centre)[..., None, :]
         return Pressed((part._replace(shape=part.shape._replace(weights=weights)),), None)
     places = jnp.stack([jnp.stack(equations.centre(part.shape)) for part in parts], -1)
     shares = tilted(places, jnp.stack([jnp.asarray(part.share, float) for part in parts]), centre)

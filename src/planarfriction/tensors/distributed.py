@@ -43,6 +43,14 @@ def cells_of(patch: ContactPatch, normal_force: float | None, front: str) -> Cel
     return Cells(np.array([maps[:, i, j] for i, j in LEVER]), patch.weights(normal_force))
 
 
+def positions_of(xp, cells: Cells):
+    """Return the positions of the cells, x then y [m], `[2, N]`."""
+    if len(cells.levers) == 2:
+        return cells.levers
+    xx, xy, yy, x, y = (cells.levers[k] for k in range(len(LEVER)))
+    return xp.stack([xx * y - xy * x, xy * y - yy * x], 0) / (xx * yy - xy * xy)
+
+
 def drive(xp, law: LawNumbers, cells: Cells, twist) -> Drive:
     """Return the drive of the bristles at a twist: the velocities of the cells."""
     vx, vy, omega = twist[..., 0, None], twist[..., 1, None], twist[..., 2, None]

@@ -1,0 +1,56 @@
+"""Steps of JAX whose pressure follows the moments of the load: those of NumPy, with derivatives by the moments."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+
+jax = pytest.importorskip("jax", reason="needs the extra [jax]")
+import jax.numpy as jnp  # noqa: E402
+
+from planarfriction import jax as front  # noqa: E402
+
+pytestmark = pytest.mark.jax
+
+LAW = pf.LuGre(mu_c=1.0, mu_s=1.2, elasto_plastic=0.9)
+PATCH = pf.ContactPatch.rectangle(0.1, 0.06, 9)
+GROOVED = PATCH.with_friction_metric([[2.0, 0.3], [0.3, 1.0]])
+KINDS = {
+    "distributed": (PATCH, "DistributedModel", {}),
+    "few cells with a metric": (GROOVED, "ReducedModel", {}),
+    "one part": (PATCH, "ReducedModel", {"parts": 1}),
+    "four parts with a metric": (GROOVED, "ReducedModel", {"parts": 4}),
+    "published": (PATCH, "ReducedModelPublished", {}),
+}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def double_precision():
+    before = jax.config.jax_enable_x64
+    jax.config.update("jax_enable_x64", True)
+    yield
+    jax.config.update("jax_enable_x64", before)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_steps_and_derivatives_are_those_of_numpy(kind):
+    """Derivatives by the moments are those of central differences; the rule itself errs by 1e-7 of the patch."""
+    patch, name, options = KINDS[kind]
+    model, ours = (getattr(end, name)(patch, LAW, **options) for end in (pf, front))
+    rng, load = np.random.default_rng(0), np.array([1.0, 2.0, 1.5])
+    state, twist = 1e-7 * rng.normal(size=(3, *model.state_shape)), rng.normal(size=(3, 3)) * (0.01, 0.01, 0.1)
+    moments = load[:, None] * np.array([(0.003, -0.005), (0.02, 0.03), (-0.1, 0.0)])  # kern, beyond it, beyond the edge
+    new, wrench = model.step(state, twist, load, 1e-3, moments=moments)
+    found, pulled = ours.step(jnp.asarray(state), twist, load, 1e-3, moments=moments)
+    np.testing.assert_allclose(found, new, rtol=1e-7, atol=1e-15)
+    np.testing.assert_allclose(pulled, wrench, rtol=1e-6, atol=1e-8)
+
+    slopes = jax.jacobian(lambda m: ours.step(jnp.asarray(state[1]), twist[1], load[1], 1e-3, moments=m)[1])
+    h, held = 1e-7, (state[1], twist[1], load[1], 1e-3)
+    ends = [[model.step(*held, moments=moments[1] + s * b)[1] for s in (1.0, -1.0)] for b in h * np.eye(2)]
+    differences = np.stack([(one - other) / (2.0 * h) for one, other in ends], -1)
+    np.testing.assert_allclose(
+        slopes(jnp.asarray(moments[1])), differences, rtol=1e-4, atol=1e-4 * abs(differences).max()
+    )
