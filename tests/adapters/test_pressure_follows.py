@@ -35,7 +35,7 @@ def made(pressure="auto", body=BOX, table=TABLE, joint="<freejoint/>"):
 
 
 def stopped(start, **options) -> np.ndarray:
-    """Return the pose at which the box comes to rest, without the half step of its start that a velocity-stepping simulator loses."""
+    """Return the pose where the box comes to rest, with the half step added that a velocity-stepping start loses."""
     _, d, friction = made(**options)
     start, away = np.array(start), PLATE.centre_of_mass
     d.qvel[:] = [start[0], start[1] - start[2] * away, 0.0, 0.0, 0.0, start[2]]
