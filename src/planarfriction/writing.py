@@ -6,6 +6,7 @@ Everything that the library writes is written here.
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import os
 import secrets
@@ -30,7 +31,7 @@ def replacing(path: str | Path) -> Iterator[io.BytesIO]:
     """
     path = check_writable(path)
     buffer = io.BytesIO()
-    with _reporting(path):
+    with reporting(path):
         yield buffer
         _replace(Path(os.path.realpath(path)), buffer.getbuffer())
 
@@ -41,7 +42,7 @@ def put(path: str, content: bytes) -> None:
     Without waiting for the disk, as `replacing` does: after the computer itself has failed the file may be damaged. For
     many small files that carry a checksum, and whose loss costs no more than the work of one.
     """
-    with _reporting(path):
+    with reporting(path):
         part = os.path.join(os.path.dirname(path), _part_name())
         try:
             with open(part, "xb", buffering=0) as file:
@@ -72,7 +73,7 @@ def check_writable(path: str | Path) -> Path:
     A file is really made beside it, since permissions alone do not tell; what `path` holds stays as it is.
     """
     path = validation.path("path", path)
-    with _reporting(path):
+    with reporting(path):
         target = Path(os.path.realpath(path))
         if target.is_dir():
             raise FileError(f"{path}: cannot be written: it is a folder; give the name of a file in it")
@@ -104,6 +105,27 @@ def make_folder(path: str | Path) -> Path:
     return path
 
 
+@contextlib.contextmanager
+def making_folder(path: Path) -> Iterator[Path]:
+    """Yield a new folder that becomes `path` when the block ends, whole or not at all.
+
+    If another process has made `path` meanwhile, and it is not empty, that one stays.
+
+    Raises FileError in one line where the folder cannot be written.
+    """
+    part = _part(path)
+    with reporting(path):
+        part.mkdir()
+        try:
+            yield part
+            part.rename(path)
+        except OSError as error:
+            if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+                raise
+        finally:
+            shutil.rmtree(part, ignore_errors=True)  # there is none after the renaming
+
+
 def _replace(target: Path, content: memoryview) -> None:
     part = _part(target)
     try:
@@ -130,8 +152,8 @@ def _part_name() -> str:
 
 
 @contextlib.contextmanager
-def _reporting(path: str | Path) -> Iterator[None]:
-    """Turn what the system says into one line with the path."""
+def reporting(path: str | Path) -> Iterator[None]:
+    """Turn the system's error into a FileError of one line with the path."""
     try:
         yield
     except FrictionError:

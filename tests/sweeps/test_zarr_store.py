@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 import signal
 import time
 import warnings
@@ -15,6 +17,8 @@ import pytest
 import planarfriction as pf
 from planarfriction import sweeps
 from planarfriction.errors import SweepInterrupted
+from planarfriction.sweeps.zarr_store import ZarrBookkeeper
+from planarfriction.writing import making_folder
 from tests.sweeps.test_running import GRIPS, MASSES, MODEL, end, grip, reference
 
 pytestmark = pytest.mark.sweep
@@ -81,6 +85,81 @@ def test_a_run_counts_once_the_journal_says_so(zarr, tmp_path):
     told.clear()  # another measurement of the same layout: nothing of the old one counts
     pf.sweep(grip, VALUES, out=path, measure=twice, progress=told.append)
     assert told[-1].found == 0
+
+
+def test_a_store_without_a_measurement_continues(zarr, tmp_path):
+    path = tmp_path / "all.zarr"
+    pf.sweep(grip, VALUES, out=path)
+    journal = path / "run" / "runs.jsonl"
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:2]))
+    told: list[sweeps.Progress] = []
+    same(pf.sweep(grip, VALUES, out=path, progress=told.append), reference())
+    assert told[-1].found == 2
+
+
+@pytest.mark.parametrize("lines", [0, 6])
+def test_a_lost_chunk_or_a_kill_before_all_arrays_were_made_is_mended(zarr, tmp_path, lines):
+    path = tmp_path / "all.zarr"
+    pf.sweep(grip, VALUES, out=path)
+    journal = path / "run" / "runs.jsonl"
+    if lines:
+        (path / "x" / "c" / "1" / "0" / "0").unlink()
+    else:  # killed while it made the arrays, before any run counted
+        journal.write_bytes(b"")
+        shutil.rmtree(path / "x")
+    told: list[sweeps.Progress] = []
+    same(pf.sweep(grip, VALUES, out=path, progress=told.append), reference())
+    assert (told[-1].found, told[-1].damaged) == ((5, 1) if lines else (0, 0))
+
+
+def nothing(solution: pf.Solution) -> dict:
+    return {"angle": float("nan"), "word": ""}
+
+
+def test_chunks_without_values_are_not_lost_ones(zarr, tmp_path):
+    told: list[sweeps.Progress] = []
+    for _ in range(2):
+        pf.sweep(grip, VALUES, out=tmp_path / "a.zarr", measure=nothing, progress=told.append)
+    assert told[-1].found == 6 and told[-1].damaged == 0
+
+
+def test_a_store_is_made_whole_or_not_at_all(zarr, tmp_path, monkeypatch):
+    def full(*args, **options):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    path = tmp_path / "a.zarr"
+    with monkeypatch.context() as patch:
+        patch.setattr(ZarrBookkeeper, "_write", full)
+        with pytest.raises(pf.errors.FileError, match=r"a\.zarr: cannot be written: No space left on device$"):
+            pf.sweep(grip, VALUES, out=path, measure=end)
+    assert not list(tmp_path.iterdir())
+    path.mkdir()  # an empty folder may become a store
+    with monkeypatch.context() as patch:
+        patch.setattr(ZarrBookkeeper, "_fill", full)
+        with pytest.raises(pf.errors.FileError, match=r"a\.zarr: cannot be written: No space left on device$"):
+            pf.sweep(grip, VALUES, out=path, measure=end)
+    whole = pf.sweep(grip, VALUES, measure=end)
+    same(pf.sweep(grip, VALUES, out=path, measure=end), whole)
+
+
+def test_two_sweeps_do_not_write_to_one_store(zarr, tmp_path):
+    def second(progress: sweeps.Progress) -> None:
+        with pytest.raises(pf.errors.FileError, match="another sweep is writing to it"):
+            pf.sweep(grip, VALUES, out=path, measure=end)
+        told.append(progress)
+
+    path = tmp_path / "a.zarr"
+    told: list[sweeps.Progress] = []
+    pf.sweep(grip, VALUES, out=path, measure=end, progress=second)
+    pf.sweep(grip, VALUES, out=path, measure=end, progress=told.append)
+    assert told[-1].found == 6
+
+
+def test_of_two_that_make_a_store_the_first_one_stays(tmp_path):
+    for name in ("first", "second"):
+        with making_folder(tmp_path / "a") as part:
+            (part / name).touch()
+    assert [each.name for each in tmp_path.rglob("*")] == ["a", "first"]
 
 
 def test_a_damaged_chunk_is_found_by_who_reads_it(zarr, tmp_path):

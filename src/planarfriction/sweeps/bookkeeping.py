@@ -35,6 +35,9 @@ OWN = {
 }
 """Variables of every sweep, with their descriptions."""
 
+_TEXTS = "UT"
+"""Kinds of dtypes that hold texts: of fixed width, and of any width as stores return them."""
+
 Index = tuple[int, ...]
 """Place of a run in the grid."""
 
@@ -237,7 +240,7 @@ def difference(found: Mapping[str, History], first: Mapping[str, History]) -> st
         mine, other = np.asarray(each.values), np.asarray(first[name].values)
         if mine.shape != other.shape:
             return f"{name} has shape {list(mine.shape)} where the first run has {list(other.shape)}"
-        if (mine.dtype.kind == "U") != (other.dtype.kind == "U"):
+        if (mine.dtype.kind in _TEXTS) != (other.dtype.kind in _TEXTS):
             return f"{name} is {mine.dtype} where the first run has {other.dtype}"
         if each.dims == (name,) and not np.array_equal(mine, other):
             return f"the axis {name} differs from that of the first run: measure what has the same axes in all runs"

@@ -116,7 +116,7 @@ def sweep(
     InvalidValueError
         A parameter breaks its rule.
     FileError
-        The folder cannot be written.
+        The folder or store cannot be written, or another sweep is writing to the store.
     SweepError
         All runs failed, or the executor did.
     SweepInterrupted
@@ -138,14 +138,15 @@ def sweep(
     book = _bookkeeper(out, make, grid, timed=measure is None)
     sweeping = Sweeping(make, grid, keys, measure, book, progress)
     try:
-        sweeping.go(executor)
-    except KeyboardInterrupt:
-        raise SweepInterrupted(str(sweeping.progress()), book.dataset()) from None
+        try:
+            sweeping.go(executor)
+        except KeyboardInterrupt:
+            raise SweepInterrupted(str(sweeping.progress()), book.dataset()) from None
+        if book.failed == grid.size:  # the mistake is in what all runs share
+            raise SweepError(f"all {book.failed} runs failed; the first: {book.first_failure}")
+        return book.dataset()
     finally:
         book.close()
-    if book.failed == grid.size:  # the mistake is in what all runs share
-        raise SweepError(f"all {book.failed} runs failed; the first: {book.first_failure}")
-    return book.dataset()
 
 
 def _bookkeeper(out: str | Path | None, make: Callable[..., Scene], grid: Grid, timed: bool) -> Bookkeeper:

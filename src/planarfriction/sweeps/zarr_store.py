@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
-from collections.abc import Mapping
+import weakref
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +17,7 @@ from planarfriction.scenes.solution import History
 from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, Index, check_names, difference, on_instants
 from planarfriction.sweeps.quantities import Grid
 from planarfriction.sweeps.records import FAILED, Record, failure, reason_of
-from planarfriction.writing import make_folder, put, write_all
+from planarfriction.writing import make_folder, making_folder, put, reporting, write_all
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,6 +27,33 @@ if TYPE_CHECKING:
 _JOURNAL = "runs.jsonl"
 """File with a line for each run that is in the store, written after its chunks. It lies in the folder of the array
 `run`, which readers of zarr do not list."""
+
+_ALL_CHUNKS = {"array.write_empty_chunks": True}
+"""Setting of zarr under which a chunk that is not there has been lost: by default one without values is not written."""
+
+_LOCKED: weakref.WeakSet[io.FileIO] = weakref.WeakSet()
+"""Locked journals of this process. A process forked from it closes them: it may live longer, and keep the lock."""
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=lambda: [each.close() for each in _LOCKED])
+
+
+def _lock(journal: io.FileIO, path: Path) -> None:
+    """Lock the journal of the store `path` until it is closed or the process ends, where the system has such locks.
+
+    Raises FileError if another sweep has locked it.
+    """
+    try:
+        import fcntl
+    except ImportError:  # on Windows
+        return
+    try:
+        fcntl.flock(journal, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise FileError(f"{path}: another sweep is writing to it: wait for its end, or name another path") from None
+    except OSError:  # a file system without locks
+        return
+    _LOCKED.add(journal)
 
 
 class ZarrBookkeeper(Bookkeeper):
@@ -45,32 +74,47 @@ class ZarrBookkeeper(Bookkeeper):
         self._arrays: dict[str, Any] = {}
         self._listed: dict[Index, tuple[str, Record]] = {}
         """Keys and records, without variables, in the journal."""
+        self._journal: Any = None
+        if not path.exists() or (path.is_dir() and not any(path.iterdir())):
+            self._create()
         try:
-            self._group: Any = zarr.open_group(path, mode="a", zarr_format=3)
-            self._begin()
-        except FileError:
-            raise
+            self._group: Any = zarr.open_group(path, mode="r+", zarr_format=3)
+            self._journal = (path / "run" / _JOURNAL).open("a+b", buffering=0)
+            _lock(self._journal, path)
+            with zarr.config.set(_ALL_CHUNKS):
+                self._begin()
         except (OSError, ValueError, KeyError, TypeError) as error:
+            self.close()
+            if isinstance(error, FileError):
+                raise
             raise FileError(f"{path}: no zarr store of a sweep, and none can be made: {reason_of(error)}") from None
-        self._journal = (path / "run" / _JOURNAL).open("a+b", buffering=0)
         if self._journal.tell() and not self._ends_a_line():
             write_all(self._journal, b"\n")
 
     def close(self) -> None:
-        """Close the journal."""
-        self._journal.close()
+        """Close the journal, and so let other sweeps write."""
+        if self._journal is not None:
+            self._journal.close()
 
     # ------------------------------------------------------------------ arrays
 
-    def _begin(self) -> None:
-        """Make the axes of the swept quantities, or check that the store has them, and read the journal."""
-        names = sorted(self._group)
-        if not names:
+    def _create(self) -> None:
+        """Make a store with the axes of the swept quantities, whole or not at all."""
+        import zarr
+
+        with making_folder(self.path) as part:
+            self._group = zarr.open_group(part, mode="w", zarr_format=3)
             for name, labels in self.grid.labels.items():
                 self._write(name, (name,), np.array(labels), {})
             for name, words in OWN.items():
                 self._write(name, tuple(self.grid.labels), np.full(self.grid.shape, ""), {"long_name": words})
-            return
+
+    def _begin(self) -> None:
+        """Check that the store has the axes of the swept quantities, read the journal, and find the arrays.
+
+        Arrays in which no run counts are removed: a sweep may have been killed before it had made them all.
+        """
+        names = sorted(self._group)
         for name, labels in self.grid.labels.items():
             there = self._group[name][...].tolist() if name in names else None
             if there != labels:
@@ -79,12 +123,18 @@ class ZarrBookkeeper(Bookkeeper):
             raise FileError(f"{self.path}: holds a sweep over other quantities: name another path")
         self._read_journal()
         swept = len(self.grid.shape)
+        begun = any(record.status != FAILED for _, record in self._listed.values())
         for name in names:
             if name in (*self.grid.labels, *OWN):
                 continue
-            self._arrays[name] = array = self._group[name]
+            if not begun:
+                del self._group[name]
+                continue
+            array = self._group[name]
             dims = tuple(array.metadata.dimension_names)
             axis = dims == (name,)
+            if not axis:
+                self._arrays[name] = array
             values = array[...] if axis else np.empty(array.shape[swept:], array.dtype)
             if self._time is not None and name == "time" and axis and not np.array_equal(values, self._time):
                 raise FileError(f"{self.path}: holds a sweep with other instants: name another path")
@@ -109,7 +159,6 @@ class ZarrBookkeeper(Bookkeeper):
         """Make the empty arrays of all runs from the variables of the first one."""
         from zarr.codecs import Crc32cCodec, ZstdCodec
 
-        check_names(self.grid, variables)
         ones = (1,) * len(self.grid.shape)
         for name, each in variables.items():
             values = np.asarray(each.values)
@@ -126,6 +175,7 @@ class ZarrBookkeeper(Bookkeeper):
                 compressors=(ZstdCodec(), Crc32cCodec()),
                 dimension_names=(*self.grid.labels, *each.dims),
                 attributes=dict(each.attrs),
+                config={"write_empty_chunks": True},
             )
         self._layout = dict(variables)
 
@@ -134,7 +184,19 @@ class ZarrBookkeeper(Bookkeeper):
     def _find(self, index: Index, key: str) -> Record | None:
         """Return the record of a run that is in the store, without its variables, or None."""
         run, record = self._listed.get(index, ("", None))
-        return None if run != key or record is None or record.status == FAILED else record
+        if run != key or record is None or record.status == FAILED:
+            return None
+        if not all(map(os.path.exists, self._chunks(index))):
+            self.damaged += 1
+            return None
+        return record
+
+    def _chunks(self, index: Index) -> Iterator[str]:
+        """Yield the files of the chunks of a run."""
+        for name, array in self._arrays.items():
+            if array.size:
+                place = (*index, *(0 for _ in array.shape[len(index) :]))
+                yield f"{self.path}/{name}/{array.metadata.encode_chunk_key(place)}"
 
     def _store(self, index: Index, key: str, record: Record, scene: Scene | None) -> Record:
         """Write the chunks of a run, then the line that makes them count; returns the record as it counts."""
@@ -143,21 +205,29 @@ class ZarrBookkeeper(Bookkeeper):
         if record.status != FAILED:
             found = record.variables if self._time is None else on_instants(record, self._time)
             if self._layout is None:
-                self._make(found)
+                check_names(self.grid, found)
+                with reporting(self.path):
+                    self._make(found)
             reason = difference(found, self._layout or found)
             if reason:
                 record = Record(FAILED, reason, {})
             else:
-                for name, each in found.items():
-                    if each.dims != (name,):
-                        values = np.asarray(each.values)
-                        self._arrays[name][index] = values.astype(object) if values.dtype.kind == "U" else values
+                with reporting(self.path):
+                    self._fill(index, found)
         if record.status == FAILED:
             folder = make_folder(self.path.with_suffix(".failed"))
             put(str(folder / f"{key}.json"), failure(record.reason, scene).encode())
         line = json.dumps([index, key, record.status, record.reason])
-        write_all(self._journal, f"{line}\n".encode())
+        with reporting(self.path):
+            write_all(self._journal, f"{line}\n".encode())
         return record._replace(variables={})
+
+    def _fill(self, index: Index, found: Mapping[str, History]) -> None:
+        """Write the chunks of a run."""
+        for name, each in found.items():
+            if each.dims != (name,):
+                values = np.asarray(each.values)
+                self._arrays[name][index] = values.astype(object) if values.dtype.kind == "U" else values
 
     def _read_journal(self) -> None:
         """Read the last outcome of each run; a line that a kill has cut counts as no line."""
@@ -182,6 +252,7 @@ class ZarrBookkeeper(Bookkeeper):
         import xarray as xr
 
         self.runs = {**self._listed, **self.runs}  # an interrupted sweep does not reach all of the journal
-        for name, values in self._outcome_arrays().items():
-            self._write(name, tuple(self.grid.labels), values, {})
+        with reporting(self.path):
+            for name, values in self._outcome_arrays().items():
+                self._write(name, tuple(self.grid.labels), values, {})
         return xr.open_zarr(self.path, chunks=None, consolidated=False)
