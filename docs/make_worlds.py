@@ -113,7 +113,7 @@ def terminal_ratio(gyration: float) -> float:
 
 def slide(gyration: float, ratio: float) -> tuple[np.ndarray, np.ndarray]:
     """Speed [m/s] and v/(omega R) of a disc that starts with 1 m/s."""
-    model = pf.ReducedModel(pf.ContactPatch.disc(RADIUS), COULOMB)
+    model = pf.ReducedModel(pf.ContactPatch.disc(RADIUS), COULOMB, parts=1)
     inertia, twist = (gyration * RADIUS) ** 2, (1.0, 0.0, 1.0 / (ratio * RADIUS))
     scene = pf.scenes.free_slide(model, mass=1.0, inertia=inertia, twist=twist, save_every=1e-3)
     data = pf.simulate(scene).data
@@ -141,7 +141,7 @@ def curling() -> PlotFigure:
     ends.set(xlabel="radius of gyration over R", ylabel="v/(omega R)", ylim=(1e-2, 1e3))
     ends.legend(fontsize="small")
     ice = pf.LuGre(mu_c=0.01, sigma_0=1e5, sigma_1=10.0, sigma_2=0.0)
-    data = pf.simulate(pf.scenes.curling(pf.ReducedModel(pf.ContactPatch.ring(0.0585, 0.0645), ice))).data
+    data = pf.simulate(pf.scenes.curling(pf.ReducedModel(pf.ContactPatch.ring(0.0585, 0.0645), ice, parts=1))).data
     stone.plot(data.time, data.vx, color=PALETTE[0], label="speed v")
     stone.plot(data.time, 0.0615 * data.omega, color=PALETTE[1], label="speed of the band, omega R")
     stone.set(xlabel="time [s]", ylabel="curling stone [m/s]", ylim=(0.0, 3.0))

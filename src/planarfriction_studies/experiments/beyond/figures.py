@@ -77,7 +77,7 @@ def driven_boxes(errors: dict[str, dict[str, dict[str, float]]]) -> PlotFigure:
                 looks.box(axes, place + offset, values, colour, 0.13)
         axes.set(ylabel=label, ylim=(0.0, None))
     key = looks.box_key({MOVED[model]: colour for model, colour in MODEL_COLOURS.items()})
-    looks.legend(figure, [*key, looks.line_key(**looks.MAXIMUM)], 6, fontsize="small")
+    looks.legend(figure, [*key, looks.line_key(**looks.MAXIMUM)], 3, fontsize="small")
     return figure
 
 
@@ -116,7 +116,7 @@ class Family(NamedTuple):
 
 FAMILIES = (
     Family("published reduced model", {"published": ""}, looks.REDUCED, "^"),
-    Family("ReducedModel", {"reduced": "few cells"}, looks.FEW, "s", (6, -3)),
+    Family("ReducedModel, 40 cells", {"reduced": ""}, looks.FEW, "s"),
     Family("ReducedModel, its parts", {"one part": "1", **{f"{n} parts": f"{n}" for n in (4, 6, 16)}}, looks.MOMENTS,
            "o", (4, -11)),
     Family("distributed, its cells", {"degree 3": "28", "degree 5": "45", "full": "all"}, looks.DISTRIBUTED, "D"),

@@ -44,7 +44,7 @@ REFERENCE_CELLS = 2100
 
 LEAST_PARTS, MOST_PARTS = 3, 33
 
-REPEATS, LONG, SHORT = 3, 0.05, 0.02
+REPEATS, LONG, SHORT = 9, 0.1, 0.02
 """A run is timed once and, if it takes less than LONG [s], so many times more; a short one before does not count."""
 
 

@@ -1,0 +1,301 @@
+"""Measure where each model lets go, how it creeps while it holds, and its price: `python docs/make_breakaway.py`.
+
+Numbers are kept in docs/breakaway.json; what is missing there is measured, and the tables of the pages (below lines
+`<!-- breakaway: NAME -->`) and the picture are written from it. Delete the file to measure all again.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import planarfriction as pf
+from planarfriction.derivatives import rollout, rollout_states, rollout_vjp
+from planarfriction.patch import PUBLISHED_PATCHES
+from planarfriction.plots import style
+from planarfriction_studies.bench.measurement import mixed_twists
+
+DOCS = Path(__file__).parent
+KEPT, PICTURE = DOCS / "breakaway.json", DOCS / "images" / "breakaway.png"
+MARK = re.compile(r"<!-- breakaway: (?P<name>.+?) -->\n\n(?:(?:\|.*\n)+\n)?")
+
+LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
+LOAD = 10.0
+"""Normal force [N] of the ramps and of the shaken contacts."""
+
+MODELS: dict[str, tuple[Callable[[pf.ContactPatch], Any], str]] = {
+    "distributed": (lambda patch: pf.DistributedModel(patch, LAW), style.DISTRIBUTED),
+    "default": (lambda patch: pf.ReducedModel(patch, LAW), style.FEW),
+    'parts="auto"': (lambda patch: pf.ReducedModel(patch, LAW, parts="auto"), style.PARTS),
+    "4 parts": (lambda patch: pf.ReducedModel(patch, LAW, parts=4), style.EXACT),
+    "1 part": (lambda patch: pf.ReducedModel(patch, LAW, parts=1), style.MOMENTS),
+    "published": (lambda patch: pf.ReducedModelPublished(patch, LAW), style.PUBLISHED),
+}
+"""Models by the words of the tables: how they are made, and their colour."""
+
+FINER = "refined(2)"
+"""Distributed model on finer cells, beside the shaken contacts."""
+
+
+def _masked(rows: str, cell: float, name: str) -> pf.ContactPatch:
+    """Return an even patch of the `#` in an image of rows, separated by spaces."""
+    mask = np.array([[float(mark == "#") for mark in row] for row in rows.split()])
+    return pf.ContactPatch.from_pressure(mask, cell_size=cell, name=name)
+
+
+def _beside(x: float, y: float) -> float:
+    return math.exp(-((x - 0.006) ** 2 + y**2) / (2.0 * 0.003**2))
+
+
+SHAPES: dict[str, Callable[[], pf.ContactPatch]] = {
+    "disc": lambda: pf.ContactPatch.disc(0.01),
+    "soft fingertip": lambda: pf.ContactPatch.disc(0.01, pressure=pf.SoftFinger(k=2.0, c=0.009, n=0.0)),
+    "edge load": lambda: pf.ContactPatch.disc(0.01, pressure=_beside),
+    "T": lambda: _masked(" ".join(["#" * 20] * 4 + ["." * 8 + "#" * 4 + "." * 8] * 16), 1e-3, "T"),
+    "L": lambda: _masked(" ".join(["#" * 4 + "." * 16] * 16 + ["#" * 20] * 4), 1e-3, "L"),
+    "line": lambda: pf.ContactPatch.line(0.02, 41),
+    "narrow pads": lambda: _masked(" ".join(["##" + "." * 26 + "##"] * 10), 1e-3, "narrow pads"),
+    "unequal pads": lambda: _masked(" ".join(["#" * 6 + "." * 16 + "##"] * 2 + ["#" * 6 + "." * 18] * 4), 1e-3, "pads"),
+}
+
+RAMPS, TOP, SLIPPED = (0.01, 0.1, 1.0), 1.35, 1e-5
+"""Times in which a load grows from zero to TOP times what the limit surface of mu_s holds [s], and displacement beyond
+that of the bent bristles at which the patch counts as slipping [m]."""
+
+LEVELS, CYCLE, LAST, T_END = (0.5, 0.65, 0.8, 0.85), 0.5, 20.0, 30.0
+"""Largest load of a shaken contact as shares of that limit surface, its cycle [s], and when it is measured [s]."""
+
+SHAKEN = ("disc", "T", "L", "line", "narrow pads")
+"""Shapes that are shaken."""
+
+
+def wrench_at_limit(patch: pf.ContactPatch, rng: np.random.Generator) -> np.ndarray:
+    """Draw a load `[3]` about the centre of pressure on the limit surface of mu_s."""
+    height, angle = rng.uniform(-0.9, 0.9), rng.uniform(0.0, 2.0 * np.pi)
+    flat, centre = math.sqrt(1.0 - height**2), patch.centre_of_pressure()
+    vx, vy, omega = flat * math.cos(angle), flat * math.sin(angle), height / patch.contact_radius()
+    fx, fy, tau = -pf.LimitSurfaceCells(patch).wrench((vx + omega * centre[1], vy - omega * centre[0], omega))
+    return LAW.mu_s * LOAD * np.array([fx, fy, tau - centre[0] * fy + centre[1] * fx])
+
+
+def moved(model: Any, body: pf.Body, times: np.ndarray, wrenches: np.ndarray, **options: Any) -> Any:
+    """Simulate a body whose centre of mass is the centre of pressure under wrenches `[T, 3]`; its motion."""
+    centre = model.patch.centre_of_pressure()
+    contact = pf.Contact(model, LOAD, position=tuple(-centre))
+    force = pf.Signal.sampled(times, wrenches, "linear")
+    return pf.simulate(pf.Scene(body, [contact], times[-1], force=force), **options).data
+
+
+def load_of_slip(model: Any, patch: pf.ContactPatch, wrench: np.ndarray, ramp: float) -> float:
+    """Return the share of `wrench` at which the patch slips while it grows within `ramp` [s]."""
+    gyration = patch.second_moment()
+    body = pf.Body(0.1, 0.4 * gyration, gravity=(0.0, 0.0))
+    data = moved(model, body, np.array([0.0, ramp]), np.outer([0.0, TOP], wrench),
+                 rtol=1e-6, atol=1e-9, save_every=ramp / 4000)  # fmt: skip
+    share = TOP * data.time.values / ramp
+    bent = np.outer(share, wrench / [1.0, 1.0, gyration]) / (LAW.sigma_0 * LOAD)
+    x, y, theta = (data[name].values - data[name].values[0] for name in ("x", "y", "theta"))
+    off = np.hypot(x - bent[:, 0], y - bent[:, 1]) + math.sqrt(gyration) * np.abs(theta - bent[:, 2])
+    first = int(np.argmax(off > SLIPPED))
+    if off[first] <= SLIPPED:
+        raise ValueError(f"no slip of {patch.name} in {ramp} s")
+    return float(np.interp(SLIPPED, off[first - 1 : first + 1], share[first - 1 : first + 1]))
+
+
+def breakaway(shape: str) -> dict[str, list[float]]:
+    """Return by model the load of slip over that of finer cells, less one, for two loads and all ramps."""
+    patch, rng = SHAPES[shape](), np.random.default_rng([25, *shape.encode()])
+    fine = patch.refined(3) if (patch.cell_extents() > 0.0).any() else patch
+    models = {name: make(patch) for name, (make, _) in MODELS.items()}
+    found: dict[str, list[float]] = {name: [] for name in models}
+    for wrench in (wrench_at_limit(patch, rng) for _ in range(2)):
+        for ramp in RAMPS:
+            truth = load_of_slip(pf.DistributedModel(fine, LAW), patch, wrench, ramp)
+            for name, model in models.items():
+                found[name].append(load_of_slip(model, patch, wrench, ramp) / truth - 1.0)
+    return found
+
+
+def two_pads(name: str) -> dict[str, float]:
+    """Return the least grips of two pads over their `holding_load`, and the slip [m] at 1.02 of it."""
+    patch = PUBLISHED_PATCHES["NonConvex1"]()
+    centre, model, mass, beside = patch.centre_of_pressure(), MODELS[name][0](patch), 0.1, 0.025
+    load = (0.0, -9.81 * mass, -9.81 * mass * (beside + centre[0]))
+    slow = pf.planning.holding_load(load, patch, LAW.mu_s)
+    inertia = mass * ((0.15**2 + 0.08**2) / 12.0 + (beside + centre[0]) ** 2)
+    least = {
+        f"{1e3 * ramp:g} ms": pf.planning.dynamic_holding_load(load, model, ramp=ramp, mass=mass, inertia=inertia)
+        / slow
+        for ramp in (0.0, 0.01, 0.1)
+    }
+    grip = pf.Signal.sampled([0.0, 0.31, 0.50], np.array([1.38, 1.0, 1.38]) * 1.02 * slow)
+    data = pf.simulate(pf.scenes.in_hand(model, centre_of_mass=(beside + centre[0], centre[1]), normal_force=grip)).data
+    return least | {"slip": float(np.hypot(data.x[-1] - data.x[0], data.y[-1] - data.y[0]))}
+
+
+def prices(steps: int = 20_000, rounds: int = 9) -> dict[str, dict[str, float]]:
+    """Return by model its states, and the times of a roll-out and of its gradient over the published model's."""
+    twists, loads = mixed_twists(steps), np.full(steps, 2.0)
+    models = {name: make(PUBLISHED_PATCHES["Circle"]()) for name, (make, _) in MODELS.items()}
+
+    def gradient(model: Any) -> None:
+        _, wrenches, states = rollout_states(model, model.rest(), twists, loads, 1e-4)
+        rollout_vjp(model, model.rest(), twists, loads, 1e-4, wrenches, states=states)
+
+    works = {"step": lambda model: rollout(model, model.rest(), twists, loads, 1e-4), "gradient": gradient}
+    times: dict[str, dict[str, list[float]]] = {name: {work: [] for work in works} for name in models}
+    for turn in range(-1, rounds):  # the first compiles
+        for name, model in models.items():
+            for work, done in works.items():
+                begin = time.process_time()
+                done(model)
+                if turn >= 0:
+                    times[name][work].append(time.process_time() - begin)
+    return {
+        name: {"states": float(np.prod(models[name].state_shape))}
+        | {work: float(np.median(np.divide(own[work], times["published"][work]))) for work in works}
+        | {"ns": float(np.median(own["step"])) / steps * 1e9}
+        for name, own in times.items()
+    }
+
+
+def shaken(shape: str, level: float) -> dict[str, float]:
+    """Return by model the creep per cycle [m] over the last ten seconds of a contact that is shaken and holds."""
+    patch = SHAPES[shape]()
+    t = np.arange(0.0, T_END + 0.0025, 0.005)
+    grown, phase, r = np.minimum(t / 0.3, 1.0), 2.0 * np.pi * t / CYCLE, patch.contact_radius()
+    fx, fy, spin = 0.43 + 0.32 * np.sin(phase), 0.27 * np.cos(phase), 0.27 + 0.32 * np.cos(phase + 0.6)
+    wrenches = LOAD * grown[:, None] * np.stack([fx, fy, r * spin], axis=1)
+    wrenches *= level / highest_level(patch, wrenches[100:300])
+    makes = {name: make for name, (make, _) in MODELS.items() if name != "4 parts"}
+    makes[FINER] = lambda patch: pf.DistributedModel(patch.refined(2), LAW)
+    found = {}
+    for name, make in makes.items():
+        body = pf.Body(1.0, 12.5 * patch.second_moment() * 2.0, gravity=(0.0, 0.0))
+        data = moved(make(patch), body, t, wrenches, rtol=1e-6, atol=1e-7, save_every=CYCLE)
+        times, own = data.time.values, np.stack([data.x.values, data.y.values, r * data.theta.values])
+        for first, last in ((LAST - 10.0, LAST), (LAST, T_END)):
+            span = (times > first) & (times <= last)
+            speeds = [np.polyfit(times[span], each[span], 1)[0] for each in own]
+            found[f"{name}, {last:g} s"] = CYCLE * float(np.linalg.norm(speeds))
+    return found
+
+
+def highest_level(patch: pf.ContactPatch, wrenches: np.ndarray) -> float:
+    """Return the largest share of wrenches about the centre of pressure in the limit surface of mu_s."""
+    surface, (x, y) = pf.LimitSurfaceTable(patch), patch.centre_of_pressure()
+    about = wrenches + np.outer(wrenches[:, 1] * x - wrenches[:, 0] * y, [0.0, 0.0, 1.0])
+    twists = [surface.twist(-wrench) for wrench in about]
+    return max(
+        float(wrench @ twist / (surface.dissipation(twist) * LAW.mu_s * LOAD))
+        for wrench, twist in zip(about, twists, strict=True)
+    )
+
+
+# ---------------------------------------------------------------------- tables and picture
+
+Rows = list[list[str]]
+
+
+def table_of_breakaway(kept: dict[str, Any]) -> Rows:
+    """Rows: the largest error of the load of slip by shape and model, and medians over all."""
+    rows = [["largest error [%]", *MODELS]]
+    for shape in SHAPES:
+        rows.append([shape, *(f"{100 * np.abs(kept[f'breakaway {shape}'][name]).max():.2f}" for name in MODELS)])
+    every = {name: np.abs(np.concatenate([kept[f"breakaway {shape}"][name] for shape in SHAPES])) for name in MODELS}
+    rows.append(["median of all", *(f"{100 * np.median(each):.3f}" for each in every.values())])
+    return [*rows, ["above 0.5 %", *(f"{(each > 0.005).sum()} of {each.size}" for each in every.values())]]
+
+
+def table_of_prices(kept: dict[str, Any]) -> Rows:
+    """Rows: states, prices and the grip of two pads, by model."""
+    rows = [["model", "states", "step", "gradient", "least grip: one step", "10 ms", "0.1 s", "slip at 1.02 [mm]"]]
+    for name in MODELS:
+        price, pads = kept["prices"][name], kept[f"two pads {name}"]
+        grips = (f"{pads[ramp]:.3f}" for ramp in ("0 ms", "10 ms", "100 ms"))
+        cost = (f"{price['states']:.0f}", f"{price['step']:.1f}", f"{price['gradient']:.1f}")
+        rows.append([name, *cost, *grips, f"{1e3 * pads['slip']:.2f}"])
+    return rows
+
+
+def table_of_creep(kept: dict[str, Any]) -> Rows:
+    """Rows: creep per cycle [nm], of the disc and the largest of all shapes, by level and model."""
+    names = [*(name for name in MODELS if name != "4 parts"), FINER]
+    rows = [["largest load", *names]]
+    for level in LEVELS:
+        found = [kept[f"shaken {shape} {level}"] for shape in SHAKEN]
+        cells = []
+        for name in names:
+            each = [1e9 * numbers[f"{name}, {T_END:g} s"] for numbers in found]
+            cells.append(
+                "; ".join(f"{value:.2g}" if value < 99.5 else f"{value:.0f}" for value in (each[0], max(each)))
+            )
+        rows.append([f"{level:g}", *cells])
+    return rows
+
+
+TABLES = {"load of slip": table_of_breakaway, "price": table_of_prices, "creep": table_of_creep}
+
+
+def draw(kept: dict[str, Any]) -> style.PlotFigure:
+    """Draw each error of the load of slip by shape, and the largest over the price of a step."""
+    figure = style.new_figure(9.6, 4.0)
+    left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0), sharey=True)
+    for k, (name, (_, colour)) in enumerate(MODELS.items()):
+        errors = [100 * np.abs(kept[f"breakaway {shape}"][name]) for shape in SHAPES]
+        places = np.repeat(np.arange(len(SHAPES)) + 0.13 * (k - 2.5), len(errors[0]))
+        left.plot(places, np.maximum(np.concatenate(errors), 1e-3), "o", color=colour, ms=3.5, alpha=0.7, label=name)
+        price, worst = kept["prices"][name]["step"], max(each.max() for each in errors)
+        right.plot(price, worst, "o", color=colour, ms=8)
+    left.set_xticks(range(len(SHAPES)), [shape.replace(" ", "\n") for shape in SHAPES])
+    left.set(yscale="log", ylabel="error of the load of slip [%]")
+    right.set(xscale="log", xlabel="time of a step / published model's")
+    right.set_title("largest of all", fontsize="medium", loc="left")
+    for axes in (left, right):
+        axes.axhline(0.5, color="0.5", lw=0.8, ls=":")
+        style.tidy(axes)
+    figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=len(MODELS), frameon=False)
+    return figure
+
+
+def measures() -> Iterator[tuple[str, Callable[[], Any]]]:
+    """Yield each measurement by the key under which it is kept."""
+    yield from ((f"breakaway {shape}", lambda shape=shape: breakaway(shape)) for shape in SHAPES)
+    yield from ((f"two pads {name}", lambda name=name: two_pads(name)) for name in MODELS)
+    yield "prices", prices
+    for level in LEVELS:
+        for shape in SHAKEN:
+            yield f"shaken {shape} {level}", lambda shape=shape, level=level: shaken(shape, level)
+
+
+def main() -> None:
+    """Measure what is not kept yet, and write tables and picture."""
+    kept = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
+    for key, measure in measures():
+        if key not in kept:
+            kept[key] = measure()
+            KEPT.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+            print(key, flush=True)
+
+    def written(found: re.Match[str]) -> str:
+        rows = TABLES[found["name"]](kept)
+        lines = [rows[0], ["---"] * len(rows[0]), *rows[1:]]
+        return f"<!-- breakaway: {found['name']} -->\n\n" + "".join(f"| {' | '.join(row)} |\n" for row in lines) + "\n"
+
+    for page in sorted(DOCS.glob("*.md")):
+        before = page.read_text(encoding="utf-8")
+        if (after := MARK.sub(written, before)) != before:
+            page.write_text(after, encoding="utf-8")
+            print(f"{page.name}: new numbers")
+    draw(kept).savefig(PICTURE)
+
+
+if __name__ == "__main__":
+    main()
