@@ -16,7 +16,7 @@ patch = PUBLISHED_PATCHES["NonConvex1"]()
 law = pf.LuGre(mu_c=1.0, mu_s=1.2, elasto_plastic=0.9)
 models = {
     "distributed": pf.DistributedModel(patch, law),
-    "reduced": pf.ReducedModel(patch, law),
+    "reduced": pf.ReducedModel(patch, law, parts=1),
     "reduced, in parts": pf.ReducedModel(patch, law, parts="auto"),
     "published reduced": pf.ReducedModelPublished(patch, law),
 }
