@@ -6,6 +6,7 @@ import contextlib
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -100,8 +101,9 @@ FLUENT = 0.1
 CATCH_UP = 250
 """Time [ms] without a change after which a browser that does not keep up draws all the same."""
 
-_ANSWER = "requestAnimationFrame(() => requestAnimationFrame(() => { drawn.value = asked.value }))"
-"""Script for the browser: it answers two frames later, when the picture is on the screen."""
+_ANSWER = "requestAnimationFrame(() => requestAnimationFrame(() => { drawn.value = cb_obj.value }))"
+"""Script for the browser: it answers two frames later, when the picture is on the screen. It takes the
+counter as `cb_obj`: Panel keeps a widget for ever that is also an argument of its own script."""
 
 
 class Paced:
@@ -116,8 +118,9 @@ class Paced:
         self._busy = False
         self.asked: Any = pn.widgets.IntInput(value=0, visible=False)
         self.drawn: Any = pn.widgets.IntInput(value=0, visible=False)
-        self.asked.jscallback(value=_ANSWER, args={"asked": self.asked, "drawn": self.drawn})
-        self.drawn.param.watch(self._answered, "value")
+        self.asked.jscallback(value=_ANSWER, args={"drawn": self.drawn})
+        this = weakref.proxy(self)  # as `drawn` is kept with the script as long as `asked` lives
+        self.drawn.param.watch(lambda _: this._answered(), "value")
 
     def ask(self) -> None:
         """Draw what there is to draw, now or soon."""
@@ -138,7 +141,7 @@ class Paced:
         self._draw()
         self.asked.value += 1
 
-    def _answered(self, _: Any) -> None:
+    def _answered(self) -> None:
         self._took, self._busy = time.perf_counter() - self._sent, False
         if self._late:
             self.ask()

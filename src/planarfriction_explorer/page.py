@@ -10,6 +10,7 @@ from typing import Any
 import panel as pn
 
 from planarfriction.errors import FrictionError
+from planarfriction.laws import LAWS, FrictionLaw
 from planarfriction_explorer import code, looks, pictures
 from planarfriction_explorer.answers import Answer, answer
 from planarfriction_explorer.controls import OWN, Controls
@@ -34,6 +35,8 @@ class Page:
         self.state = State()
         self.answer: Answer | None = None
         self._figure: dict[str, Any] = {}
+        self._laws: dict[str, FrictionLaw] = {}
+        """Last law of each kind, which comes back when the kind is chosen again."""
         self._pointer: tuple[float, float] | None = None
         self.slow = Paced(self._show_slow)
         self.controls = Controls(self.state)
@@ -83,7 +86,9 @@ class Page:
         self.controls.offer_parameters(self.state.law, lambda _: self._try(self._set_law))
 
     def _choose_law(self, kind: str) -> None:
-        self.state = self.state.with_law(kind)
+        self._laws[str(LAWS.name_of(self.state.law))] = self.state.law
+        law = self._laws.get(kind)
+        self.state = self.state.with_law(kind) if law is None else self.state.changed(law=law)
         self._offer_parameters()
         self._refresh()
 

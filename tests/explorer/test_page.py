@@ -7,6 +7,7 @@ import re
 import signal
 import threading
 import warnings
+import weakref
 from typing import Any
 
 import numpy as np
@@ -77,6 +78,25 @@ def test_a_law_has_its_fields_and_a_value_that_breaks_a_rule_is_one_line(page):
     assert "mu_c must be &gt; 0" in page.message.object and page.message.visible and page.state.law is law
     page.controls.parameters[0].value = 0.4
     assert page.state.law.mu_c == 0.4 and not page.message.visible
+
+
+def test_a_law_that_is_chosen_again_has_its_values(page):
+    first = page.state.law
+    page.controls.law.value = "dahl"
+    page.controls.parameters[0].value = 0.4
+    page.controls.law.value = "lugre"
+    assert page.state.law == first and first.mu_s == 1.2 and first.elasto_plastic is not None
+    assert page.controls.law_values()["mu_s"] == 1.2
+    page.controls.law.value = "dahl"
+    assert page.state.law.mu_c == 0.4
+
+
+def test_a_page_that_nobody_holds_is_freed():
+    one = Page()
+    layout, kept = one.layout(), weakref.ref(one)
+    del one, layout
+    gc.collect()
+    assert kept() is None
 
 
 def test_an_empty_map_leaves_no_numbers_of_another_one(page):
