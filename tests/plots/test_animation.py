@@ -425,6 +425,19 @@ def test_without_ffmpeg_the_extra_is_named(tmp_path, monkeypatch):
         synthetic.solution().animate(tmp_path / "motion.mp4")
 
 
+def test_an_ffmpeg_that_is_not_where_it_is_named_is_said_to_be_missing(tmp_path, monkeypatch):
+    pytest.importorskip("imageio_ffmpeg")
+    monkeypatch.setattr(film_files.shutil, "which", lambda name: None)
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(tmp_path / "gone"))
+    with pytest.raises(FileError, match=r"there is no ffmpeg at .*gone, which imageio-ffmpeg names"):
+        synthetic.solution().animate(tmp_path / "motion.mp4")
+
+
+def test_the_slowest_gif_is_written(tmp_path):
+    path = synthetic.solution().animate(tmp_path / "motion.gif", fps=animation.SLOWEST, slow=1e3, dpi=20.0)
+    assert path.stat().st_size > 0
+
+
 @pytest.mark.parametrize("kind", ["gif", "html", "mp4"])
 def test_ctrl_c_leaves_what_was_there(tmp_path, kind):
     if kind == "mp4":
@@ -478,6 +491,7 @@ def test_an_ffmpeg_that_fails_is_named_and_one_that_is_stopped_is_not(tmp_path, 
         ({"slow": 1e4}, "slow must be at most 50 here, for at most 3000 frames, got 10000.0"),
         ({"fps": 60}, "fps must be at most 50, got 60.0"),
         ({"fps": -1}, "fps must be > 0"),
+        ({"fps": 1e-3}, "fps must be at least 0.01, got 0.001"),
         ({"follow": "body"}, "follow must be True or False, got 'body'"),
         ({"dpi": 5}, "dpi must be from 20 to 400, got 5.0"),
         ({"progress": 5}, "progress must be a function of the time of a frame, or None, got 5"),

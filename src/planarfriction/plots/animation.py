@@ -22,6 +22,9 @@ LEAST_FRAMES, USUAL_FRAMES, MOST_FRAMES = 75, 300, 3000
 FASTEST = 50.0
 """Most frames a second: browsers show faster GIFs ten times too slow."""
 
+SLOWEST = 0.01
+"""Fewest frames a second: a GIF shows no frame for more than 655 s."""
+
 
 def animate_solution(
     solution: pf.Solution,
@@ -51,7 +54,7 @@ def animate_solution(
         How many times slower than real time [-]; below 1 is faster. None: real time if that makes 75 to 300 frames,
         else the next of 1, 2, 5, 10, ... that does.
     fps
-        Frames per second, at most 50.
+        Frames per second, from 0.01 to 50.
     follow
         Whether the view follows a body that moves much farther than its size, instead of showing the whole path.
     dpi
@@ -95,6 +98,8 @@ def frame_times(sampled: np.ndarray, slow: float | None, fps: float) -> tuple[np
     fps = validation.positive("fps", fps)
     if fps > FASTEST:
         raise InvalidValueError("fps", f"be at most {FASTEST:g}", fps)
+    if fps < SLOWEST:
+        raise InvalidValueError("fps", f"be at least {SLOWEST:g}", fps)
     span = float(sampled[-1] - sampled[0])
     if slow is None:
         slow = _usual_pace(span * fps)

@@ -173,4 +173,6 @@ def _ffmpeg(path: Path) -> str:
         except (ImportError, RuntimeError):
             what = "ffmpeg is not installed: run pip install 'planarfriction[ffmpeg]', or write a .gif or an .html"
             raise FileError(f"cannot write {path}: {what}") from None
+        if not Path(found).is_file():  # the variable IMAGEIO_FFMPEG_EXE is not checked by imageio-ffmpeg
+            raise FileError(f"cannot write {path}: there is no ffmpeg at {found}, which imageio-ffmpeg names")
     return found
