@@ -244,6 +244,20 @@ def test_damaged_files_do_not_count(tmp_path):
     assert again.identical(data)
 
 
+def test_a_folder_in_place_of_a_file_fails_one_run(tmp_path):
+    """It does for a file of results, and one in place of the file of a failure changes nothing."""
+    runs = pf.sweep(grip, {"grip": GRIPS}).run.values.tolist()
+    (tmp_path / f"{runs[1]}.npz").mkdir()
+    (tmp_path / f"{runs[1]}.failed.json").mkdir()
+    data = pf.sweep(grip, {"grip": GRIPS}, out=tmp_path)
+    assert data.status.values.tolist() == ["success", "failed", "success"]
+    assert "cannot be written" in str(data.failure[1].item()) and runs[1] in str(data.failure[1].item())
+    refused = pf.sweep(crossed, {"grip": GRIPS, "mass": MASSES})
+    (tmp_path / f"{refused.run.values[2, 0]}.failed.json").mkdir()
+    again = pf.sweep(crossed, {"grip": GRIPS, "mass": MASSES}, out=tmp_path)
+    assert again.failure.values.tolist() == refused.failure.values.tolist()
+
+
 def test_files_hold_what_runs_have_left_and_nothing_is_lost():
     variables = {
         "y": records.History(("time",), np.array([0.0, -0.0, np.nan]), {"units": "m"}),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planarfriction.errors import InvalidValueError
+from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.scenes.signal import SAME_TIME
 from planarfriction.scenes.solution import History
 from planarfriction.sweeps.quantities import Grid
@@ -179,12 +179,27 @@ class FolderBookkeeper(Bookkeeper):
             return record
         failed = f"{self._begin}{key}.failed.json"
         if record.status == FAILED:
-            put(failed, failure(record.reason, scene).encode())
+            _put(failed, failure(record.reason, scene).encode())
             return record
-        put(f"{self._begin}{key}.npz", pack(record))
+        if reason := _put(f"{self._begin}{key}.npz", pack(record)):
+            return Record(FAILED, reason, {})
         with contextlib.suppress(OSError):
             os.unlink(failed)
         return record
+
+
+def _put(path: str, content: bytes) -> str:
+    """Write the file of a run; returns the reason if a folder has its name, which concerns this run alone, or nothing.
+
+    Raises FileError if the file cannot be written for another reason, such as a full disk.
+    """
+    try:
+        put(path, content)
+    except FileError as error:
+        if not os.path.isdir(path):
+            raise
+        return str(error)
+    return ""
 
 
 # ---------------------------------------------------------------------- variables of a run in those of all
