@@ -362,6 +362,16 @@ def test_an_interrupt_keeps_what_is_done(tmp_path, capsys):
     assert (tmp_path / "measured.json").exists()
 
 
+def test_a_model_that_raises_is_one_line_and_the_others_keep_their_results(tmp_path, capsys):
+    (tmp_path / "own.py").write_text("def first(question):\n    return question.nothing\n")
+    given = ["--only", "ellipsoid", "--own", f"{tmp_path / 'own.py'}:first", "--out", str(tmp_path)]
+    assert main(["measured", "--task", "pushes", *given]) == 2
+    printed = capsys.readouterr()
+    assert "ellipsoid" in printed.out and "Traceback" not in printed.err
+    assert "error: model first must answer its questions, got AttributeError: " in printed.err
+    assert set(json.loads((tmp_path / "measured.json").read_text())["tasks"]["pushes"]["models"]) == {"ellipsoid"}
+
+
 @pytest.mark.parametrize(
     ("options", "word"),
     [

@@ -93,6 +93,7 @@ def measured(
     from planarfriction import validation
     from planarfriction.cli import INTERRUPTED
     from planarfriction.cli.console import note, print_table, work_progress
+    from planarfriction.errors import FrictionError
     from planarfriction.writing import make_folder
     from planarfriction_studies.measured import TASKS, Benchmark
     from planarfriction_studies.measured.library import LIBRARY
@@ -108,7 +109,7 @@ def measured(
         make_folder(folder)
     benchmark = Benchmark(models, tasks or tuple(TASKS), tables, seed)
     benchmark.left_out += left_out
-    code = 0
+    code, wrong = 0, None
     try:
         with work_progress("measured") as progress:
             benchmark.run(progress)
@@ -116,7 +117,11 @@ def measured(
         done = sum(map(len, benchmark.results.values()))
         note(f"interrupted: {done} of {len(models) * len(benchmark.tasks)} results are finished")
         code = INTERRUPTED
+    except FrictionError as error:  # of a model: the others are done
+        wrong = error
     _show(benchmark, as_json, folder if benchmark.results else None)
+    if wrong is not None:
+        raise wrong
     return code
 
 

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.errors import InvalidValueError
+from planarfriction.errors import FrictionError, InvalidValueError
+from planarfriction.sweeps.records import reason_of
 from planarfriction_studies.measured.library import library
 from planarfriction_studies.measured.pushes import published
 from planarfriction_studies.measured.questions import Case
@@ -100,9 +101,11 @@ class Benchmark:
     def run(self, progress: Callable[[str], None] | None = None) -> dict[str, dict[str, Result]]:
         """Fit and score every model on every task; returns `results`.
 
-        Raises `InvalidValueError` if an answer has the wrong shape or contains numbers that are not finite.
+        Raises `InvalidValueError` if a model raised an error, or gave an answer of the wrong shape or with numbers that
+        are not finite. The other models are run first, and `results` has theirs.
         """
         say = (lambda text: None) if progress is None else progress
+        wrong: list[Exception] = []
         for name in self.tasks:
             task, test = TASKS[name], self.test(name)
             training = [case for case in self.cases[name] if case.is_training]
@@ -114,6 +117,9 @@ class Benchmark:
                     answers = _answers(fitted, called, test, lambda part, n=name, c=called: say(f"{n}: {c}, {part}"))
                 except NotImplementedError:
                     continue  # a model need not answer every task
+                except Exception as error:
+                    wrong.append(_failure(called, error))
+                    continue
                 errors = tuple(task.errors(case, answer) for case, answer in zip(test, answers, strict=True))
                 # friction coefficients cancel in the other tasks
                 told = name == "slides" or (name == "onsets" and fitted is not model)
@@ -125,7 +131,18 @@ class Benchmark:
                 self.results.setdefault(name, {})[called] = Result(
                     scores, tuple(answers), errors, values, checked, seconds, regions
                 )
+        if wrong:
+            raise wrong[0]
         return self.results
+
+
+def _failure(name: str, error: Exception) -> Exception:
+    """Return the error of a model as one of the library, whose cause it is."""
+    if isinstance(error, FrictionError):
+        return error
+    told = InvalidValueError(f"model {name}", "answer its questions", reason_of(error))
+    told.__cause__ = error
+    return told
 
 
 def _answers(model: Any, name: str, cases: Sequence[Case], say: Callable[[str], None]) -> list[np.ndarray]:
