@@ -108,3 +108,14 @@ def test_parts_abreast_are_the_sum_of_models_of_one_part():
         close(ours.states[..., k, :], one.states)
         total += part.share * one.wrenches
     close(ours.wrenches, total)
+
+
+@pytest.mark.parametrize("surface", [pf.LimitSurfaceCells, pf.LimitSurfaceTable, pf.LimitSurfaceTablePublished])
+def test_twists_whose_squares_leave_the_range_of_numbers_are_rest(surface):
+    generator, model = np.random.default_rng(0), pf.ReducedModelPublished(PATCH, ELASTIC, surface=surface(PATCH))
+    twist = 10.0 ** generator.uniform(-163.0, -160.0, (1000, 1, 1)) * generator.normal(size=(1000, 1, 3)) * [1, 1, 150]
+    start = generator.normal(size=(1000, 3)) * [1e-7, 1e-7, 1e-9]
+    ours, still = (derivatives.rollout(model, start, each, 1.0, 1e-3) for each in (twist, 0.0 * twist))
+    np.testing.assert_array_equal(ours.wrenches, still.wrenches)
+    for each in derivatives.rollout_vjp(model, start, twist, 1.0, 1e-3, np.ones((1, 3))):
+        assert np.isfinite(each).all()

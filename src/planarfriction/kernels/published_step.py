@@ -56,9 +56,10 @@ class PublishedStep(NamedTuple):
 
 @kernel
 def scaled_twist(shape, twist):
-    """Return `V_S`."""
+    """Return `V_S`; rest up to `STILL`, below which the squares in its norm leave the range of numbers."""
     vx, vy, omega = twist
-    return vx - omega * shape.centre_y, vy + omega * shape.centre_x, shape.contact_radius * omega
+    scaled = vx - omega * shape.centre_y, vy + omega * shape.centre_x, shape.contact_radius * omega
+    return times(xp.where(norm(scaled) > STILL, 1.0, 0.0), scaled)
 
 
 @kernel
@@ -66,8 +67,6 @@ def hold(contact, twist):
     """Return `HeldTwist` at a twist."""
     surface, scaled = contact.surface, scaled_twist(contact.shape, twist)
     v = norm(scaled)
-    moves = xp.where(v > STILL, 1.0, 0.0)
-    scaled, v = times(moves, scaled), moves * v
     u = sliding(surface[0], contact.data, surface[1], surface[2], scaled[0], scaled[1], scaled[2], v)
     return HeldTwist(scaled, twist[2], v, u)
 
