@@ -30,6 +30,14 @@ def test_a_linear_signal_is_joined_by_straight_lines():
     assert signal.breaks.tolist() == [1.0, 2.0, 4.0]
 
 
+@pytest.mark.parametrize("values", [[0.0, 1.0, 2.0], [[0.0, 0.0], [0.0, 1.0], [0.0, 1.0]]])
+def test_samples_so_close_that_the_slope_overflows_are_refused(values):
+    with pytest.raises(InvalidValueError, match="times must be far enough apart for a finite slope"):
+        Signal.sampled([0.0, 5e-324, 0.02], values, hold="linear")
+    held = Signal.sampled([0.0, 5e-324, 0.02], values)
+    assert np.array_equal(held(0.01), values[1])
+
+
 def test_vector_signals_keep_their_columns():
     signal = Signal.sampled([0.0, 1.0], [[1.0, 2.0, 3.0], [3.0, 2.0, 1.0]], hold="linear")
     assert signal.columns == 3

@@ -296,6 +296,20 @@ def test_failure_says_the_remedy_and_keeps_what_is_done():
     assert np.isfinite(kept.x).all()
 
 
+def test_a_run_ends_after_max_steps_and_keeps_what_is_done():
+    scene = free_scene()
+    with pytest.raises(pf.errors.SolverError, match="max_steps steps were tried before the end: raise it") as caught:
+        pf.simulate(scene, max_steps=25)
+    done, whole = caught.value.solution, pf.simulate(scene)
+    count = done.statistics.steps + done.statistics.rejections
+    assert (done.status, count) == ("step limit", 25)
+    reached = len(done.data.time)
+    assert 0 < reached < len(whole.data.time)
+    np.testing.assert_array_equal(done.data.x, whole.data.x[:reached])
+    every = whole.statistics.steps + whole.statistics.rejections
+    assert pf.simulate(scene, max_steps=every).status == "success"
+
+
 def test_interruption_keeps_what_is_done():
     def stop(time: float) -> None:
         if time > 0.3:

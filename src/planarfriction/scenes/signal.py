@@ -86,6 +86,14 @@ class Signal(ByValue):
                 "times", "increase", f"{times[i]:g} s, then {times[i + 1]:g} s at index {i + 1} ({kind})"
             )
         validation.choice("hold", self.hold, ("previous", "linear"))
+        if self.hold == "linear":
+            with np.errstate(over="ignore"):
+                steep = ~np.isfinite((np.diff(values, axis=0).T / steps).T).reshape(len(steps), -1).all(axis=1)
+            if steep.any():
+                i = int(np.argmax(steep))
+                raise InvalidValueError(
+                    "times", "be far enough apart for a finite slope", f"{times[i]:g} s, then {times[i + 1]:g} s"
+                )
         times.setflags(write=False)
         values.setflags(write=False)
         self._set(times=times, values=values)

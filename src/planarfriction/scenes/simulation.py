@@ -14,6 +14,7 @@ from planarfriction.kernels.integration import Method, Output
 from planarfriction.scenes.options import SolverOptions
 from planarfriction.scenes.packing import SegmentBatches
 from planarfriction.scenes.scene import Scene
+from planarfriction.scenes.signal import MOST_SAMPLES
 from planarfriction.scenes.solution import History, Solution
 from planarfriction.solvers import RODAS4, integrate
 
@@ -22,6 +23,9 @@ BRISTLES = ("none", "all")
 
 MOST_NUMBERS = 10**9
 """Numbers of bristles that a run records at most: 8 GB."""
+
+MAX_STEPS = 5 * MOST_SAMPLES
+"""Steps that a run tries at most by default: five for each sample of the longest signal, a minute with few states."""
 
 _BODY = {"vx": "m/s", "vy": "m/s", "omega": "rad/s", "x": "m", "y": "m", "theta": "rad"}
 _WRENCH = {"fx": "N", "fy": "N", "tau": "N m"}
@@ -50,6 +54,7 @@ def simulate(
     bristles: str = "none",
     method: Method = RODAS4,
     progress: Callable[[float], None] | None = None,
+    max_steps: int = MAX_STEPS,
 ) -> Solution:
     """Simulate a scene from its start at t = 0 and record it every `save_every` [s]; returns a `Solution`.
 
@@ -77,13 +82,15 @@ def simulate(
         `planarfriction.solvers.RODAS4` (default) or `RODAS3`.
     progress
         Called with the simulated time [s] from time to time.
+    max_steps
+        Largest number of steps that the solver tries, accepted or rejected: whatever the scene asks for, a run ends.
 
     Raises
     ------
     InvalidValueError
         A parameter breaks its rule.
     SolverError
-        The solver failed; carries the solution so far and suggests a remedy.
+        The solver failed, or tried `max_steps` steps; carries the solution so far and suggests a remedy.
     SimulationInterrupted
         Ctrl-C; carries the solution so far. Before anything is recorded, for example during compilation, it is a plain
         `KeyboardInterrupt`.
@@ -96,11 +103,13 @@ def simulate(
         raise InvalidValueError("method", "be solvers.RODAS4 or solvers.RODAS3", method)
     if not (progress is None or callable(progress)):
         raise InvalidValueError("progress", "be a function of the simulated time, or None", progress)
+    max_steps = validation.count("max_steps", max_steps)
     with said_when_compiling(silent=progress is not None):
         batches = SegmentBatches(scene, plan.end, times=plan.times)
         output = _output(plan.times, batches, bristles)
         scales = plan.atol * batches.state_scale
-        run = integrate(batches, output, batches.state, method=method, rtol=plan.rtol, atol=scales, progress=progress)
+        limits = {"rtol": plan.rtol, "atol": scales, "max_steps": max_steps}
+        run = integrate(batches, output, batches.state, method=method, progress=progress, **limits)
     cost = replace(run.statistics, compile_time=run.statistics.compile_time + batches.loading)
     solution = Solution(_histories(scene, batches, run.output), cost, run.status, run.message, scene)
     if run.status == "interrupted":

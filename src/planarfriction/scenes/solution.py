@@ -75,7 +75,7 @@ class Solution:
     statistics: Statistics
     """Number of steps and computing time."""
     status: str
-    """"success", "at rest", or the reason why the simulation ended early: "interrupted", "step too small"."""
+    """"success", "at rest", or the reason for an early end: "interrupted", "step too small", "step limit"."""
     message: str
     """Message in one sentence, with a remedy if the solver failed."""
     scene: Scene

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -21,6 +22,9 @@ _STATES_PER_SLICE = 400_000
 _FIRST_STEP = 1e-6
 """First trial step [s]: below the relaxation time of a bristle, so that it is hardly ever rejected."""
 
+_STEP_LIMIT = 4
+"""Outcome beside those of the compiled loop: all steps that a run may try are taken."""
+
 _MESSAGES = {
     kernels.DONE: ("success", "reached the end"),
     kernels.AT_REST: ("at rest", "the body came to rest"),
@@ -28,6 +32,10 @@ _MESSAGES = {
     kernels.STEP_TOO_SMALL: (
         "step too small",
         "the step size fell below the resolution of time: loosen rtol, or check the scene for extreme parameters",
+    ),
+    _STEP_LIMIT: (
+        "step limit",
+        "max_steps steps were tried before the end: raise it, or check the scene for extreme parameters",
     ),
 }
 
@@ -39,6 +47,11 @@ def start_of(state: np.ndarray) -> Progress:
     """Return the progress of an integration that has yet to begin."""
     clock = np.array([0.0, _FIRST_STEP, np.inf])
     return Progress(np.array(state, dtype=float), np.zeros(2, np.int64), clock, np.zeros(4, np.int64))
+
+
+def tried(at: Progress) -> int:
+    """Return the number of steps that an integration has tried, accepted or not."""
+    return int(at.statistics[kernels.STEPS] + at.statistics[kernels.REJECTIONS])
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,13 +77,15 @@ def integrate(
     rtol: float,
     atol: np.ndarray,
     progress: Callable[[float], None] | None = None,
+    max_steps: float = math.inf,
 ) -> Integration:
     """Integrate a motion, given in windows, from its first break to its last, and record it at `output.time`.
 
     Each window continues where the previous one ends, and is released before the next one is requested. `state`
     contains bristles, body velocity and pose; `atol` is the absolute tolerance of each of its entries. `progress` is
-    called with the simulated time from time to time, and before each further window. Ctrl-C ends with the status
-    "interrupted", or with `KeyboardInterrupt` if nothing has been recorded yet.
+    called with the simulated time from time to time, and before each further window. After `max_steps` steps, rejected
+    ones included, it ends with the status "step limit". Ctrl-C ends with the status "interrupted", or with
+    `KeyboardInterrupt` if nothing has been recorded yet.
 
     Raises `InvalidValueError` for `rtol <= 0`.
     """
@@ -92,8 +107,8 @@ def integrate(
             run, breaks = kernels.Run(system, method, output, at, rtol=rtol, atol=atol), system.motion.breaks
             at.cursor[0], outcome = 0, kernels.PAUSED
             while outcome == kernels.PAUSED:
-                begin = time.perf_counter()
-                outcome = kernels.advance(run.address, slice_steps)
+                begin, left = time.perf_counter(), max_steps - tried(at)
+                outcome = kernels.advance(run.address, min(slice_steps, left)) if left > 0 else _STEP_LIMIT
                 wall_time += time.perf_counter() - begin
                 if progress is not None:
                     piece = min(int(at.cursor[0]), len(breaks) - 1)
