@@ -1,5 +1,6 @@
 # make demo: the main job, with everything it needs.   make test: the tests.   The rest is for development.
 # make test-generic: the tests of numbers once more, compiled for any x86-64 or ARM processor instead of this one.
+# make test-bounds: the quick tests of numbers once more, with every index of compiled loops checked.
 # make test-lowest: the tests with the lowest versions of everything.
 # make fuzz MINUTES=60: attacks with random examples, an hour long.
 # make docs: the site, in build/docs; scripts of its gallery run once, and again when they have changed.
@@ -13,7 +14,7 @@ LOWEST := .venv-lowest
 # survive from run to run. What is installed changes with pyproject.toml only.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-generic test-lowest fuzz docs lint bench clean
+.PHONY: demo test test-generic test-bounds test-lowest fuzz docs lint bench clean
 
 demo: $(VENV)/.package
 	$(BIN)/planarfriction run in-hand --model both --out out/ --plot
@@ -28,6 +29,13 @@ NUMERIC := compiler derivatives identify kernels limit_surface models patch plan
 
 test-generic: $(VENV)/.test
 	NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES= $(BIN)/python -m pytest -n 2 --dist loadfile $(NUMERIC:%=tests/%) $(ARGS)
+
+# Loops whose indices are checked compile into their own machine code, of which the whole half takes an hour; pointers
+# have no bounds to check.
+BOUNDED := kernels derivatives limit_surface tensors test_coupling.py
+
+test-bounds: $(VENV)/.test
+	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -n 2 --dist loadfile $(BOUNDED:%=tests/%) $(ARGS)
 
 # The lowest versions that pyproject.toml promises, without the optional front ends.
 test-lowest: $(LOWEST)/.test

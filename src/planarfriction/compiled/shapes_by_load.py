@@ -37,14 +37,19 @@ class ShapesByLoad(NamedTuple):
     by_load: np.ndarray
     """Slopes of these numbers and of the share by the load `[P, L, S + 1]` [1/N]."""
     data: np.ndarray
-    """Numbers of the map that lies first in memory, from which those of all others are reached."""
+    """Numbers from the map that lies first in memory to the end of the last, of which only maps may be read."""
 
 
-class _Holding:
-    """An array that holds others, too."""
+class _Span:
+    """Addresses from the first of several arrays to the end of the last, which it keeps alive.
 
-    def __init__(self, first: np.ndarray, others: Sequence[np.ndarray]) -> None:
-        self.__array_interface__, self.others = first.__array_interface__, others
+    What lies between them belongs to others: only the arrays may be read.
+    """
+
+    def __init__(self, arrays: Sequence[np.ndarray]) -> None:
+        first = min(arrays, key=place_of)
+        words = (max(place_of(each) + each.nbytes for each in arrays) - place_of(first)) // first.itemsize
+        self.__array_interface__, self.arrays = {**first.__array_interface__, "shape": (words,)}, tuple(arrays)
 
 
 def shapes_by_load(loaded: Sequence[Sequence[Part]], by_load: np.ndarray | None) -> ShapesByLoad:
@@ -75,9 +80,8 @@ def cells_by_load(levers: np.ndarray, weights: np.ndarray, by_load: np.ndarray |
 
 
 def places_of(maps: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the offset of each map from the lowest address, and the array at that address, which holds all maps."""
+    """Return the offset of each map from the lowest address, and the array from there to the end of the last map."""
     own = {id(data): data for data in maps}
-    at = {name: place_of(data) for name, data in own.items()}
-    first = min(own, key=at.__getitem__)
-    begin = {name: (place - at[first]) // own[first].itemsize for name, place in at.items()}
-    return np.array([begin[id(data)] for data in maps]), np.asarray(_Holding(own[first], tuple(own.values())))
+    data = np.asarray(_Span(tuple(own.values())))
+    begin = {name: (place_of(each) - place_of(data)) // data.itemsize for name, each in own.items()}
+    return np.array([begin[id(each)] for each in maps]), data

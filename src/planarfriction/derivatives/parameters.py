@@ -59,7 +59,7 @@ class Family(NamedTuple):
     gradient: Callable[..., None]
     sensitivities: Callable[..., None]
     tangent: Callable[..., None]
-    """Compiled loops (see `kernels.rollouts`)."""
+    """Compiled loops (see `kernels.rollouts`), which add to what comes in but for the state."""
 
 
 def _family_of(names: tuple[str, ...], numbers: tuple[str, ...], many: Any, one: Any) -> Family:
@@ -86,9 +86,9 @@ def _cells(entries: cells_rollout.CellRollouts) -> Family:
         """Change one number after the other."""
         start, none = z[:, slice(*span)].copy(), np.zeros((1, len(inputs.dt), 3))
         for d, column in enumerate(columns):
-            z[:, slice(*span)], numbers = start, np.zeros((1, inputs.rows.shape[-1]))
+            z[:, slice(*span)], wrenches[slice(*span)], numbers = start, 0.0, np.zeros((1, inputs.rows.shape[-1]))
             numbers[:, column] = 1.0
-            changes, change = Bars(np.zeros_like(z), none, none[..., 0], numbers), np.empty(wrenches.shape)
+            changes, change = Bars(np.zeros_like(z), none, none[..., 0], numbers), np.zeros(wrenches.shape)
             entries.tangent(inputs, span, z, changes, wrenches, change)
             slopes[slice(*span), ..., d] = change[slice(*span)]
 

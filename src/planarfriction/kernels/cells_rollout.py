@@ -36,7 +36,7 @@ from planarfriction.kernels.derive import derive
 from planarfriction.kernels.forward import forward
 from planarfriction.kernels.law import law_of, squared
 from planarfriction.kernels.rollouts import row_of
-from planarfriction.kernels.vectors import accumulate, dot, plus, put, scatter, three, times
+from planarfriction.kernels.vectors import accumulate, add, dot, plus, scatter, three, times
 
 PARAMETERS = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
 """Numbers of the law that derivatives are taken by."""
@@ -118,10 +118,9 @@ def _roll(lever, law, inputs, b, n, w, wrench, states):
         load, twist, dt = loads[t], three(twists[t]), inputs.dt[t]
         if load == 0.0:
             _forget(w, blocks, Z)
-            put(wrench[t], (0.0, 0.0, 0.0))
         else:
             advance(lever, law, w, blocks, lanes, twist, dt)
-            put(wrench[t], times(load, totals(w, blocks, OUT, lanes)))
+            add(wrench[t], times(load, totals(w, blocks, OUT, lanes)))
 
 
 @kernel
@@ -140,7 +139,7 @@ def _rollout(lever, inputs, span, z, wrench, states, w):
 
 
 def rollout(lever, inputs, span, z, wrench, states):
-    """Step the contacts `span[0]` to `span[1]`: `z` [1, B, 2 n] in place, wrenches into `wrench` [B, T, 3].
+    """Step the contacts `span[0]` to `span[1]`: `z` [1, B, 2 n] in place, wrenches added to `wrench` [B, T, 3].
 
     The state before each step goes into `states` [1, B, T, 2 n], unless that is empty.
     """
@@ -185,8 +184,8 @@ def _pull(lever, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
         loaded = 0.0 if load == 0.0 else 1.0
         for k in range(blocks):
             _retreat(lever, law, at(w, k * BLOCK), twist, dt, pull, load, loaded, lanes)
-        put(twist_bar[t], totals(w, blocks, OUT, lanes))
-        load_bar[t] = total(w, blocks, OUT + 3 * LANES, lanes)
+        add(twist_bar[t], totals(w, blocks, OUT, lanes))
+        load_bar[t] += total(w, blocks, OUT + 3 * LANES, lanes)
 
 
 @kernel
@@ -204,11 +203,11 @@ def _gradient(lever, inputs, states, wrench_bar, span, bars, w):
             _pull(lever, law, inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b])
         _read(w, BAR, bars.state[0, b], n)
         for m in range(_COUNT):
-            row_bar[COLUMNS[m]] = total(w, blocks, LAW_BAR + m * LANES, LANES)
+            row_bar[COLUMNS[m]] += total(w, blocks, LAW_BAR + m * LANES, LANES)
 
 
 def gradient(lever, inputs, states, wrench_bar, span, bars):
-    """Write the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
+    """Add the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
     scratch = np.empty(inputs.shapes.shape[2] // LANES * BLOCK)
     _gradient(lever, inputs, states, wrench_bar, span, bars, pointer(scratch))
 
@@ -258,8 +257,8 @@ def _tangent(lever, inputs, span, z, changes, wrenches, slopes, w):
             load, twist, turn, dt = loads[t], three(twists[t]), three(turns[t]), inputs.dt[t]
             for k in range(blocks):
                 _push(lever, law, by, at(w, k * BLOCK), twist, turn, dt, load, pushes[t], lanes)
-            put(wrenches[b, t], times(load, totals(w, blocks, OUT, lanes)))
-            put(slopes[b, t], totals(w, blocks, OUT + 3 * LANES, lanes))
+            add(wrenches[b, t], times(load, totals(w, blocks, OUT, lanes)))
+            add(slopes[b, t], totals(w, blocks, OUT + 3 * LANES, lanes))
             if load == 0.0:
                 _forget(w, blocks, Z)
                 _forget(w, blocks, BAR)
@@ -268,7 +267,7 @@ def _tangent(lever, inputs, span, z, changes, wrenches, slopes, w):
 
 
 def tangent(lever, inputs, span, z, changes, wrenches, slopes):
-    """Run roll-outs with their change along given ones of the inputs, into `wrenches` and `slopes` [B, T, 3].
+    """Run roll-outs with their change along given ones of the inputs, added to `wrenches` and `slopes` [B, T, 3].
 
     `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state in place.
     """

@@ -168,6 +168,18 @@ def _slope(own, p):
 
 
 @kernel
+def too_far(first, here):
+    """Return True where a slope beyond the root says to go back; one that is not positive at its start says nothing."""
+    return first > 0.0 and not here >= -DOWNHILL * first
+
+
+@kernel
+def shortening_of(first, here):
+    """Return the share of a displacement to try next, from its slope at the start and the negative one at its end."""
+    return xp.minimum(xp.maximum(first / (first - here), 0.1), 0.7)
+
+
+@kernel
 def _go(own, p, held, whole):
     """Go along the Newton step from the wrenches, and, unless it is to be `whole`, back where it goes too far."""
     n, w, first, far = 3 * own.count, p.wrench, _slope(own, p), 1.0
@@ -179,9 +191,9 @@ def _go(own, p, held, whole):
         _host(own, p, held)
         step_all(own, p)
         here = _slope(own, p)
-        if whole or here >= -DOWNHILL * first or not first > 0.0 or shortening == SHORTENINGS:
+        if whole or not too_far(first, here) or shortening == SHORTENINGS:
             break
-        far *= xp.minimum(xp.maximum(first / (first - here), 0.1), 0.7)
+        far *= shortening_of(first, here)
     if held:
         _host(own, p, False)
 

@@ -27,6 +27,7 @@ import numpy as np
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
+from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.rollouts import row_of
 from planarfriction.kernels.vectors import accumulate, dot, three, times
 
@@ -34,7 +35,7 @@ LANES = 8
 SLOTS = 136
 
 NUMBERS = 20
-"""Room for the numbers of a contact."""
+"""Room for the numbers of a contact (see `fitting`)."""
 
 TWIST, OMEGA, LOAD, WRENCH, STATE, TWIST_BAR, LOAD_BAR, FIELDS = (SLOTS * n for n in (0, 3, 4, 5, 8, 11, 14, 15))
 """Offsets of the fields of `w`: `scaled` twist, spin, load, wrench or its cotangent, state before a step; those of the
@@ -166,17 +167,8 @@ def _add(w, field, values, lanes, c, begin, end):
 
 
 @kernel
-def _put_or_add(p, w, field, values, lanes, c, begin, end):
-    """Write the slots of the first part, and add those of the others."""
-    if p == 0:
-        _copy_out(w, field, values, lanes, c, begin, end)
-    else:
-        _add(w, field, values, lanes, c, begin, end)
-
-
-@kernel
 def _rollout(begin, scaled, prepare, advance, inputs, span, z, wrench, states, w, own):
-    """Step the contacts `span[0]` to `span[1]`: `z` [P, B, 3] in place, wrenches into `wrench` [B, T, 3].
+    """Step the contacts `span[0]` to `span[1]`: `z` [P, B, 3] in place, wrenches added to `wrench` [B, T, 3].
 
     The state before each step goes into `states` [P, B, T, 3], unless that is empty.
     """
@@ -193,7 +185,7 @@ def _rollout(begin, scaled, prepare, advance, inputs, span, z, wrench, states, w
                 _forward(advance, w[(t - at) * lanes :], own, lanes, inputs.dt[t])
             for c in range(lanes):
                 p, b = _lane(span, first + c)
-                _put_or_add(p, w, WRENCH, wrench[b], lanes, c, at, end)
+                _add(w, WRENCH, wrench[b], lanes, c, at, end)
                 if kept:
                     _copy_out(w, STATE, states[p, b], lanes, c, at, end)
         for c in range(lanes):
@@ -203,7 +195,7 @@ def _rollout(begin, scaled, prepare, advance, inputs, span, z, wrench, states, w
 
 @kernel
 def _gradient(begin, scaled, prepare, retreat, inputs, states, wrench_bar, span, bars, w, own):
-    """Write the adjoint of `_rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`.
+    """Add the adjoint of `_rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`.
 
     `bars` are those of `rollouts`, of each part those of state [P, B, 3] and rows [P, B, N].
     """
@@ -224,18 +216,24 @@ def _gradient(begin, scaled, prepare, retreat, inputs, states, wrench_bar, span,
                 _backward(retreat, w[(t - at) * lanes :], own, lanes, inputs.dt[t])
             for c in range(lanes):
                 p, b = _lane(span, first + c)
-                _put_or_add(p, w, TWIST_BAR, bars.twist[b], lanes, c, at, end)
+                _add(w, TWIST_BAR, bars.twist[b], lanes, c, at, end)
                 for t in range(at, end):
-                    before = 0.0 if p == 0 else bars.load[b, t]
-                    bars.load[b, t] = before + w[LOAD_BAR + (t - at) * lanes + c]
+                    bars.load[b, t] += w[LOAD_BAR + (t - at) * lanes + c]
         for c in range(lanes):
             p, b = _lane(span, first + c)
             bars.state[p, b, 0], bars.state[p, b, 1], bars.state[p, b, 2] = carried(own, c)
             for m in range(bars.rows.shape[2]):
-                bars.rows[p, b, m] = own[ROW_BAR + m * LANES + c]
+                bars.rows[p, b, m] += own[ROW_BAR + m * LANES + c]
 
 
 # ---------------------------------------------------------------------- entry points of a model
+
+
+def fitting(names):
+    """Return the number of names of a contact's numbers; raise InvalidValueError if `own` has no room for them."""
+    if len(names) > NUMBERS:
+        raise InvalidValueError("names", f"be at most {NUMBERS} (lanes.NUMBERS)", len(names))
+    return len(names)
 
 
 class LaneModel(NamedTuple):

@@ -19,7 +19,7 @@ import numpy as np
 from planarfriction.compiler import kernel
 from planarfriction.kernels.law import LAW, law_of
 from planarfriction.kernels.moment_steps import Contact
-from planarfriction.kernels.vectors import accumulate, dot, plus, put, three, times
+from planarfriction.kernels.vectors import accumulate, add, dot, plus, put, three, times
 
 SCRATCH = 9
 """Numbers that `hold_slopes` may write to."""
@@ -71,11 +71,6 @@ def _part(shape_of, inputs, row, p, at):
 
 
 @kernel
-def _add(row, a):
-    row[0], row[1], row[2] = row[0] + a[0], row[1] + a[1], row[2] + a[2]
-
-
-@kernel
 def row_of(values, b):
     """Return the row of `values` for contact b: its own, or the one that all share."""
     return b if values.shape[0] > 1 else 0
@@ -92,7 +87,7 @@ def _weighed(wrench, load):
 
 @kernel
 def _rollout(shape_of, hold, taped_step, inputs, span, z, wrench, states):
-    """Roll out contacts as `lanes.rollout` does, but add the wrenches to what is in `wrench`."""
+    """Roll out contacts as `lanes.rollout` does."""
     steps, kept = inputs.dt.shape[0], states.shape[2] > 0
     for b in range(span[0], span[1]):
         twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
@@ -106,7 +101,7 @@ def _rollout(shape_of, hold, taped_step, inputs, span, z, wrench, states):
                 load, contact = loads[t], _part(shape_of, inputs, row, p, which[t])
                 step = taped_step(contact, hold(contact, three(twists[t])), own, inputs.dt[t])
                 own = step.new if load != 0.0 else (0.0, 0.0, 0.0)
-                _add(wrench[b, t], _weighed(step.wrench, inputs.shares[p, which[t]] * load))
+                add(wrench[b, t], _weighed(step.wrench, inputs.shares[p, which[t]] * load))
             put(z[p, b], own)
 
 
@@ -117,7 +112,7 @@ def rollout(shape_of, hold, taped_step, inputs, span, z, wrench, states):
 
 @kernel
 def _gradient(shape_of, hold_slopes, taped_step, pull_back, inputs, states, wrench_bar, span, bars, work):
-    """Compute what `lanes.gradient` does, but add the cotangents to what is in `bars`."""
+    """Compute what `lanes.gradient` does."""
     for b in range(span[0], span[1]):
         twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
         which, pulls = inputs.which[row_of(inputs.which, b)], wrench_bar[row_of(wrench_bar, b)]
@@ -132,7 +127,7 @@ def _gradient(shape_of, hold_slopes, taped_step, pull_back, inputs, states, wren
                 new = times(0.0 if load == 0.0 else 1.0, own)
                 bar = pull_back(contact, step, known, new, times(share * load, pull))
                 own = bar.state
-                _add(bars.twist[b, t], bar.twist)
+                add(bars.twist[b, t], bar.twist)
                 heavier = share + load * slopes[len(bar.shape)]
                 bars.load[b, t] += heavier * dot(pull, step.wrench) + dot(bar.shape, shape_of(slopes))
                 accumulate(bars.rows[p, b], 0, 1, (bar.law, bar.shape))
@@ -219,7 +214,7 @@ def _forward(shape_of, hold_slopes, taped_step, pull_back, seed, inputs, span, z
                     hold_slopes, taped_step, pull_back, contact, own, twist, weights, inputs.dt[t], scratch, here
                 )
                 own = step.new if load != 0.0 else (0.0, 0.0, 0.0)
-                _add(wrenches[b, t], _weighed(step.wrench, weights[1]))
+                add(wrenches[b, t], _weighed(step.wrench, weights[1]))
                 for d in range(change.shape[1]):
                     before = change[0, d], change[1, d], change[2, d]
                     for i in range(6):

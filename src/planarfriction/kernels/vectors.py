@@ -159,6 +159,12 @@ def put(row, a):
 
 
 @kernel
+def add(row, a):
+    """Add a vector to the beginning of a row."""
+    row[0], row[1], row[2] = row[0] + a[0], row[1] + a[1], row[2] + a[2]
+
+
+@kernel
 def put_all(row, numbers):
     """Write a tuple of any length to the beginning of a row."""
     for i in range(len(numbers)):

@@ -15,10 +15,9 @@ from planarfriction.adapters.mujoco.loops.geometry import place, take
 from planarfriction.adapters.mujoco.loops.records import Host, Remembered, Scratch, read
 from planarfriction.adapters.mujoco.loops.responses import is_sparse, leaves_range, respond
 from planarfriction.compiler import callback, entry, jit, kernel
-from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler.calls import address_of, c_address_of, call, call_c, pointer, shared_word
 from planarfriction.compiler.memory import arrays_at, doubles, integers, integers32
-from planarfriction.kernels.coupling import step_all
+from planarfriction.kernels.coupling import shortening_of, step_all, too_far
 from planarfriction.kernels.coupling_rows import Problem
 from planarfriction.kernels.coupling_rows import read as read_patches
 from planarfriction.kernels.following import hold
@@ -28,9 +27,6 @@ PASSES = 10
 
 SHORTENINGS = 4
 """Largest number of times that the displacement to a solution is shortened before the next solution is sought."""
-
-DOWNHILL = 0.5
-"""Excess beyond the root along the displacement that is accepted, as a share of the slope at its start."""
 
 INSTALLED, _installed = shared_word("planarfriction_mujoco")
 """Address of the `Host` whose model the callback serves, 0 without one."""
@@ -161,8 +157,8 @@ def _solve(own, patches, m, d, nefc):
         respond(own, m, d, sparse, nefc)
         if passes > 0 and shortenings < SHORTENINGS:
             here = _slope(own, patches)
-            if here < -DOWNHILL * first:
-                far *= xp.minimum(xp.maximum(first / (first - here), 0.1), 0.7)
+            if too_far(first, here):
+                far *= shortening_of(first, here)
                 shortenings += 1
                 _begin(own, far)
                 _apply(own, d, problem.guess)

@@ -1,0 +1,62 @@
+"""Compiled loops stay within their arrays: `make test-bounds` checks each index, these tests what it cannot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numba import njit
+
+import planarfriction as pf
+from planarfriction import derivatives
+from planarfriction.compiled.shapes_by_load import places_of
+from planarfriction.derivatives.inputs import checked
+from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import coupling, lanes
+
+PATCH, LAW = pf.ContactPatch.disc(radius=0.01, cells=9), pf.LuGre()
+MODELS = {
+    "parts": pf.ReducedModel(PATCH, LAW, parts=3, segments=6, speeds=6),
+    "published": pf.ReducedModelPublished(PATCH, LAW),
+    "cells": pf.DistributedModel(PATCH, LAW),
+}
+
+
+def test_the_array_at_the_first_map_reaches_to_the_end_of_the_last():
+    maps = [np.full(n, n, dtype=np.float32) for n in (300, 7, 4000)]
+    begin, data = places_of([*maps, maps[1]])
+    assert begin.min() == 0 and begin[1] == begin[3]
+    for first, each in zip(begin, maps, strict=False):
+        np.testing.assert_array_equal(data[first : first + len(each)], each)
+    del maps[:]
+    assert data[begin[1]] == 7.0  # the array keeps the maps alive
+
+
+def test_a_contact_of_more_numbers_than_there_is_room_for_is_refused():
+    assert lanes.fitting(["x"] * lanes.NUMBERS) == lanes.NUMBERS
+    with pytest.raises(InvalidValueError, match="names must be at most"):
+        lanes.fitting(["x"] * (lanes.NUMBERS + 1))
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_roll_outs_of_all_models_add_to_what_comes_in(name):
+    twist = np.tile([1e-3, 0.0, 0.1], (2, 4, 1))
+    inputs = checked(MODELS[name], None, twist, [1.0, 1.0, 0.0, 1.0], 1e-3, None)
+    family, compiled, found = inputs.model.family, inputs.compiled(), []
+    for start in (0.0, 5.0):
+        wrenches = np.full(twist.shape, start)
+        family.rollout(compiled, (0, 2), inputs.state.copy(), wrenches, np.empty((len(inputs.state), 2, 0, 3)))
+        found.append(wrenches - start)
+    np.testing.assert_allclose(found[1], found[0], atol=1e-14)  # rounding of 5 N
+    assert np.abs(found[0]).max() > 0.1
+    wrenches = derivatives.rollout_jacobian(MODELS[name], None, twist, 1.0, 1e-3).wrenches  # one pass a parameter
+    np.testing.assert_allclose(wrenches, derivatives.rollout(MODELS[name], None, twist, 1.0, 1e-3).wrenches, atol=1e-12)
+
+
+def test_a_slope_that_does_not_rise_at_its_start_shortens_no_displacement():
+    @njit
+    def asked(first, here):
+        return coupling.too_far(first, here), coupling.shortening_of(first, here)
+
+    assert asked(1.0, -0.6)[0]
+    assert not any(asked(*each)[0] for each in [(1.0, -0.4), (0.0, -1.0), (-1.0, -1.0)])
+    assert asked(1.0, -1.0)[1] == 0.5 and asked(1.0, -1e9)[1] == 0.1
