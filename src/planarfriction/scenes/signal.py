@@ -86,14 +86,6 @@ class Signal(ByValue):
                 "times", "increase", f"{times[i]:g} s, then {times[i + 1]:g} s at index {i + 1} ({kind})"
             )
         validation.choice("hold", self.hold, ("previous", "linear"))
-        if self.hold == "linear":
-            with np.errstate(over="ignore"):
-                steep = ~np.isfinite((np.diff(values, axis=0).T / steps).T).reshape(len(steps), -1).all(axis=1)
-            if steep.any():
-                i = int(np.argmax(steep))
-                raise InvalidValueError(
-                    "times", "be far enough apart for a finite slope", f"{times[i]:g} s, then {times[i + 1]:g} s"
-                )
         times.setflags(write=False)
         values.setflags(write=False)
         self._set(times=times, values=values)
@@ -240,7 +232,12 @@ class Signal(ByValue):
         """Slope on the interval that begins at each sample; 0 after the last one."""
         if self.hold == "previous":
             return np.zeros_like(self.values)
-        slopes = np.diff(self.values, axis=0) / self._spread(np.diff(self.times))
+        with np.errstate(over="ignore"):
+            slopes = np.diff(self.values, axis=0) / self._spread(np.diff(self.times))
+        steep = np.argwhere(~np.isfinite(slopes))[:, 0]
+        if steep.size:
+            between = " s, then ".join(f"{time:g}" for time in self.times[steep[0] : steep[0] + 2])
+            raise InvalidValueError("times", "be far enough apart for a finite slope", f"{between} s")
         return np.concatenate([slopes, np.zeros_like(self.values[:1])])
 
     def _spread(self, array: np.ndarray) -> np.ndarray:
