@@ -102,7 +102,7 @@ def test_parts_abreast_are_the_sum_of_models_of_one_part():
     model = MODELS["three parts"]
     ours = derivatives.rollout_states(model, None, twist, loads, dt)
     total = np.zeros_like(twist)
-    for k, part in enumerate(model.parts_at(None)):
+    for k, part in enumerate(model.reduction.parts_at(None)):
         packed = pack_parts(model.law.numbers, [(1.0, part.shape)])
         one = derivatives.rollout_states(packed, None, twist, loads, dt)
         close(ours.states[..., k, :], one.states)
