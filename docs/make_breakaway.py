@@ -275,6 +275,17 @@ def measures() -> Iterator[tuple[str, Callable[[], Any]]]:
             yield f"shaken {shape} {level}", lambda shape=shape, level=level: shaken(shape, level)
 
 
+def with_tables(page: str, kept: dict[str, Any]) -> str:
+    """Return the text of a page with the tables that it names."""
+
+    def written(found: re.Match[str]) -> str:
+        rows = TABLES[found["name"]](kept)
+        lines = [rows[0], ["---"] * len(rows[0]), *rows[1:]]
+        return f"<!-- breakaway: {found['name']} -->\n\n" + "".join(f"| {' | '.join(row)} |\n" for row in lines) + "\n"
+
+    return MARK.sub(written, page)
+
+
 def main() -> None:
     """Measure what is not kept yet, and write tables and picture."""
     kept = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
@@ -283,17 +294,11 @@ def main() -> None:
             kept[key] = measure()
             KEPT.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
             print(key, flush=True)
-
-    def written(found: re.Match[str]) -> str:
-        rows = TABLES[found["name"]](kept)
-        lines = [rows[0], ["---"] * len(rows[0]), *rows[1:]]
-        return f"<!-- breakaway: {found['name']} -->\n\n" + "".join(f"| {' | '.join(row)} |\n" for row in lines) + "\n"
-
-    for page in sorted(DOCS.glob("*.md")):
-        before = page.read_text(encoding="utf-8")
-        if (after := MARK.sub(written, before)) != before:
-            page.write_text(after, encoding="utf-8")
-            print(f"{page.name}: new numbers")
+    for path in sorted(DOCS.glob("*.md")):
+        before = path.read_text(encoding="utf-8")
+        if (after := with_tables(before, kept)) != before:
+            path.write_text(after, encoding="utf-8")
+            print(f"{path.name}: new numbers")
     draw(kept).savefig(PICTURE)
 
 
