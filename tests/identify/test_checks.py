@@ -12,7 +12,7 @@ from planarfriction.cli import main
 from planarfriction.cli.output import history_columns, write_csv
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.identify import Log
-from planarfriction.identify.checks import check_loads, check_log, check_logs, check_sampling
+from planarfriction.identify.checks import check_loads, check_log, check_logs, check_sampling, with_findings
 from planarfriction.identify.logs import columns_of
 from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, fitted, noisy
 
@@ -146,6 +146,9 @@ def test_findings_stand_beside_the_estimates(log):
     slow = noisy(clean_log(*excitation(duration=1.0, rate=200.0)), 1)
     told = fitted(slow, PATCH, parameters=("sigma_0", "sigma_1"), start=LAW, starts=1)
     assert any("samples of log should be taken at" in str(verdict) for verdict in told.verdicts)
+    assert not told.identifiable("sigma_1") and told.identifiable("sigma_0")
+    two = with_findings(dataclasses.replace(told, verdicts=()), [slow, log], ())
+    assert two.identifiable("sigma_1")  # one log is fast enough
 
 
 def test_sampling_is_no_matter_where_sigma_1_may_be_zero():
@@ -153,7 +156,7 @@ def test_sampling_is_no_matter_where_sigma_1_may_be_zero():
     law = dataclasses.replace(LAW, sigma_1=0.0)
     log = noisy(clean_log(*excitation(duration=1.0, rate=200.0), law=law), 1)
     told = fitted(log, PATCH, parameters=("sigma_0", "sigma_1"), start=LAW, starts=1, model="reduced-published")
-    assert told.intervals()["sigma_1"][0] == 0.0
+    assert told.intervals()["sigma_1"][0] == 0.0 and not told.identifiable("sigma_1")
     assert not any("samples of log" in str(verdict) for verdict in told.verdicts)
 
 

@@ -92,12 +92,16 @@ def check_logs(logs: Sequence[Log], patch: ContactPatch, names: Sequence[str] = 
 
 def with_findings(result: Identification, logs: Sequence[Log], findings: Sequence[Finding]) -> Identification:
     """Return the result with verdicts on the findings, and on the sampling rate that its estimates ask for."""
-    found = [*findings]
+    found: list[Finding | None] = [*findings]
+    unseen: list[Verdict] = []
     estimates, least = result.estimates, {name: low for name, (low, _) in result.intervals().items()}
     # where sigma_1 may be 0, or nobody knows it, its corner may lie anywhere
     if "sigma_0" in estimates and least.get("sigma_1", 0.0) > 0.0:
-        found += [check_sampling(log, estimates["sigma_0"], estimates["sigma_1"]) for log in logs]
-    verdicts = [Verdict("fit", False, str(finding)) for finding in found if finding is not None]
+        rates = [check_sampling(log, estimates["sigma_0"], estimates["sigma_1"]) for log in logs]
+        found += rates
+        if None not in rates:
+            unseen.append(Verdict("sigma_1", False, "no log is sampled at twice the corner frequency of the bristles"))
+    verdicts = [*unseen, *(Verdict("fit", False, str(finding)) for finding in found if finding is not None)]
     return dataclasses.replace(result, verdicts=(*result.verdicts, *verdicts))
 
 

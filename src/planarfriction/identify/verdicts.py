@@ -232,6 +232,9 @@ def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
         return Verdict(name, False, reason)
     if not (error < VAGUE * size if kind.logarithmic else np.isfinite(error)):
         return Verdict(name, False, _why(evidence, i, seen))
+    if name == "sigma_1" and value <= TWO_SIDED * error:
+        text = "cannot be distinguished from 0, so the corner frequency of the bristles may be above all samples"
+        return Verdict(name, False, text)
     if kind.low == 0.0 and value < TWO_SIDED * error:
         most = f"{value + TWO_SIDED * error:.3g} {kind.unit}"
         return Verdict(name, True, f"cannot be distinguished from 0, at most {most}")
