@@ -35,11 +35,10 @@ KNOTS = np.linspace(0.0, 0.5, 20)
 SIGNALS = {"fingers.normal_force": KNOTS}
 
 
-def reduced(full: bool) -> Measurement:
+def reduced(full: bool, parts: int | None = None) -> Measurement:
     """Measure a roll-out with its gradient, as `gradient.published`."""
-    ours, theirs = (
-        _value_and_gradient(model(disc(), law()), (STEPS,), 15) for model in (ReducedModel, ReducedModelPublished)
-    )
+    models = ReducedModel(disc(), law(), parts=parts), ReducedModelPublished(disc(), law())
+    ours, theirs = (_value_and_gradient(model, (STEPS,), 15) for model in models)
     return line(ours, "s", AGAINST_PUBLISHED, theirs)
 
 
@@ -101,16 +100,17 @@ def published_batch(full: bool) -> Measurement:
     return line(both, "million contact-steps/s", words, once, both / once)
 
 
-def reduced_batch(full: bool) -> Measurement:
-    """Measure a thousand roll-outs with their gradient, as `gradient.published.batch`."""
-    (both, once), (theirs, alone) = (_batch(model(disc(), law())) for model in (ReducedModel, ReducedModelPublished))
+def reduced_batch(full: bool, parts: int | None = None) -> Measurement:
+    """Measure 1000 roll-outs with their gradient, as `gradient.published.batch`; of cells fewer steps are kept."""
+    models = ReducedModel(disc(), law(), parts=parts), ReducedModelPublished(disc(), law())
+    (both, once), (theirs, alone) = (_batch(model, 300 if parts is None else 1000) for model in models)
     words = f"{AGAINST_PUBLISHED} (the roll-outs alone: {once:.3g} and {alone:.3g})"
     return line(both, "million contact-steps/s", words, theirs, both / theirs)
 
 
-def _batch(model: ReducedModel | ReducedModelPublished) -> tuple[float, float]:
+def _batch(model: ReducedModel | ReducedModelPublished, count: int = 1000) -> tuple[float, float]:
     """Return millions of contact-steps per second of a thousand roll-outs with their gradient, and of these alone."""
-    shape = 1000, 1000
+    shape = 1000, count
     steps = 1e-6 * math.prod(shape)
     return steps / _value_and_gradient(model, shape, 5), steps / _alone(model, shape, 5)
 

@@ -57,10 +57,10 @@ def published(full: bool, load: Literal[1, 2] = 1) -> Measurement:
     return line(value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end))
 
 
-def reduced(full: bool) -> Measurement:
+def reduced(full: bool, parts: int | None = None) -> Measurement:
     """Measure `ReducedModel`."""
-    kinds = (ReducedModel, ReducedModelPublished)
-    value, theirs = (_solver_time(in_hand(kind(disc(), law())), 9)[0] for kind in kinds)
+    models = ReducedModel(disc(), law(), parts=parts), ReducedModelPublished(disc(), law())
+    value, theirs = (_solver_time(in_hand(model), 9)[0] for model in models)
     return line(value, "s", "the published reduced model", theirs)
 
 
@@ -81,7 +81,8 @@ def load_family(full: bool) -> Measurement:
     every = once(lambda: simulate(in_hand(rebuilt)))
     times = np.array([[once(lambda scene=scene: simulate(scene)) for scene in scenes] for _ in range(25)])
     value, theirs = np.median(times, axis=0).tolist()
-    maps = len(family.reduction.load_rungs)
+    moments: Any = family.reduction
+    maps = len(moments.load_rungs)
     words = (
         f"the same with a fixed shape (both: all of simulate); building the family's {maps} maps "
         f"first took {built:.2g} s; with a map built for every load, the run takes {every:.2g} s"

@@ -132,8 +132,9 @@ def load_family(quick: bool) -> dict[str, float]:
     """
     patch, t_end = soft_patch(2), QUICK_TIME if quick else TIME
     model, rebuilt = ReducedModel(patch, LAW, parts=1), ReducedModel(patch, LAW, parts=1, load_error=0.0)
+    moments: Any = model.reduction
     scenes.simulate(scenes.in_hand(model), t_end=t_end)
-    maps = len(model.reduction.load_rungs)
+    maps = len(moments.load_rungs)
     apart = np.array([_steady_apart(model, rebuilt, load) for load in LOADS]).max(axis=0)
     return {
         "maps": maps,
