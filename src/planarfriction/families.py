@@ -116,7 +116,10 @@ MODELS = Family(
     "model",
     {
         "distributed": ("a bristle in every cell", "models.distributed:DistributedModel"),
-        "reduced": ("bristles of a few cells, or moments in parts", "models.reduced:ReducedModel"),
+        "reduced": (
+            "bristles on a few cells, or moments in parts",
+            "models.reduced:ReducedModel",
+        ),
         "reduced-published": (
             "three bristles and a limit surface, as published",
             "models.reduced_published:ReducedModelPublished",

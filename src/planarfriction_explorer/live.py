@@ -103,7 +103,7 @@ CATCH_UP = 250
 
 _ANSWER = "requestAnimationFrame(() => requestAnimationFrame(() => { drawn.value = cb_obj.value }))"
 """Script for the browser: it answers two frames later, when the picture is on the screen. It takes the
-counter as `cb_obj`: Panel keeps a widget for ever that is also an argument of its own script."""
+counter as `cb_obj`: Panel keeps a widget indefinitely that is also an argument of its own script."""
 
 
 class Paced:

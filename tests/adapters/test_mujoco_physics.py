@@ -52,7 +52,7 @@ def test_a_shaken_gripper_keeps_what_it_holds(integrator):
 @pytest.mark.parametrize(
     ("kind", "start"),
     [
-        *((pf.ReducedModel, start) for start in mujoco_scenes.STARTS),
+        *((pf.models.MomentModel, start) for start in mujoco_scenes.STARTS),
         (pf.DistributedModel, mujoco_scenes.STARTS[0]),
         *(pytest.param(pf.DistributedModel, start, marks=SLOW) for start in mujoco_scenes.STARTS[1:]),
     ],

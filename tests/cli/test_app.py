@@ -316,9 +316,7 @@ def test_differences_cover_the_time_that_both_runs_have():
 def test_a_run_is_what_simulate_gives(capsys, tmp_path):
     arguments = ["run", "in-hand", "--model", "reduced", "--patch", "Square", "--t-end", "0.5", "--out", str(tmp_path)]
     assert main(arguments) == 0
-    model = pf.ReducedModel(
-        PUBLISHED_PATCHES["Square"](), pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9)), parts=1
-    )
+    model = pf.ReducedModel(PUBLISHED_PATCHES["Square"](), pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9)))
     expected = pf.simulate(scenes.in_hand(model, t_end=0.5))
     columns = read_csv(tmp_path / "in-hand-reduced.csv")
     check_columns(columns, expected.data)

@@ -169,7 +169,7 @@ def test_the_closed_form_has_the_published_ratios():
     assert terminal_ratio(1.0, 0.999) == pytest.approx(1.0, abs=2e-3)
 
 
-@pytest.mark.parametrize("kind", [pf.DistributedModel, pf.ReducedModel])
+@pytest.mark.parametrize("kind", [pf.DistributedModel, pf.models.MomentModel])
 @pytest.mark.parametrize("patch", [DISC, RING], ids=["disc", "ring"])
 def test_discs_and_rings_stop_sliding_and_turning_together(patch, kind):
     """From a tenth more, the same or a tenth less, they come closer to the ratio of the closed form."""
@@ -184,7 +184,7 @@ def test_discs_and_rings_stop_sliding_and_turning_together(patch, kind):
 @pytest.mark.parametrize("gyration", [0.4, 0.6, 0.9])
 def test_the_radius_of_gyration_decides_what_lasts_longer(gyration):
     """Below 1/2 the spin dies first, above sqrt(2/3) the slide, between them they die together (uniform disc)."""
-    speed, ratio = ratios(DISC, gyration, 1.0, pf.ReducedModel)
+    speed, ratio = ratios(DISC, gyration, 1.0, pf.models.MomentModel)
     early, late = ratio[speed > 0.3][-1], ratio[speed > 0.01][-1]
     if gyration < 0.5:
         assert late > 2.0 * early > 2.0

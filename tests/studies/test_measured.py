@@ -362,7 +362,7 @@ def test_an_interrupt_keeps_what_is_done(tmp_path, capsys):
     assert (tmp_path / "measured.json").exists()
 
 
-def test_a_model_that_raises_is_one_line_and_the_others_keep_their_results(tmp_path, capsys):
+def test_a_model_that_raises_is_one_line(tmp_path, capsys):
     (tmp_path / "own.py").write_text("def first(question):\n    return question.nothing\n")
     given = ["--only", "ellipsoid", "--own", f"{tmp_path / 'own.py'}:first", "--out", str(tmp_path)]
     assert main(["measured", "--task", "pushes", *given]) == 2

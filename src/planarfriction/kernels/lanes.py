@@ -27,7 +27,6 @@ import numpy as np
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.rollouts import row_of
 from planarfriction.kernels.vectors import accumulate, dot, three, times
 
@@ -35,7 +34,7 @@ LANES = 8
 SLOTS = 136
 
 NUMBERS = 20
-"""Room for the numbers of a contact (see `fitting`)."""
+"""Room for the numbers of a contact; a test checks that those of each model fit."""
 
 TWIST, OMEGA, LOAD, WRENCH, STATE, TWIST_BAR, LOAD_BAR, FIELDS = (SLOTS * n for n in (0, 3, 4, 5, 8, 11, 14, 15))
 """Offsets of the fields of `w`: `scaled` twist, spin, load, wrench or its cotangent, state before a step; those of the
@@ -227,13 +226,6 @@ def _gradient(begin, scaled, prepare, retreat, inputs, states, wrench_bar, span,
 
 
 # ---------------------------------------------------------------------- entry points of a model
-
-
-def fitting(names):
-    """Return the number of names of a contact's numbers; raise InvalidValueError if `own` has no room for them."""
-    if len(names) > NUMBERS:
-        raise InvalidValueError("names", f"be at most {NUMBERS} (lanes.NUMBERS)", len(names))
-    return len(names)
 
 
 class LaneModel(NamedTuple):

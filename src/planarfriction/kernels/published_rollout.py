@@ -22,7 +22,7 @@ from planarfriction.kernels.surfaces import (
 )
 from planarfriction.kernels.vectors import gathered, norm, times
 
-_NUMBERS = lanes.fitting(NAMES)
+_NUMBERS = len(NAMES)
 
 # Fields of `w`. The table's corners lie where the sliding and its slopes come to lie.
 _SLIDING, _SLOPES, _PLACE, _END = (FIELDS + SLOTS * n for n in (0, 3, 12, 16))

@@ -48,7 +48,7 @@ from planarfriction.kernels.steady import (
 )
 from planarfriction.kernels.vectors import gathered, norm, times
 
-_NUMBERS, _HEAD_NUMBERS = lanes.fitting(NAMES), len(Head._fields)
+_NUMBERS, _HEAD_NUMBERS = len(NAMES), len(Head._fields)
 
 # Fields of `w`. The places in the map lie where the cotangents of twist and load come to lie, its readings where the
 # steady state and its slopes do.

@@ -11,11 +11,14 @@ import numpy as np
 from planarfriction.equality import ByValue
 from planarfriction.patch import ContactPatch
 from planarfriction.patch import compressed_rows as rows
-from planarfriction.patch.compressed import WeightProblem
+from planarfriction.patch.compressed import WeightProblem, chosen_cells
 from planarfriction.patch.pressure import Pressure
 
 OF_ALL_LOADS = 2
 """Times as many cells as of another stand for a patch whose shape depends on the load."""
+
+SAME = 1e-9
+"""Relative difference of positions and weights below which they are the same."""
 
 DEGREE = 2
 """Degree up to which they keep the moments of the pressure; what is left open of their weights fits limit surfaces."""
@@ -48,7 +51,37 @@ def few_cells(patch: ContactPatch, cells: int) -> ContactPatch:
     kinds = _kinds(patch)
     if patch.depends_on_load:
         return _by_load(patch, OF_ALL_LOADS * cells) if kinds.max() == 0 else patch
-    return patch.compressed(DEGREE, cells=cells) if kinds.max() == 0 else _by_kind(patch, kinds, cells)
+    return _symmetric(patch, cells) if kinds.max() == 0 else _by_kind(patch, kinds, cells)
+
+
+def _symmetric(patch: ContactPatch, cells: int) -> ContactPatch:
+    """Return the few cells of a patch of fixed shape: those of a symmetric patch are symmetric.
+
+    The two pads of a grip then pull in the same line, and a patch that slides along its axis of symmetry is not pulled
+    aside.
+    """
+    images = _images(patch)
+    problem = WeightProblem.of(patch.positions, patch.weights(), DEGREE, images)
+    most = max(cells // len(images), len(problem.moments))
+    found = problem.solution(most, np.zeros(patch.cells, bool))
+    return chosen_cells(patch, np.mean(found[images], axis=0)[None], None)
+
+
+def _images(patch: ContactPatch) -> np.ndarray:
+    """Return the cell that each reflection of the patch puts in the place of each, `[I, N]`, the identity first.
+
+    Reflections are those along x, y and both about the centre of pressure that leave positions and weights alike.
+    """
+    from scipy.spatial import KDTree
+
+    weights, about = patch.weights(), patch.positions - patch.centre_of_pressure()
+    near, tree, found = SAME * float(np.abs(about).max()), KDTree(about), [np.arange(patch.cells)]
+    for flip in ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)):
+        distance, image = tree.query(about * flip)
+        alike = np.abs(weights[image] - weights).max() <= SAME * weights.max()
+        if alike and distance.max() <= near and len(np.unique(image)) == patch.cells:
+            found.append(np.asarray(image))
+    return np.unique(found, axis=0)
 
 
 def _kinds(patch: ContactPatch) -> np.ndarray:

@@ -98,7 +98,7 @@ def compressed(
         if refit is None:
             refit = problem.solution(most, favoured)
         found[index] = refit
-    return _few(patch, found, nodes)
+    return chosen_cells(patch, found, nodes)
 
 
 def surface_error(patch: ContactPatch, few: ContactPatch, normal_force: ArrayLike | None = None) -> float:
@@ -148,7 +148,7 @@ def _nodes(patch: ContactPatch, loads: Any) -> np.ndarray | None:
     return np.geomspace(low, high, 1 + math.ceil(NODES_PER_OCTAVE * math.log2(high / low)))
 
 
-def _few(patch: ContactPatch, weights: np.ndarray, nodes: np.ndarray | None) -> ContactPatch:
+def chosen_cells(patch: ContactPatch, weights: np.ndarray, nodes: np.ndarray | None) -> ContactPatch:
     """Return the patch of those cells that have weight at a node; each stands for the same area."""
     from planarfriction.patch.contact_patch import ContactPatch
 
@@ -180,15 +180,25 @@ class WeightProblem(NamedTuple):
     surface_wanted: np.ndarray
 
     @classmethod
-    def of(cls, positions: np.ndarray, weights: np.ndarray, degree: int) -> WeightProblem:
-        """Return the problem of compressing `weights` `[N]` at `positions` `[N, 2]`."""
+    def of(
+        cls, positions: np.ndarray, weights: np.ndarray, degree: int, images: np.ndarray | None = None
+    ) -> WeightProblem:
+        """Return the problem of compressing `weights` `[N]` at `positions` `[N, 2]`.
+
+        With `images` `[I, N]`, the cells that reflections put in the place of each, a cell stands for all of its images
+        in equal shares.
+        """
         loaded = np.flatnonzero(weights > 0.0)
         scaled, twists = rows.scaled_positions(positions[loaded], weights[loaded]), rows.directions(DIRECTIONS)
-        chosen = rows.thinned(scaled)
+        chosen, places = rows.thinned(scaled), np.arange(len(loaded))[None]
+        if images is not None:
+            places = np.searchsorted(loaded, images[:, loaded])
+            chosen = np.unique(places[:, chosen].min(axis=0))
         whole = rows.dissipation(scaled, weights[loaded], twists)
-        speeds = rows.speeds(scaled[chosen], twists) / (whole[:, None] * math.sqrt(DIRECTIONS))
+        each = [rows.speeds(scaled[image[chosen]], twists) for image in places]
+        speeds = np.mean(each, axis=0) / (whole[:, None] * math.sqrt(DIRECTIONS))
         polynomials = np.vstack([rows.polynomials(scaled, degree), rows.spin(scaled)])
-        moments, turn = rows.independent(polynomials[:, chosen])
+        moments, turn = rows.independent(np.mean([polynomials[:, image[chosen]] for image in places], axis=0))
         wanted = turn @ (polynomials @ weights[loaded])
         surface_wanted = np.full(DIRECTIONS, 1.0 / math.sqrt(DIRECTIONS))
         return cls(len(positions), loaded[chosen], moments, wanted, speeds, surface_wanted)
