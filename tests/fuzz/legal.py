@@ -121,7 +121,8 @@ def objects() -> dict[str, Any]:
         "wrench_axis": None, "axis": None,
         # instances, for their methods
         "ContactPatch": SOFT, "Coulomb": pf.Coulomb(0.5), "CoulombStribeck": pf.CoulombStribeck(), "Dahl": pf.Dahl(),
-        "LuGre": LAW, "DistributedModel": pf.DistributedModel(PATCH, LAW), "MomentModel": pf.models.MomentModel(PATCH, LAW, segments=8, speeds=6),
+        "LuGre": LAW, "DistributedModel": pf.DistributedModel(PATCH, LAW),
+        "MomentModel": pf.models.MomentModel(PATCH, LAW, segments=8, speeds=6),
         "ReducedModelPublished": soft,
         "ReducedModel": pf.ReducedModel(PATCH, LAW, segments=8, speeds=6, parts=1), "Signal": signal, "Scene": scene,
         "Solution": solution, "Grid": pf.patch.Grid.around_origin(0.02, 0.02, 5, 5), "SoftFinger": SOFT.pressure,

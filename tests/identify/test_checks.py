@@ -144,10 +144,10 @@ def test_findings_stand_beside_the_estimates(log):
         for each in found.verdicts
     )
     slow = noisy(clean_log(*excitation(duration=1.0, rate=200.0)), 1)
-    told = fitted(slow, PATCH, parameters=("sigma_0", "sigma_1"), start=LAW, starts=1)
-    assert any("samples of log should be taken at" in str(verdict) for verdict in told.verdicts)
-    assert not told.identifiable("sigma_1") and told.identifiable("sigma_0")
-    two = with_findings(dataclasses.replace(told, verdicts=()), [slow, log], ())
+    found = fitted(slow, PATCH, parameters=("sigma_0", "sigma_1"), start=LAW, starts=1)
+    assert any("samples of log should be taken at" in str(verdict) for verdict in found.verdicts)
+    assert not found.identifiable("sigma_1") and found.identifiable("sigma_0")
+    two = with_findings(dataclasses.replace(found, verdicts=()), [slow, log], ())
     assert two.identifiable("sigma_1")  # one log is fast enough
 
 
@@ -155,9 +155,9 @@ def test_sampling_is_no_matter_where_sigma_1_may_be_zero():
     """Its corner may then lie anywhere: no rate of 1e+11 Hz is asked for."""
     law = dataclasses.replace(LAW, sigma_1=0.0)
     log = noisy(clean_log(*excitation(duration=1.0, rate=200.0), law=law), 1)
-    told = fitted(log, PATCH, parameters=("sigma_0", "sigma_1"), start=LAW, starts=1, model="reduced-published")
-    assert told.intervals()["sigma_1"][0] == 0.0 and not told.identifiable("sigma_1")
-    assert not any("samples of log" in str(verdict) for verdict in told.verdicts)
+    found = fitted(log, PATCH, parameters=("sigma_0", "sigma_1"), start=LAW, starts=1, model="reduced-published")
+    assert found.intervals()["sigma_1"][0] == 0.0 and not found.identifiable("sigma_1")
+    assert not any("samples of log" in str(verdict) for verdict in found.verdicts)
 
 
 # ------------------------------------------------------------------------------------------------ no false alarms

@@ -36,7 +36,7 @@ def double_precision():
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_steps_and_derivatives_are_those_of_numpy(kind):
-    """Derivatives by the moments are those of central differences; the rule itself errs by 1e-7 of the patch."""
+    """Derivatives by the moments are those of central differences, as far as the rule is exact: 1e-7 of the patch."""
     patch, name, options = KINDS[kind]
     model, ours = (getattr(end, name)(patch, LAW, **options) for end in (pf, front))
     rng, load = np.random.default_rng(0), np.array([1.0, 2.0, 1.5])
@@ -48,9 +48,9 @@ def test_steps_and_derivatives_are_those_of_numpy(kind):
     np.testing.assert_allclose(pulled, wrench, rtol=1e-6, atol=1e-8)
 
     slopes = jax.jacobian(lambda m: ours.step(jnp.asarray(state[1]), twist[1], load[1], 1e-3, moments=m)[1])
-    h, held = 1e-7, (state[1], twist[1], load[1], 1e-3)
+    h, held = 1e-6, (state[1], twist[1], load[1], 1e-3)
     ends = [[model.step(*held, moments=moments[1] + s * b)[1] for s in (1.0, -1.0)] for b in h * np.eye(2)]
     differences = np.stack([(one - other) / (2.0 * h) for one, other in ends], -1)
     np.testing.assert_allclose(
-        slopes(jnp.asarray(moments[1])), differences, rtol=1e-4, atol=1e-4 * abs(differences).max()
+        slopes(jnp.asarray(moments[1])), differences, rtol=1e-3, atol=1e-3 * abs(differences).max()
     )

@@ -68,7 +68,7 @@ def _symmetric(patch: ContactPatch, cells: int) -> ContactPatch:
 
 
 def _images(patch: ContactPatch) -> np.ndarray:
-    """Return the cell that each reflection of the patch puts in the place of each, `[I, N]`, the identity first.
+    """Return the cell onto which each reflection of the patch maps each cell, `[I, N]`, the identity first.
 
     Reflections are those along x, y and both about the centre of pressure that leave positions and weights alike.
     """

@@ -185,8 +185,8 @@ class WeightProblem(NamedTuple):
     ) -> WeightProblem:
         """Return the problem of compressing `weights` `[N]` at `positions` `[N, 2]`.
 
-        With `images` `[I, N]`, the cells that reflections put in the place of each, a cell stands for all of its images
-        in equal shares.
+        With `images` `[I, N]`, the cells onto which reflections map each, a cell stands for all of its images in equal
+        shares.
         """
         loaded = np.flatnonzero(weights > 0.0)
         scaled, twists = rows.scaled_positions(positions[loaded], weights[loaded]), rows.directions(DIRECTIONS)

@@ -26,6 +26,10 @@ PRESSURES = ("auto", "follows", "fixed")
 _ROUND = {int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("SPHERE", "CAPSULE", "ELLIPSOID")}
 """Geoms that touch in points, not faces."""
 
+_PLANE, _BOX = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_BOX)
+"""Geoms whose faces touch in several points: boxes each other, and planes all but what is round. Elsewhere MuJoCo
+finds one point, which says nothing of the pressure."""
+
 
 @dataclass(frozen=True)
 class PatchContact(Checked):
@@ -46,7 +50,7 @@ class PatchContact(Checked):
     """Origin of the patch: that of the "site", or the middle of the points of "contact"."""
     pressure: str = "auto"
     """Pressure that "follows" the moments of the contact forces (see `ContactPatch.weights`), or is "fixed" to the
-    patch; "auto" is fixed if one of the geoms is a sphere, a capsule or an ellipsoid."""
+    patch; "auto" follows between two boxes, and between a plane and what is not a sphere, a capsule or an ellipsoid."""
 
     def __post_init__(self) -> None:
         validation.instance("model", self.model, FrictionModel, "a friction model")
@@ -114,7 +118,8 @@ class Placed:
         own = int(bodies[1] == owner)
         self.own, self.other = int(self.geoms[own]), int(self.geoms[1 - own])
         self.bodies = int(bodies[1 - own]), int(owner)
-        faces = not _ROUND.intersection(m.geom_type[self.geoms].tolist())
+        kinds = set(m.geom_type[self.geoms].tolist())
+        faces = kinds == {_BOX} or (_PLANE in kinds and not _ROUND.intersection(kinds))
         self.follows = patch.pressure == "follows" or (patch.pressure == "auto" and faces)
         """True if the pressure follows the contact forces."""
         for pair in range(m.npair):
