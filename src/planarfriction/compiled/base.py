@@ -267,7 +267,7 @@ class CompiledModel:
             result = np.empty(len(held) * self._per_contact + self._scratch)
             ready(jacobians)(self._jacobian_table(contact), z[rows].ravel(), held.ravel(), result)
             found[rows] = result[: -self._scratch].reshape(len(held), self._per_contact)
-            if moved is not None:
+            if moved is not None and len(moved) > 0:
                 self._move(found, rows, moved)
         return StepJacobians(*(found[:, place].reshape(*load.shape, *shape) for place, shape in self._derivatives))
 

@@ -50,8 +50,8 @@ class DrakeScene:
         """Friction of its patch."""
         law = LuGre(mu_c=self.mu, mu_s=self.mu, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
         if self.shape == "disc":
-            return ReducedModel(ContactPatch.disc(radius=0.1, cells=41), law)
-        return ReducedModel(ContactPatch.rectangle(0.1, cells=21), law)
+            return ReducedModel(ContactPatch.disc(radius=0.1, cells=41), law, parts=1)
+        return ReducedModel(ContactPatch.rectangle(0.1, cells=21), law, parts=1)
 
     def build(self, way: Way, dt: float) -> tuple[Any, Any, Any]:
         """Return a simulator, its plant, and the plant's context."""
