@@ -163,3 +163,12 @@ def test_few_cells_of_a_symmetric_patch_are_symmetric():
     model = pf.ReducedModel(DISC, LAW)
     wrench = model.step(model.rest(), (0.01, 0.0, 1.0), 1.0, 1e-2)[1]
     assert abs(wrench[1]) < 1e-9 * abs(wrench[0])
+
+
+@pytest.mark.parametrize("loads", [(1.0, 2.0), (1e7, 2e7)])
+def test_maps_that_stay_or_change_beyond_all_loads_have_few_cells(loads):
+    values = np.random.default_rng(0).random((12, 12))
+    patch = pf.ContactPatch.from_pressure({load: values**k for k, load in enumerate(loads, 1)}, 1e-3)
+    few = few_cells(patch, 20)
+    assert few.cells <= 40
+    kept(few, patch, 1.5)

@@ -126,6 +126,8 @@ def _loads_of_change(patch: ContactPatch) -> np.ndarray:
     """Return loads [N] from the lowest to the highest at which the shape changes, by equal changes of the shape."""
     moved = 0.5 * np.abs(np.diff(patch.weights(PROBED), axis=0)).sum(axis=1)
     changes = np.flatnonzero(moved > 0.0)
+    if len(changes) == 0:  # the shape stays, or changes at loads beyond all that exist
+        return PROBED[[0, -1]]
     span = slice(changes[0], changes[-1] + 2)
     total = np.r_[0.0, np.cumsum(moved[changes[0] : changes[-1] + 1])]
     wanted = np.linspace(0.0, total[-1], max(2, math.ceil(total[-1] / MOVED)) + 1)
