@@ -28,6 +28,7 @@ from planarfriction.adapters.mujoco import Friction, PatchContact, prepare
 from planarfriction.plots.style import new_figure
 
 MU, RADIUS, MASS, ARM = 1.0, 0.012, 0.1, 0.04  # [-], pads [m], plate [kg], from the pads to its centre of mass [m]
+SIDE = RADIUS / np.sqrt(2.0)  # half the width of boxes with their corners on the rim [m]: boxes meet in several points
 FIRM, LOOSE = 6.0, 1.4  # forces of each finger [N]
 GRIPS = (
     (0.3, FIRM),
@@ -41,11 +42,11 @@ SHOWN = 0.2, 1.6, 2.6, 4.2  # times of the pictures [s]
 
 FINGERS = "".join(
     f"""<body pos="{sign * 0.007} 0 0"><joint name="{side}" type="slide" axis="{-sign} 0 0" damping="20"/>
-    <geom name="{side}" type="cylinder" size="{RADIUS} 0.005" euler="0 90 0" mass="0.05" rgba=".3 .35 .4 .2"/>
+    <geom name="{side}" type="box" size="0.005 {SIDE} {SIDE}" mass="0.05" rgba=".3 .35 .4 .2"/>
     <site name="{side}" pos="{-sign * 0.005} 0 0" zaxis="{sign} 0 0" size="1e-4"/></body>"""
     for side, sign in (("near", 1), ("far", -1))
 )
-HAND = f"""<mujoco><option timestep="0.002" integrator="implicitfast"><flag multiccd="disable"/></option>
+HAND = f"""<mujoco><option timestep="0.002" integrator="implicitfast"/>
 <default><geom solref="0.004 1" solimp="0.99 0.99 0.001"/></default>
 <visual><headlight ambient=".5 .5 .5" diffuse=".3 .3 .3" specular="0 0 0"/><map force="0.012" znear="0.01"/></visual>
 <asset><texture name="sky" type="skybox" builtin="flat" rgb1="1 1 1" width="8" height="8"/></asset>
@@ -66,10 +67,14 @@ def controls(t: float) -> tuple[float, float, float]:
     return force, force, 1.2 * float(s * s * (3.0 - 2.0 * s))
 
 
-def hand() -> tuple[mujoco.MjModel, mujoco.MjData, Friction]:
-    """Build the model, its data, and the friction of the pads."""
+def soft_pad() -> pf.ReducedModel:
+    """Build the friction of a pad."""
     law = pf.LuGre(mu_c=MU, mu_s=MU, sigma_0=1e5, sigma_1=300.0, sigma_2=10.0, elasto_plastic=0.9)
-    pad = pf.ReducedModel(pf.ContactPatch.disc(radius=RADIUS, cells=21), law)
+    return pf.ReducedModel(pf.ContactPatch.disc(radius=RADIUS, cells=21), law)
+
+
+def hand(pad: pf.models.FrictionModel) -> tuple[mujoco.MjModel, mujoco.MjData, Friction]:
+    """Build the model, its data, and the friction of its pads."""
     patches = [PatchContact(pad, site=side, geoms=(side, "plate")) for side in ("near", "far")]
     spec = mujoco.MjSpec.from_string(HAND)
     spec.geom("near").contype = spec.geom("far").contype = 0  # they touch the plate through its pairs alone
@@ -92,7 +97,7 @@ def run(draw: bool = True) -> tuple[np.ndarray, list[np.ndarray]]:
 
     The offset of the centre of mass is measured to the side of the pads and downwards.
     """
-    m, d, friction = hand()
+    m, d, friction = hand(soft_pad())
     renderer = mujoco.Renderer(m, 360, 360) if draw else None
     camera = mujoco.MjvCamera()
     camera.lookat[:], camera.distance, camera.azimuth, camera.elevation = (0.0, 0.028, -0.02), 0.21, 194.0, -12.0
