@@ -207,6 +207,25 @@ def test_other_models_are_left_alone_and_copies_are_not():
     assert np.hypot(*friction.wrenches(other)[:, :2].T).sum() > 1.0
 
 
+def test_another_model_of_the_same_size_is_not_served():
+    """It has the same joints and user data, and pads with other friction; a model prepared for the same is a copy."""
+    scene = mujoco_scenes.grip()
+    _, d, friction = _held(scene)
+    law = dataclasses.replace(LAW, mu_c=0.4)
+    m, other, slippery = scene.ours(model=pf.ReducedModel(PAD.patch, law, parts=1))
+    assert (m.nv, m.nuserdata) == (friction.m.nv, friction.m.nuserdata)
+    with pytest.raises(pf.errors.InvalidValueError, match="d must be data of the model of the patches, or of a copy"):
+        friction.step(other)
+    with friction.install():
+        for data in (other, mujoco.MjData(scene.ours()[0])):
+            data.ctrl[:] = 3.0
+            for _ in range(5):
+                mujoco.mj_step(data.model, data)
+            assert friction.loads(data).any() == (data is not other)
+    slippery.step(other)
+    friction.step(mujoco.MjData(scene.ours()[0]))
+
+
 def test_forward_changes_nothing():
     """And neither do steps over velocities alone, nor finite differences, which begin half-way."""
     scene = mujoco_scenes.shaken()
@@ -311,6 +330,62 @@ def test_options_that_do_not_fit_are_refused(name):
     with pytest.raises(pf.errors.InvalidValueError, match=message), friction.install():
         pass
     assert mujoco.get_mjcb_control() is None
+
+
+CHANGED = BAD | {"timestep": ("timestep", 0.015, BAD["timestep"][2])}
+
+
+@pytest.mark.parametrize("name", [*CHANGED, "condim"])
+def test_options_changed_at_run_time_are_refused_before_the_step(name):
+    m, d, friction = _held(mujoco_scenes.grip())
+    if name == "condim":
+        m.pair_dim[0], message = 3, "pair must have condim 1 between pad left and block"
+    else:
+        option, value, message = CHANGED[name]
+        setattr(m.opt, option, value)
+    time = d.time
+    with pytest.raises(pf.errors.InvalidValueError, match=message):
+        friction.step(d)
+    assert d.time == time and (friction.wrenches(d) == 0.0).all()
+    with pytest.raises(pf.errors.InvalidValueError, match=message):
+        friction.step(d)
+    m.opt.integrator, m.opt.noslip_iterations, m.opt.timestep, m.opt.enableflags, m.pair_dim[:] = 0, 0, 2e-3, 0, 1
+    with pytest.raises(pf.errors.InvalidValueError, match="integrator"), friction.install():
+        friction.step(d)
+        assert friction.report(d).converged
+        m.opt.integrator = 1
+        mujoco.mj_step(m, d)
+        assert friction.report(d).iterations == -2 and not friction.report(d).converged
+
+
+@pytest.mark.parametrize("integrator", ["implicit", "implicitfast"])
+def test_implicit_steps_may_be_longer_than_contacts_are_stiff(integrator):
+    """A quarter of what Euler takes: MuJoCo makes contacts softer (`refsafe`), unless it may not."""
+    scene = dataclasses.replace(mujoco_scenes.grip(), time=1.0)
+    with pytest.raises(pf.errors.InvalidValueError, match="or 0.01 s with refsafe and implicit or implicitfast, got"):
+        scene.ours(5e-3, "Euler", 0.004)
+    m, d, friction = scene.ours(5e-3, integrator, 0.004)
+    path = scene.run(m, d, lambda: friction.step(d))
+    assert abs(path[-1, :3] - path[100, :3]).max() < 4e-10  # 0.0004 um
+    m.opt.disableflags = int(mujoco.mjtDisableBit.mjDSBL_REFSAFE)
+    with pytest.raises(pf.errors.InvalidValueError, match="timestep"):
+        friction.step(d)
+
+
+def test_preparing_twice_takes_user_data_once():
+    text = mujoco_scenes.grip().text(mujoco_scenes.Native(solref=0.02), 2e-3, "Euler")
+    patches = [PatchContact(PAD, site=site, geoms=geoms) for site, geoms in mujoco_scenes.grip().patches]
+    spec, once = mujoco.MjSpec.from_string(text), mujoco.MjSpec.from_string(text)
+    spec.nuserdata = once.nuserdata = 7  # the user's own
+    prepare(once, patches)
+    for each in (patches, patches[:1], patches):
+        prepare(spec, each)
+    m = spec.compile()
+    assert m.nuserdata == once.nuserdata and m.npair == 2 and len(spec.numerics) == 1
+    again = mujoco.MjSpec.from_string(spec.to_xml())
+    prepare(again, patches)
+    assert again.nuserdata == once.nuserdata
+    Friction(m, patches)
 
 
 def test_unprepared_models_and_unknown_names_are_refused():

@@ -290,7 +290,7 @@ def _check(m: Any, placed: Sequence[Placed]) -> None:
         rule = "be 0: they would change the solution"
         raise InvalidValueError("noslip_iterations", rule, m.opt.noslip_iterations)
     for each in placed:
-        each.check_step(m)
+        each.check(m)
 
 
 def _refuse_precision(given: str) -> None:

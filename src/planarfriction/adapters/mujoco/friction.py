@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from planarfriction.adapters.mujoco.draw import draw_patch
-from planarfriction.adapters.mujoco.library import layout
+from planarfriction.adapters.mujoco.library import layout, same
 from planarfriction.adapters.mujoco.loops import step as loops
 from planarfriction.adapters.mujoco.loops.records import Host, scratch_layout
 from planarfriction.adapters.mujoco.patches import PatchContact, Placed, check_once, memory
@@ -34,7 +34,8 @@ class Report(NamedTuple):
     """Statistics of the last step."""
 
     iterations: int
-    """Newton iterations, summed over all passes; -1 if the state was not finite, and the step had no friction."""
+    """Newton iterations, summed over all passes; negative for a step without friction: -1 for a state that was not
+    finite, -2 for options that do not fit (see `Friction`)."""
     passes: int
     """Number of solutions of the step (again after other constraints became active); 0 without contact."""
     residual: float
@@ -77,7 +78,7 @@ class Friction:
         if options.enableflags & int(sleep):
             raise InvalidValueError("sleep", "be disabled: sleeping bodies do not react to wrenches", "enabled")
         for placed in self.placed:
-            placed.check_step(m)
+            placed.check(m)
 
     # ------------------------------------------------------------------ what the data hold
 
@@ -133,21 +134,30 @@ class Friction:
     def step(self, d: Any) -> None:
         """Take a step with patch friction, instead of `mj_step`.
 
-        Raises `InvalidValueError` for a state that is not finite.
+        Raises `InvalidValueError` for data of another model, for options of the model that have been changed to what
+        does not fit, before the step, and for a state that is not finite.
         """
+        if d.model is not self.m and not loops.is_served(self._row, d.model._address):
+            raise InvalidValueError("d", "be data of the model of the patches, or of a copy", "data of another model")
         mujoco.mj_step1(self.m, d)
         loops.plan_step(self._row, self.m._address, d._address)
+        iterations = d.userdata[self._memory.iterations]
+        if iterations == loops.UNFIT:
+            self._check()
         mujoco.mj_step2(self.m, d)
-        if d.userdata[self._memory.iterations] < 0.0:
+        if iterations < 0.0:
             raise InvalidValueError("state", "be finite", "a number that is not")
 
     @contextmanager
     def install(self) -> Iterator[Friction]:
         """Add friction to `mj_step` within a `with` block, and so to the reader, `mujoco.rollout` and derivatives.
 
-        This applies to all data of this model and of its copies. MuJoCo calls compiled code, on any number of threads.
+        This applies to all data of this model and of its copies: models of the same names and bodies that were prepared
+        for the same patches. MuJoCo calls compiled code, on any number of threads. A step with options that do not fit
+        has no friction (see `report`).
 
-        Raises `FrictionError` if another control callback is installed.
+        Raises `FrictionError` if another control callback is installed, and at the end of the block `InvalidValueError`
+        if options of this model do not fit any more.
         """
         self._check()
         if mujoco.get_mjcb_control() is not None or loops.INSTALLED[0] != 0:
@@ -159,6 +169,7 @@ class Friction:
         finally:
             mujoco.set_mjcb_control(None)
             loops.INSTALLED[0] = 0
+        self._check()
 
     @functools.cached_property
     def _row(self) -> np.ndarray:
@@ -169,16 +180,17 @@ class Friction:
             scratch_layout(packed.words, k, self.m.nv),
         )
         chosen = [
-            (each.site, each.own, each.other, *reversed(each.bodies), each.patch.centre == "contact")
+            (each.site, each.own, each.other, *reversed(each.bodies), each.pair, each.patch.centre == "contact")
             for each in self.placed
         ]
         columns = np.ascontiguousarray(np.array(chosen, np.int64).T)
-        names = ("sites", "own", "other", "own_bodies", "other_bodies", "at_contact")
+        names = ("sites", "own", "other", "own_bodies", "other_bodies", "pairs", "at_contact")
         joints = np.flatnonzero(self.m.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE))
         free = np.array([joints, self.m.jnt_dofadr[joints]], np.int64)
         self._kept = problem, columns, free, packed
-        places = dict(zip(names, (place_of(columns) + 8 * k * np.arange(6)).tolist(), strict=True))
+        places = dict(zip(names, (place_of(columns) + 8 * k * np.arange(len(names))).tolist(), strict=True))
         host = Host(
+            m=self.m._address, same_count=len(same()), same=place_of(same()),
             nv=self.m.nv, nuserdata=self.m.nuserdata, count=k, states=self.coupled.state_shape[0], words=packed.words,
             scratch_words=scratch.size, problem=place_of(problem), patches=place_of(packed.row),
             solve=kernels.solve_address(), plan=loops.plan_address(), free_count=len(joints),

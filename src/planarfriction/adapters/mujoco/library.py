@@ -58,7 +58,8 @@ def layout() -> dict[str, Any]:
     Raises `FrictionError` for a version whose structs are not as it describes them.
     """
     model, data, contact, option = (_offsets(name) for name in ("mjModel", "mjData", "mjContact", "mjOption"))
-    options = {name: model["opt"] + option[name] for name in ("timestep", "integrator", "disableflags")}
+    names = "timestep", "integrator", "disableflags", "enableflags", "noslip_iterations"
+    options = {name: model["opt"] + option[name] for name in names}
     in_model = "D_rownnz" in model
     parts = {
         "inertia": data.get("qM", -1),
@@ -71,6 +72,28 @@ def layout() -> dict[str, Any]:
     }
     _check(parts)
     return parts
+
+
+@functools.cache
+def same() -> np.ndarray:
+    """Return the arrays by which copies of a model are known, int [S, 3]: see `Host.same`."""
+    model = _offsets("mjModel")
+    rows = [(-1, model[name], 0) for name in ("nv", "nuserdata")]  # counts alone
+    rows += [(model[array], model[count], size) for array, (count, size) in _SHARED.items()]
+    return np.array(rows, np.int64)
+
+
+_SHARED = {
+    "names": ("nnames", 1),
+    "names_map": ("nnames_map", 4),
+    "body_parentid": ("nbody", 4),
+    "jnt_type": ("njnt", 4),
+    "geom_bodyid": ("ngeom", 4),
+    "site_bodyid": ("nsite", 4),
+    "pair_geom1": ("npair", 4),
+    "numeric_data": ("nnumericdata", 8),
+}
+"""Arrays of a model that its copies share, whatever is set at run time, with their counts and the bytes of a number."""
 
 
 def _functions() -> Any:
@@ -89,6 +112,8 @@ def _constants() -> Any:
         "ELLIPTIC": kind.mjCNSTR_CONTACT_ELLIPTIC,
         **{name: getattr(integrator, f"mjINT_{name}") for name in ("EULER", "IMPLICIT", "IMPLICITFAST")},
         "NO_EULERDAMP": mujoco.mjtDisableBit.mjDSBL_EULERDAMP,
+        "NO_REFSAFE": mujoco.mjtDisableBit.mjDSBL_REFSAFE,
+        "SLEEP": getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0),
     }
     return records.Constants(**{name: int(value) for name, value in found.items()})
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,11 +14,15 @@ import mujoco
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.adapters.mujoco.loops.models import LONGEST
 from planarfriction.adapters.mujoco.loops.records import Memory, memory_layout
 from planarfriction.compiler.memory import Layout
 from planarfriction.equality import Checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.models import FrictionModel
+
+RECORD = "planarfriction"
+"""Name of the custom numeric of a prepared model."""
 
 CENTRES = ("site", "contact")
 
@@ -25,6 +30,8 @@ PRESSURES = ("auto", "follows", "fixed")
 
 _ROUND = {int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("SPHERE", "CAPSULE", "ELLIPSOID")}
 """Geoms that touch in points, not faces."""
+
+_IMPLICIT = {int(getattr(mujoco.mjtIntegrator, f"mjINT_{name}")) for name in ("IMPLICIT", "IMPLICITFAST")}
 
 _PLANE, _BOX = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_BOX)
 """Geoms whose faces touch in several points: boxes each other, and planes all but what is round. Elsewhere MuJoCo
@@ -77,7 +84,9 @@ def _layout(patches: Sequence[PatchContact], nv: int) -> Layout:
 def prepare(spec: Any, patches: Sequence[PatchContact]) -> None:
     """Prepare an `MjSpec` for the patches: add a contact pair without friction for each, and room in the user data.
 
-    An existing pair keeps its settings except for friction; a new pair takes those of its geoms.
+    An existing pair keeps its settings except for friction; a new pair takes those of its geoms. A second call replaces
+    the room that the first one took. A custom numeric "planarfriction" holds the room taken and a digest of the
+    patches, by which copies of the model are told from other models.
 
     Raises `InvalidValueError` for a geom or a site that does not exist, and for the same pair twice.
     """
@@ -93,7 +102,23 @@ def prepare(spec: Any, patches: Sequence[PatchContact]) -> None:
             pair = spec.add_pair(geomname1=patch.geoms[0], geomname2=patch.geoms[1])
             pair.solref[:], pair.solimp[:], pair.margin, pair.gap = math.nan, math.nan, math.nan, math.nan
         pair.condim = 1
-    spec.nuserdata = max(spec.nuserdata, 0) + _layout(patches, spec.copy().compile().nv).size
+    room = _layout(patches, spec.copy().compile().nv).size
+    record = next((each for each in spec.numerics if each.name == RECORD), None)
+    taken = 0 if record is None else int(record.data[0])
+    record = spec.add_numeric(name=RECORD) if record is None else record
+    record.data = [room, *_digest(patches)]
+    spec.nuserdata = max(spec.nuserdata, 0) - taken + room
+
+
+def _digest(patches: Sequence[PatchContact]) -> list[int]:
+    """Return numbers that tell patches from others, of five digits: XML keeps six."""
+    found = hashlib.sha256()
+    for each in patches:
+        cells = each.model.patch
+        found.update(repr((each, each.model.law)).encode() + cells.positions.tobytes() + cells.areas.tobytes())
+        if not cells.depends_on_load:
+            found.update(cells.weights().tobytes())
+    return np.frombuffer(found.digest(), ">u2", 4).tolist()
 
 
 def check_once(patches: Sequence[PatchContact]) -> None:
@@ -124,19 +149,26 @@ class Placed:
         """True if the pressure follows the contact forces."""
         for pair in range(m.npair):
             if {int(m.pair_geom1[pair]), int(m.pair_geom2[pair])} == set(self.geoms.tolist()):
-                if m.pair_dim[pair] > 1:
-                    rule = f"have condim 1 between {' and '.join(patch.geoms)} (prepare does that)"
-                    raise InvalidValueError("pair", rule, int(m.pair_dim[pair]))
                 self.pair = pair
+                self.check(m)
                 return
         raise InvalidValueError("pair", "be in the model (prepare adds it)", " and ".join(patch.geoms))
 
-    def check_step(self, m: Any) -> None:
-        """Refuse time steps at which MuJoCo's own normal contact is lost: above half of its time constant."""
-        constant = float(m.pair_solref[self.pair, 0])
-        if constant > 0.0 and m.opt.timestep > 0.5 * constant:
+    def check(self, m: Any) -> None:
+        """Refuse a pair with friction of its own, and time steps at which MuJoCo's own normal contact is lost.
+
+        These are above half of its time constant, unless MuJoCo makes the contact softer (`refsafe`) and the integrator
+        is implicit.
+        """
+        if m.pair_dim[self.pair] != 1:
+            rule = f"have condim 1 between {' and '.join(self.patch.geoms)} (prepare does that)"
+            raise InvalidValueError("pair", rule, int(m.pair_dim[self.pair]))
+        constant, dt = float(m.pair_solref[self.pair, 0]), m.opt.timestep
+        safe = m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_REFSAFE) == 0 and m.opt.integrator in _IMPLICIT
+        if not (safe and dt <= LONGEST) and 0.0 < 0.5 * constant < dt:
             rule = f"be at most half of solref[0] = {constant:g} s of the pair {' and '.join(self.patch.geoms)}"
-            raise InvalidValueError("timestep", rule, m.opt.timestep)
+            rule += f", or {LONGEST:g} s with refsafe and implicit or implicitfast"
+            raise InvalidValueError("timestep", rule, dt)
 
     def contacts(self, d: Any) -> tuple[np.ndarray, np.ndarray]:
         """Return its contacts that are in the solver, and the sign of their normals: 1 into the owner."""

@@ -15,7 +15,10 @@ def _integers(name: str, fields: str) -> Any:
     return NamedTuple(name, [(field, int) for field in fields.split()])
 
 
-ModelOffsets = _integers("ModelOffsets", "nv nuserdata timestep integrator disableflags dof_damping")
+ModelOffsets = _integers(
+    "ModelOffsets",
+    "nv nuserdata timestep integrator disableflags enableflags noslip_iterations dof_damping pair_dim pair_solref",
+)
 """Offsets of `mjModel`."""
 
 DataOffsets = _integers(
@@ -41,7 +44,7 @@ Functions = _integers(
 Constants = _integers(
     "Constants",
     "SATISFIED QUADRATIC LINEARNEG LINEARPOS CONE EQUALITY FRICTION_DOF FRICTION_TENDON ELLIPTIC EULER IMPLICIT "
-    "IMPLICITFAST NO_EULERDAMP",
+    "IMPLICITFAST NO_EULERDAMP NO_REFSAFE SLEEP",
 )
 """Values of MuJoCo's enumerations."""
 
@@ -144,6 +147,11 @@ def scratch_layout(words: int, k: int, nv: int) -> Layout:
 class Host(NamedTuple):
     """A model with patches."""
 
+    m: int
+    """Address of the `mjModel`."""
+    same_count: int
+    same: int
+    """Address of offsets in it of arrays that copies share, of their counts, and of their words, [same_count, 3]."""
     nv: int
     nuserdata: int
     count: int
@@ -168,6 +176,8 @@ class Host(NamedTuple):
     other: int
     own_bodies: int
     other_bodies: int
+    pairs: int
+    """Contact pairs of the model."""
     at_contact: int
     """Address of flags: 1 where the origin is in the middle of the contacts."""
     free_count: int

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from numba import types
 
 from planarfriction.adapters.mujoco.loops.geometry import place, take
+from planarfriction.adapters.mujoco.loops.models import fits, serves
 from planarfriction.adapters.mujoco.loops.records import Host, Remembered, Scratch, read
 from planarfriction.adapters.mujoco.loops.responses import is_sparse, leaves_range, respond
 from planarfriction.compiler import callback, entry, jit, kernel
@@ -27,6 +28,9 @@ PASSES = 10
 
 SHORTENINGS = 4
 """Largest number of times that the displacement to a solution is shortened before the next solution is sought."""
+
+UNFIT = -2.0
+"""Number of iterations of a step that options do not allow: it has no friction."""
 
 INSTALLED, _installed = shared_word("planarfriction_mujoco")
 """Address of the `Host` whose model the callback serves, 0 without one."""
@@ -185,7 +189,7 @@ def _solve(own, patches, m, d, nefc):
 
 @kernel
 def _forget(host, kept, d):
-    """Clear the memory: no patch is in contact."""
+    """Clear the memory: no patch is in contact, or none can have friction."""
     _clear(kept.new, host.states)
     _clear(kept.wrench, 3 * host.count)
     _clear(kept.twist, 3 * host.count)
@@ -219,7 +223,10 @@ def plan(place_of_host, m, d):
     kept.next[0] = doubles(d + host.data.time)[0] + dt
     call_c(host.functions.mj_markStack, (d,))
     s = take(host, d, nefc)
-    if place(host, m, d, s, nefc) == 0:
+    if not fits(host, m):
+        _forget(host, kept, d)
+        kept.iterations[0], kept.converged[0] = UNFIT, 0.0
+    elif place(host, m, d, s, nefc) == 0:
         _forget(host, kept, d)
     else:
         problem = arrays_at(patches.row, s.problem)
@@ -245,8 +252,7 @@ def control(m, d):
     if place_of_host == 0:
         return
     host = read(place_of_host)
-    nv, nuserdata = integers32(m + host.model.nv)[0], integers32(m + host.model.nuserdata)[0]
-    if nv == host.nv and nuserdata == host.nuserdata:
+    if serves(host, m):
         call(host.plan, (place_of_host, m, d))
 
 
@@ -254,6 +260,12 @@ def control(m, d):
 def plan_step(host, m, d):
     """Call `plan` from Python with the row of a `Host` and the addresses of model and data."""
     call(read(host).plan, (pointer(host), m, d))
+
+
+@jit
+def is_served(host, m):
+    """Return True if the row of a `Host` serves the model at an address."""
+    return serves(read(host), m)
 
 
 def plan_address() -> int:
@@ -270,3 +282,4 @@ def compile_ahead() -> None:
     """Compile what steps inside MuJoCo take."""
     plan_address(), control_address()
     plan_step.compile((types.float64[::1], types.int64, types.int64))
+    is_served.compile((types.float64[::1], types.int64))
