@@ -35,6 +35,7 @@ TOLERANCE = 1e-9
 """Default error of the twists [m/s]: a bristle is off by a thousandth of its largest deflection after a second."""
 
 ITERATIONS = 50
+"""Default number of iterations of an attempt."""
 
 PASSES = 10
 """Rounds in which the shapes of patches follow their loads."""
@@ -140,7 +141,7 @@ class CoupledPatches(ByValue):
         dt: ArrayLike,
         *,
         tolerance: float = TOLERANCE,
-        iterations: int = ITERATIONS,
+        iterations: int | None = None,
     ) -> CoupledStep:
         """Find the wrenches of a host's step: `W = w(V, N)`, with the V and N that they cause (see `HostStep`).
 
@@ -148,14 +149,16 @@ class CoupledPatches(ByValue):
         for W, starting from the better of the guess and rest; a step that goes too far is shortened, and slopes with
         the wrong sign are left out (docs/embedding.md). Leading axes broadcast; environments run on threads, without
         the interpreter's lock. `tolerance` is that of the twists [m/s], with spins multiplied by the size of the patch.
-        If the iteration does not converge within `iterations`, the best result found is returned.
+        What does not converge in 50 iterations is solved again without the guess, and through shorter steps. If that
+        fails too, the wrenches of the best result are scaled down and its bristles let go, as far as they would do more
+        work on the host than the bristles give. With `iterations` there is one attempt, and its best result as it is.
 
         Raises `InvalidValueError` for input that is not finite, of the wrong shape, or negative where it must not be.
         """
         if not isinstance(host, HostStep):
             raise InvalidValueError("host", "be a HostStep", type(host).__name__)
         tolerance = validation.positive("tolerance", tolerance)
-        iterations = validation.count("iterations", iterations, 0)
+        most = ITERATIONS if iterations is None else validation.count("iterations", iterations, 0)
         given = dict(zip(_INPUTS, (state, dt, *host), strict=True))
         for name in ("load_response", "moments"):
             if given[name] is None:
@@ -165,7 +168,8 @@ class CoupledPatches(ByValue):
         arrays = {name: validation.numbers(name, value) for name, value in given.items()}
         problems, batch = self._problems(arrays)
         parts = self._parts
-        problems[:, parts["tolerance"]], problems[:, parts["most"]] = tolerance, iterations
+        problems[:, parts["tolerance"]], problems[:, parts["most"]] = tolerance, most
+        problems[:, parts["again"]] = float(iterations is None)
         problems[:, parts["wrench"]] = problems[:, parts["guess"]]
         counts = self._solve(problems)
         if (counts < 0).any():
@@ -274,6 +278,7 @@ class CoupledPatches(ByValue):
         row, parts = np.zeros((1, self._packed.words)), self._parts
         row.view(np.int64)[:, parts["records"]], row[:, parts["shares"]] = self._packed.records, self._packed.shares
         row[:, parts["tolerance"]], row[:, parts["most"]], row[:, parts["follows"]] = TOLERANCE, ITERATIONS, follows
+        row[:, parts["again"]] = 1.0
         return row
 
     # ------------------------------------------------------------------ what is packed once

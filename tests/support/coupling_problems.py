@@ -115,3 +115,22 @@ def random_run(generator: np.random.Generator, patches: CoupledPatches, bodies: 
         step = patches.step(state, host, bodies.dt)
         yield state, host, bodies.dt, step
         state, wrench, twist = step.state, step.wrench.reshape(count, -1), step.twist.reshape(count, -1)
+
+
+def abrupt_run(generator: np.random.Generator, patches: CoupledPatches, count: int, height: float, steps: int):
+    """Yield as `random_run` does, with other bodies in each step: a host whose contacts jump."""
+    k = len(patches.models)
+    state, wrench = np.zeros((count, *patches.state_shape)), np.zeros((count, 3 * k))
+    for _ in range(steps):
+        bodies = random_bodies(generator, count, k, height)
+        unit = np.stack([np.ones(count), np.ones(count), 1.0 / bodies.size], 1)
+        speed = unit * 10.0 ** generator.uniform(-3.0, 0.5, (count, 1)) * generator.normal(size=(count, 3))
+        free = np.einsum("eia,ea->ei", bodies.jacobian, speed) + np.einsum("eij,ej->ei", bodies.response, wrench)
+        tilted = np.einsum("epj,ej->ep", bodies.load_response, wrench)
+        load = np.maximum(bodies.load * (1.0 + 0.1 * generator.normal(size=(count, k))) + tilted, 0.0)
+        host = HostStep(
+            free.reshape(count, k, 3), load, wrench.reshape(count, k, 3), bodies.response, bodies.load_response
+        )
+        step = patches.step(state, host, bodies.dt)
+        yield state, host, bodies.dt, step
+        state, wrench = step.state, step.wrench.reshape(count, -1)

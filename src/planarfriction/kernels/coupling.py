@@ -36,6 +36,9 @@ JOINT, ROUND = 8, 24
 """Number of iterations at the start of a round in which loads move with the wrenches, and length of a round; in its
 others loads follow behind: where both turn against each other, one of the two ways gets on."""
 
+SHORTER, STAGES = 4.0, 8
+"""Ratio of the lengths, and number, of the shorter steps that lead from damping alone to a step that is hard to solve."""
+
 ROUNDING = 1e-13
 """Error of a twist, in the largest speed that goes into it, below which no step gets."""
 
@@ -252,6 +255,52 @@ def _copy(own, twist, load, to_twist, to_load):
         to_load[k] = load[k]
 
 
+@kernel
+def _again(own, p, patches, problem, best):
+    """Solve without a guess, then from the wrenches of ever longer steps; return the misfit of the better solution.
+
+    Bristles that have hardly moved only damp, which is easy to solve. The host's step keeps its length.
+    """
+    dt, iterations = p.dt[0], p.iterations[0]
+    _copy(own, p.twist, p.load, p.kept_twist, p.kept_load)
+    p.again[0] = 0.0
+    for stage in range(-1, STAGES + 1):
+        if stage <= 0:
+            for i in range(3 * own.count):
+                p.wrench[i] = 0.0
+        p.dt[0] = dt if stage < 0 else dt / SHORTER ** (STAGES - stage)
+        call(own.solve, (patches, problem))
+        iterations += p.iterations[0]
+        if stage < 0 and p.converged[0] > 0.0:
+            break
+    p.dt[0], p.again[0], p.iterations[0] = dt, 1.0, iterations
+    if p.residual[0] < best:
+        return p.residual[0]
+    _copy(own, p.kept_twist, p.kept_load, p.twist, p.load)
+    return best
+
+
+@kernel
+def _restrain(own, p):
+    """Scale wrenches that did not converge, so that they do no more work than the bristles give.
+
+    The models' wrenches W at their twists V take at least `-W.V dt` from the bristles; under `s W` the host moves at
+    `V_0 + s A W`. If that is more work at s = 1, s is that of the least; if it is still more, the bristles are let go,
+    which gives all they hold, and s W does no work then, since none is done at s = 0.
+    """
+    n, w, move, given, begin, bends = 3 * own.count, p.wrench, p.move, 0.0, 0.0, 0.0
+    for i in range(n):
+        move[i] = _applied(p.response, i, n, w, 0.0)
+        given, begin, bends = given + w[i] * p.twist[i], begin + w[i] * p.twist_0[i], bends + w[i] * move[i]
+    if begin + bends > given:
+        s = xp.minimum(xp.maximum(-0.5 * begin / bends, 0.0), 1.0) if bends > 0.0 else 0.0
+        if s * (begin + s * bends) > given:
+            for i in range(own.states):
+                p.new[i] = 0.0
+        for i in range(n):
+            w[i], p.twist[i] = s * w[i], p.twist_0[i] + s * move[i]
+
+
 @entry
 def solve(patches, problem):
     """Solve the problem of one row, whose address comes in; `patches` is that of its `Patches`."""
@@ -276,13 +325,20 @@ def solve(patches, problem):
         _go(own, p, held, rest)
         iterations, rest = iterations + 1, False
         misfit = _misfit(own, p)
+    p.iterations[0] = iterations
     if not misfit <= best:
         _copy(own, p.best_twist, p.best_load, p.twist, p.load)
+    lost = best > tolerance and p.again[0] > 0.0
+    if lost and p.most[0] > 0.0:
+        best = _again(own, p, patches, problem, best)
+    if lost or not misfit <= best:
         step_all(own, p)
     for i in range(3 * own.count):
         p.wrench[i] = p.load[i // 3] * p.unit[i]
     _forget_unloaded(own, p)
-    p.iterations[0], p.residual[0], p.converged[0] = iterations, best, 1.0 if best <= tolerance else 0.0
+    if lost and best > tolerance:
+        _restrain(own, p)
+    p.residual[0], p.converged[0] = best, 1.0 if best <= tolerance else 0.0
 
 
 @kernel

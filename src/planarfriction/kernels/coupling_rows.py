@@ -17,7 +17,9 @@ class Problem(NamedTuple):
     tolerance: Doubles
     """Tolerance of the twists [m/s], [1]."""
     most: Doubles
-    """Iterations at most, [1]."""
+    """Iterations of an attempt at most, [1]."""
+    again: Doubles
+    """1 if what does not converge is tried again, and restrained if that fails too, else 0, [1]."""
     response: Doubles
     """A, [3k, 3k]."""
     load_response: Doubles
@@ -76,6 +78,10 @@ class Problem(NamedTuple):
     """V of the least residual so far, [3k]."""
     best_load: Doubles
     """N of the least residual so far, [k]."""
+    kept_twist: Doubles
+    """V of the first attempt, [3k]."""
+    kept_load: Doubles
+    """N of the first attempt, [k]."""
     matrix: Doubles
     """Matrix of the Newton step, [3k, 3k]."""
     step: Doubles
@@ -107,8 +113,8 @@ def layout(patches: int, pieces: int, states: int, points: int, copies: int) -> 
     """Return the layout of rows for k patches, of so many `points` to share loads, and words of records to copy."""
     k, n = patches, 3 * patches
     shapes = dict.fromkeys(Problem._fields, n)
-    shapes |= dict.fromkeys(("dt", "tolerance", "most", "iterations", "residual", "converged"), 1)
-    shapes |= dict.fromkeys(("free_load", "load", "load_0", "best_load", "follows"), k)
+    shapes |= dict.fromkeys(("dt", "tolerance", "most", "again", "iterations", "residual", "converged"), 1)
+    shapes |= dict.fromkeys(("free_load", "load", "load_0", "best_load", "kept_load", "follows"), k)
     shapes |= dict.fromkeys(("moments", "moved"), 2 * k) | {"weights": points, "copies": copies}
     shapes |= dict.fromkeys(("records", "shares", "acting", "acting_shares"), pieces)
     shapes |= dict.fromkeys(("state", "new"), states)
