@@ -135,6 +135,7 @@ def objects() -> dict[str, Any]:
 
 
 SPECIAL: dict[str, dict[str, Any]] = {
+    "Contact": {"pressure": "fixed", "height": 0.0},
     "Slider": {"outline": SQUARE},
     "Slider.gaps": {"point": (0.0, 0.0)},
     "planning.motion_cone": {"at": (-0.01, 0.002), "normal": (1.0, 0.0)},

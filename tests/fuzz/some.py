@@ -107,7 +107,10 @@ def scene(draw: random.Random) -> pf.Scene:
         options |= {"position": (draw.uniform(-0.1, 0.1), draw.uniform(-0.1, 0.1)), "count": draw.randint(1, 3)}
         if velocity is None and draw.random() < 0.2:
             options["support_velocity"] = signal(draw, t_end, lambda: [draw.uniform(-1, 1), 0.0, draw.uniform(-10, 10)])
-        return pf.Contact(model(draw), signal(draw, t_end, load), name=f"{draw.choice('aφ')} {number}", **options)
+        made, name = model(draw), f"{draw.choice('aφ')} {number}"
+        if count == 1 and isinstance(made.reduction, pf.DistributedModel):
+            options |= {"mounted_on": "body", "pressure": "follows", "height": draw.choice([0.0, spread(draw, -3, 0)])}
+        return pf.Contact(made, signal(draw, t_end, load), name=name, **options)
 
     velocity, force = None, None
     if draw.random() < 0.3:
@@ -122,5 +125,6 @@ def scene(draw: random.Random) -> pf.Scene:
         gravity=draw.choice([(0.0, 0.0), (0.0, -9.81)]),
     )
     stop = draw.choice([None, 1e-4]) if velocity is None else None
-    contacts = [contact(number) for number in range(draw.choice([1, 1, 1, 2, 3]))]
+    count = draw.choice([1, 1, 1, 2, 3])
+    contacts = [contact(number) for number in range(count)]
     return pf.Scene(body, contacts, t_end, force, velocity, stop, save_every=t_end / 4)

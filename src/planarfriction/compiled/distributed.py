@@ -41,7 +41,7 @@ class CompiledDistributed(CompiledModel):
         turned = self.patch.anisotropic
         return (contacts.TURNED, steps.TURNED) if turned else (contacts.ISOTROPIC, steps.ISOTROPIC)
 
-    def _record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
+    def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         """Return the record of a contact, and how many numbers of a linearisation each cell has."""
         rows = ROWS_OF_A_CELL if self.patch.asymmetric else contacts.LINEAR_ROWS
         return contacts.CellsContact(self.law.numbers, numbers.shape[1], numbers, weights), rows
@@ -59,7 +59,7 @@ class CompiledDistributed(CompiledModel):
 
     def points(self) -> tuple[np.ndarray, int]:
         """See `CompiledModel`."""
-        return self.patch.positions, size_of(type(self._record(np.zeros((2, 1)), np.zeros(1))[0]))
+        return self.patch.positions, size_of(type(self.record(np.zeros((2, 1)), np.zeros(1))[0]))
 
     def _following(self, load: np.ndarray, centre: np.ndarray) -> Iterator[tuple[Any, PackedParts, np.ndarray | None]]:
         weights = tilted(self.patch.positions, self.patch.weights(load.reshape(-1)), centre)
@@ -119,7 +119,7 @@ class CompiledDistributed(CompiledModel):
         chosen = np.ones(weights.shape[1], bool) if chosen is None else chosen
         weights, positions = np.ascontiguousarray(weights), self.patch.positions[chosen]
         count, numbers = len(positions), self.numbers(chosen)
-        record, rows = self._record(numbers, weights)
+        record, rows = self.record(numbers, weights)
         return PackedModel(
             self._contact,
             rows_of(record, len(weights), weights=places_of(weights)),

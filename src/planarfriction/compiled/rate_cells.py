@@ -23,7 +23,7 @@ class CompiledRateCells(CompiledDistributed):
         self._lever = cells.LEVERS if self.patch.anisotropic else cells.POSITIONS
         return self.law.functions(self._lever)[1:]
 
-    def _record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
+    def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         return self.law.contact(self._lever, numbers, weights), ROWS_OF_A_CELL
 
 

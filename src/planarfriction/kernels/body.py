@@ -103,7 +103,9 @@ class SystemRecord(NamedTuple):
     size: int
     """Number C of contacts."""
     bristles: int
-    """Number of bristle states."""
+    """Number of states of contacts."""
+    pressures: int
+    """Number of these, at their end, that are the place of a pressure."""
     pieces: int
     """Number S of pieces."""
     rates: int
@@ -122,7 +124,9 @@ class System(Packed):
     `keepalive` are arrays whose addresses are in the records of the contacts: they live as long as this does.
     """
 
-    def __init__(self, contacts: Contacts, motion: Motion, keepalive: tuple[np.ndarray, ...] = ()) -> None:
+    def __init__(
+        self, contacts: Contacts, motion: Motion, keepalive: tuple[np.ndarray, ...] = (), pressures: int = 0
+    ) -> None:
         n, square = len(contacts.count), (3, 3)
         layout = Layout(
             Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=3, stiffness=square,
@@ -130,7 +134,7 @@ class System(Packed):
         )  # fmt: skip
         functions = (rates, "ppfdd"), (linearise, "ppd"), (factor, "ppfdf"), (solve, "ppfdfdd")
         addresses = [address_of(*each) for each in functions]
-        sizes = n, int(contacts.state[n]), len(motion.breaks) - 1
+        sizes = n, int(contacts.state[n]), pressures, len(motion.breaks) - 1
         super().__init__(SystemRecord(contacts, motion, layout.made(), *sizes, *addresses))
         self.contacts, self.motion, self.work, self.keepalive = contacts, motion, self.record.work, keepalive
 

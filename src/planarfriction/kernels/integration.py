@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from planarfriction.compiler import entry
 from planarfriction.compiler.memory import Doubles, Integers, at, reader
 
@@ -43,6 +45,8 @@ class Output(NamedTuple):
     """[M, C]"""
     bristles: Doubles
     """[M, number of bristle states], or [0, 0] when they are not wanted."""
+    pressure: Doubles = np.empty((0, 2))
+    """Last two of these, [M, 2], where they are the place of a pressure that follows its load; else [0, 2]."""
 
 
 class Progress(NamedTuple):

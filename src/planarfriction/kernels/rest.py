@@ -74,7 +74,7 @@ def _is_held(run, own, piece, since, energy):
         pace, moved = xp.maximum(math.sqrt(2.0 * energy), motion.stop_speed), step * motion.stop_length
         _move(run, own, pace)
         call(own.rates, (run.system, piece, since, y, rate))
-        for i in range(own.bristles):
+        for i in range(own.bristles - own.pressures):
             y[i] += moved / pace * rate[i]
         before, force = force, _force(run, own, piece, since)
         energy += 0.5 * (before + force) * moved

@@ -88,6 +88,9 @@ def _record(run, own, piece, since, state):
     if exists(out.bristles):
         for i in range(own.bristles):
             out.bristles[m * own.bristles + i] = state[i]
+    if exists(out.pressure):
+        for i in range(2):
+            out.pressure[2 * m + i] = state[own.bristles - 2 + i]
     run.progress.cursor[SAMPLE] = m + 1
 
 

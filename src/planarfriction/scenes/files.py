@@ -37,7 +37,7 @@ _LONG_KEY = re.compile(rf"""(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{_
 _OPTIONS = ("save_every", "stop_speed", "rtol", "atol", "name", "start")
 BODY_KEYS = ("mass", "inertia", "position", "angle", "velocity", "gravity", "outline", "size")
 CONTACT_KEYS = (
-    *("name", "mounted_on", "position", "angle", "count", "normal_force", "support_velocity"),
+    *("name", "mounted_on", "position", "angle", "count", "pressure", "height", "normal_force", "support_velocity"),
     *("model", "patch", "law"),
 )
 
@@ -74,8 +74,14 @@ def scene_to_dict(scene: Scene, of_part: Callable[[Any], dict[str, Any]] = part_
     data = table(scene, "name", "t_end", "save_every", "rtol", "atol", "stop_speed", *start)
     data["body"] = table(scene.body, *BODY_KEYS[:-1])
     data |= table(scene, "force", "velocity")
-    data["contact"] = [{**table(each, *CONTACT_KEYS[:7]), **of_part(each.model)} for each in scene.contacts]
+    data["contact"] = [{**table(each, *_keys_of(each)), **of_part(each.model)} for each in scene.contacts]
     return data
+
+
+def _keys_of(contact: Contact) -> tuple[str, ...]:
+    """Return the keys of a contact but for its model; those of a fixed pressure go without saying."""
+    keys = CONTACT_KEYS[:9]
+    return keys if contact.pressure == "follows" else tuple(each for each in keys if each not in ("pressure", "height"))
 
 
 def _plain(value: Any, of_part: Callable[[Any], dict[str, Any]]) -> Any:
@@ -124,7 +130,7 @@ def _contacts(scene: Section) -> list[Contact]:
     for number, data in enumerate(tables, 1):
         where = "contact" if len(tables) == 1 else f"contact.{number}"
         table = Section(data, where, scene.source, scene.folder).only(CONTACT_KEYS)
-        options = {key: table.get(key) for key in ("name", "mounted_on", "position", "angle", "count") if key in table}
+        options = {key: table.get(key) for key in CONTACT_KEYS[:7] if key in table}
         if "name" not in table and len(tables) > 1:
             options["name"] = f"contact {number}"
         load, model = read_signal(table, "normal_force"), model_from_dict(table)

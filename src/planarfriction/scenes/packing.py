@@ -13,6 +13,7 @@ from planarfriction.compiler.memory import places_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.body import Motion, System
 from planarfriction.kernels.contacts import BODY, BODY_AXES, WORLD, Contacts, calls_of
+from planarfriction.scenes.following import STATES, packed_contact
 from planarfriction.scenes.movers import displacement
 from planarfriction.scenes.signal import SAME_TIME, Signal, breaks_between
 from planarfriction.scenes.start import first_slopes, first_states
@@ -206,7 +207,9 @@ class SegmentBatches:
     def _flat(self, states: list[np.ndarray]) -> np.ndarray:
         """Return states `[K, *state_shape]` of the contacts as the solver has them, `[K, n]`."""
         chosen = [each if m.cells is None else each[..., m.cells] for each, m in zip(states, self.models, strict=True)]
-        return np.concatenate([each.reshape(len(each), -1) for each in chosen], axis=1)
+        flat = [each.reshape(len(each), -1) for each in chosen]
+        more = [np.zeros((len(each), m.states - each.shape[1])) for each, m in zip(flat, self.models, strict=True)]
+        return np.hstack([part for pair in zip(flat, more, strict=True) for part in pair])
 
     def __iter__(self) -> Iterator[System]:
         while self._ready is not None or self._done < self._pieces.count:
@@ -229,12 +232,12 @@ class SegmentBatches:
         for c, contact in enumerate(self._scene.contacts):
             between = self._between[c]
             if between is None:
-                self.models.append(old.pop(0) if old else contact.model.packed([None]))
+                self.models.append(old.pop(0) if old else packed_contact(contact, [None]))
                 rows.append(np.zeros(len(pieces), np.int64))
                 continue
             held = self._pieces.held(c, pieces[:count])
             loads, row = _in_order(np.where(held > 0.0, held, between[0]))  # any, where there is no load
-            self.models.append(contact.model.packed(loads, between if self._most < MOST_PIECES else None))
+            self.models.append(packed_contact(contact, loads, between if self._most < MOST_PIECES else None))
             rows.append(row)
             packed = len(self.models[c].records)
             count = count if packed == len(loads) else int(np.argmax(row == packed))
@@ -273,7 +276,8 @@ class SegmentBatches:
         if self._times is not None:
             _meet(self._times, breaks)
         kept = tuple(array for model in models for array in (model.records, *model.keepalive))
-        return System(self._contacts, motion, kept)
+        pressures = sum(STATES for contact in scene.contacts if contact.pressure == "follows")
+        return System(self._contacts, motion, kept, pressures)
 
 
 def pack(scene, t_end: float, *, sensitivities: bool = False) -> PackedScene:

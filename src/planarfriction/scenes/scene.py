@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -125,6 +126,15 @@ class Contact(ByValue):
     For a pad fixed to the world it is the twist at the origin of the contact frame, which moves with the pad. Under a
     patch fixed to the body it is the twist of the ground (a belt, a turntable) at the origin of the world.
     """
+    pressure: Literal["fixed", "follows"] = "fixed"
+    """Pressure that is "fixed" to the patch, or "follows" the load (docs/physics.md, "Pressure that follows the load").
+
+    It follows weight, applied forces and inertia, which act at the centre of mass, and friction, which acts below it,
+    with a lag of 1 ms. The patch is fixed to the body, which has no other contact, and its model has bristles on cells.
+    A body that would tip slides on the edge of its patch.
+    """
+    height: float = 0.0
+    """Height of the body's centre of mass above the contact [m], >= 0, where the pressure follows the load."""
 
     if TYPE_CHECKING:  # what is given may be more than what is kept
 
@@ -138,6 +148,8 @@ class Contact(ByValue):
             count: int = 1,
             name: str = "contact",
             support_velocity: Signal | ArrayLike | None = None,
+            pressure: Literal["fixed", "follows"] = "fixed",
+            height: float = 0.0,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -153,6 +165,29 @@ class Contact(ByValue):
         self._set(position=position, angle=validation.number(angle, self.angle), count=count)
         if self.support_velocity is not None:
             self._set(support_velocity=as_signal(f"support_velocity {of_contact}", self.support_velocity, 3))
+        validation.choice(f"pressure {of_contact}", self.pressure, ("fixed", "follows"))
+        self._set(height=validation.non_negative(f"height {of_contact}", self.height))
+        self._check_pressure(of_contact)
+
+    def _check_pressure(self, of_contact: str) -> None:
+        if self.pressure == "fixed":
+            if self.height > 0.0:
+                raise InvalidValueError(f"height {of_contact}", "be 0 where the pressure is 'fixed'", self.height)
+            return
+        from planarfriction.models import DistributedModel
+
+        if self.mounted_on != "body":
+            rule = "be 'fixed' on the world: only a patch of the body follows its load"
+            raise InvalidValueError(f"pressure {of_contact}", rule, self.pressure)
+        if not isinstance(getattr(self.model, "reduction", None), DistributedModel):
+            rule = "have bristles on cells where the pressure follows (DistributedModel, ReducedModel without parts)"
+            raise InvalidValueError(f"model {of_contact}", rule, self.model)
+
+    @property
+    def centre_of_mass(self) -> tuple[float, float]:
+        """Place of the body's centre of mass in the frame of a contact fixed to the body [m]."""
+        (x, y), cos, sin = self.position, math.cos(self.angle), math.sin(self.angle)
+        return -cos * x - sin * y, sin * x - cos * y
 
     def __repr__(self) -> str:
         count = f"{self.count} x " if self.count > 1 else ""
@@ -255,6 +290,10 @@ class Scene(ByValue):
                     name = f"support_velocity of contact {contact.name!r}"
                     rule = "be None if the body's velocity is prescribed"
                     raise InvalidValueError(name, rule, contact.support_velocity)
+        for contact in self.contacts:
+            if contact.pressure == "follows" and len(self.contacts) > 1:
+                rule = "be 'fixed' beside other contacts, which share the load in a way that statics leaves open"
+                raise InvalidValueError(f"pressure of contact {contact.name!r}", rule, contact.pressure)
         sample_count(self.t_end, self.save_every, "save_every")
         validation.text("name", self.name)
         self._check_start()
@@ -266,6 +305,8 @@ class Scene(ByValue):
             if contact.support_velocity is not None:
                 driven[f"contact {contact.name!r}"] = contact.support_velocity(0.0).tolist()
         moves = [name for name, velocity in driven.items() if any(velocity)]
+        if self.start == "equilibrium" and any(contact.pressure == "follows" for contact in self.contacts):
+            raise InvalidValueError("start", "be 'rest' or 'sliding' if the pressure follows the load", self.start)
         if self.start == "equilibrium" and self.velocity is not None:
             raise InvalidValueError("start", "be 'rest' or 'sliding' if the velocity is prescribed", self.start)
         if self.start == "equilibrium" and moves:

@@ -11,6 +11,7 @@ from planarfriction import validation
 from planarfriction.compiler.notice import said_when_compiling
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
 from planarfriction.kernels.integration import Method, Output
+from planarfriction.scenes.following import centres_of_pressure
 from planarfriction.scenes.options import SolverOptions
 from planarfriction.scenes.packing import SegmentBatches
 from planarfriction.scenes.scene import Scene
@@ -41,6 +42,8 @@ _LONG_NAMES = {
     "fy": "friction on the body along y of the contact frame, one of the identical contacts",
     "tau": "friction torque on the body about the contact frame's origin, one of the identical contacts",
     "normal_force": "normal force of one of the identical contacts",
+    "pressure_x": "centre of pressure along x of the contact frame",
+    "pressure_y": "centre of pressure along y of the contact frame",
 }
 
 
@@ -106,7 +109,7 @@ def simulate(
     max_steps = validation.count("max_steps", max_steps)
     with said_when_compiling(silent=progress is not None):
         batches = SegmentBatches(scene, plan.end, times=plan.times)
-        output = _output(plan.times, batches, bristles)
+        output = _output(scene, plan.times, batches, bristles)
         scales = plan.atol * batches.state_scale
         limits = {"rtol": plan.rtol, "atol": scales, "max_steps": max_steps}
         run = integrate(batches, output, batches.state, method=method, progress=progress, **limits)
@@ -119,13 +122,15 @@ def simulate(
     return solution
 
 
-def _output(times: np.ndarray, batches: SegmentBatches, bristles: str) -> Output:
+def _output(scene: Scene, times: np.ndarray, batches: SegmentBatches, bristles: str) -> Output:
     count, contacts, states = len(times), len(batches.models), int(batches.bristles[-1])
     if bristles == "all" and count * states > MOST_NUMBERS:
         shown = f"{count} samples of {states} numbers"
         raise InvalidValueError("bristles", f"be 'none' above {MOST_NUMBERS} numbers (raise save_every)", shown)
     recorded = np.empty((count, states) if bristles == "all" else (0, 0))
-    return Output(times, np.empty((count, 6)), np.empty((count, contacts, 3)), np.empty((count, contacts)), recorded)
+    follows = sum(contact.pressure == "follows" for contact in scene.contacts)
+    shapes = (count, 6), (count, contacts, 3), (count, contacts)
+    return Output(times, *map(np.empty, shapes), recorded, np.empty((follows * count, 2)))
 
 
 def _histories(scene: Scene, batches: SegmentBatches, output: Output) -> dict[str, History]:
@@ -143,10 +148,15 @@ def _histories(scene: Scene, batches: SegmentBatches, output: Output) -> dict[st
     for i, (name, unit) in enumerate(_WRENCH.items()):
         histories[name] = history(name, ("time", "contact"), output.wrench[:, :, i], unit)
     histories["normal_force"] = history("normal_force", ("time", "contact"), output.load, "N")
+    if scene.contacts[0].pressure == "follows":
+        centres = centres_of_pressure(scene.contacts[0], output.pressure, output.load[:, 0])
+        for i, name in enumerate(("pressure_x", "pressure_y")):
+            histories[name] = history(name, ("time", "contact"), centres[:, i : i + 1], "m")
     if len(output.bristles):
         for c, contact in enumerate(scene.contacts):
             first, cells = batches.bristles, batches.cells[c]
             part = output.bristles[:, first[c] : first[c + 1]]
+            part = part[:, : 2 * cells.sum()] if cells is not None else part  # no place of the pressure
             name = f"bristles_{contact.name}"
             if cells is not None:
                 full = np.zeros((len(part), 2, len(cells)))

@@ -1,0 +1,56 @@
+"""Cells whose pressure follows the load, as the solver of scenes reads them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planarfriction.compiled.distributed import CompiledDistributed
+from planarfriction.compiled.packed import PackedModel
+from planarfriction.compiler.memory import place_of, places_of, row_of, rows_of
+from planarfriction.kernels.contacts import calls_of
+from planarfriction.kernels.following_cells import FUNCTIONS, OWN, FollowingContact
+from planarfriction.kernels.tilt import NARROW
+
+LAG = 1e-3
+"""Time [s] with which the pressure follows the load: about a step of a simulator, whose patches follow that of the step
+before."""
+
+STATES = 2
+"""States behind the bristles: how far the centre of pressure is from the centre of mass, along x and y [m]."""
+
+
+def following(
+    compiled: CompiledDistributed, packed: PackedModel, centre: tuple[float, float], height: float
+) -> PackedModel:
+    """Return packed cells whose pressure follows a load at `centre` [m] in the contact frame, `height` [m] above it."""
+    (weights, numbers), positions = packed.keepalive, compiled.patch.positions[packed.cells]
+    count, (x, y) = weights.shape[1], np.ascontiguousarray(positions.T)
+    middle, slopes, radius = _moved(weights, positions)
+    pressed, trial, scratch, zero, rows = (np.zeros(size) for size in (count, count, *(2 * count + STATES,) * 2, 12))
+    held, tried = (row_of(compiled.record(numbers, each)[0]) for each in (pressed, trial))
+    calls = calls_of(packed.functions, change=True)
+    record = FollowingContact(
+        count, x, y, weights, middle, *slopes, calls, place_of(held), place_of(tried), pressed, trial, scratch, zero,
+        rows, radius, *centre, height, LAG,
+    )  # fmt: skip
+    columns = {"weights": weights, "middle": middle, "slope_x": slopes[0], "slope_y": slopes[1]}
+    return packed._replace(
+        functions=FUNCTIONS,
+        records=rows_of(record, len(weights), **{name: places_of(each) for name, each in columns.items()}),
+        states=packed.states + STATES,
+        workspace=OWN + packed.workspace,
+        state_scale=np.append(packed.state_scale, np.full(STATES, radius / np.sqrt(count + 1))),
+        keepalive=(*packed.keepalive, x, y, middle, slopes, calls, held, tried, pressed, trial, scratch, zero, rows),
+    )
+
+
+def _moved(weights: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return the centres of pressure `[R, 2]` of rows of weights, their slopes by it `[2, R, n]`, and a radius [m].
+
+    A plane over cells along a line does not tilt them across it.
+    """
+    middle = weights @ positions
+    away = positions - middle[:, None]
+    spread = np.einsum("rn,rni,rnj->rij", weights, away, away)
+    slopes = np.einsum("rij,rnj->irn", np.linalg.pinv(spread, rcond=NARROW, hermitian=True), away)
+    return middle, np.ascontiguousarray(slopes), float(np.sqrt(np.trace(spread, axis1=1, axis2=2).max()))
