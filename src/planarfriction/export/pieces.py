@@ -1,0 +1,151 @@
+"""Models taken apart for source code: their numbers as tables, and the traced step of one cell or part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planarfriction.errors import InvalidValueError
+from planarfriction.export.trace import Block, Number, Table, Trace, traced
+from planarfriction.export.twins import twin
+from planarfriction.formulas import LawNumbers
+from planarfriction.kernels import cells, distributed_step, moment_steps, published_step, reduced_step
+from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, Root
+from planarfriction.kernels.reduced_contact import ReducedContact, ReducedPatch
+from planarfriction.kernels.surfaces import CELLS
+from planarfriction.models import DistributedModel, MomentModel, ReducedModel, ReducedModelPublished
+
+FIXED = "gamma", "elasto_plastic", "creep_speed"
+"""Numbers of a law that are constants of the source: stored maps and the shape of the code depend on them."""
+
+
+class Pieces(NamedTuple):
+    """A model as source code needs it: `count` cells or parts that see the same twist and share the load."""
+
+    count: int
+    states: int
+    """Number of states of a cell or part."""
+    stride: int
+    """Places between the states of a cell or part."""
+    spacing: int
+    """Places between the first states of one cell or part and of the next."""
+    tables: dict[str, np.ndarray]
+    """Constant arrays by name; `share` [count] is that in the load."""
+    step: Block
+    """New states, then the wrench per unit load, from `p`, `k`, `z`, `v` and `dt`."""
+    parameters: dict[str, float]
+    """Numbers of the law that may change at run time."""
+
+
+def pieces_of(model: Any) -> Pieces:
+    """Take a model apart.
+
+    Raises InvalidValueError for models without straight-line source: laws of the user's own, patches whose shape
+    depends on the load, friction that differs from cell to cell in other ways than by a metric.
+    """
+    whole = model.reduction if isinstance(model, ReducedModel) else model
+    for kind, taken_apart in _KINDS.items():
+        if type(whole) is kind and isinstance(getattr(model.law, "numbers", None), LawNumbers):
+            if whole.patch.depends_on_load:
+                rule = "have a patch whose shape does not depend on the load"
+                raise InvalidValueError("model", rule, model.patch.name or "a patch that does")
+            return taken_apart(whole)
+    names = ", ".join(kind.__name__ for kind in (*_KINDS, ReducedModel))
+    given = f"{type(model).__name__}, {type(getattr(model, 'law', None)).__name__}"
+    raise InvalidValueError("model", f"be one of {names} with a law of LuGre bristles", given)
+
+
+# ---------------------------------------------------------------------- what they are traced with
+
+
+def _law(trace: Trace, numbers: LawNumbers) -> LawNumbers:
+    given = numbers._asdict()
+    return LawNumbers(*(value if name in FIXED else Number(trace, f"p->{name}") for name, value in given.items()))
+
+
+def _parameters(numbers: LawNumbers) -> dict[str, float]:
+    names = [name for name in LawNumbers._fields if name not in FIXED]
+    if not numbers.elasto_plastic:
+        names.remove("breakaway_ratio")
+    return {name: float(getattr(numbers, name)) for name in names}
+
+
+def _vector(trace: Trace, *names: str) -> tuple[Number, ...]:
+    return tuple(Number(trace, name) for name in names)
+
+
+_TWIST = "v[0]", "v[1]", "v[2]"
+
+
+# ---------------------------------------------------------------------- kinds of models
+
+
+def _distributed(model: DistributedModel) -> Pieces:
+    if model.patch.asymmetry is not None:
+        raise InvalidValueError("model", "have no asymmetry", model.patch.asymmetry)
+    numbers, n, law = model.compiled.numbers(), model.patch.cells, model.law.numbers
+    lever = twin(cells.LEVERS if model.patch.anisotropic else cells.POSITIONS)
+    names = ["lever_xx", "lever_xy", "lever_yy", "lever_x", "lever_y"] if model.patch.anisotropic else ["x", "y"]
+
+    def step(trace: Trace) -> Any:
+        own = _vector(trace, *(f"{name}[k]" for name in names))
+        u = lever.seen(own, _vector(trace, *_TWIST))
+        z, dt = _vector(trace, "z[k]", f"z[{n} + k]"), Number(trace, "dt")
+        new, traction = twin(distributed_step.cell)(_law(trace, law), z, u, dt)
+        return new, lever.wrench(own, traction)
+
+    tables = {**dict(zip(names, numbers, strict=False)), "share": model.patch.weights()}
+    return Pieces(n, 2, n, 1, tables, traced(step), _parameters(law))
+
+
+def _of_three_states(model: Any, law: LawNumbers, steps: Any, tables: dict, contact: Callable[[Trace], Any]) -> Pieces:
+    """Trace `moment_steps.step` of the record of a contact."""
+    frame, hold, taped_step = (twin(each) for each in (steps._FRAME, steps.MODEL.hold, steps.MODEL.taped_step))
+
+    def step(trace: Trace) -> Any:
+        new, out, dt = [0.0] * 3, [0.0] * 3, Number(trace, "dt")
+        z, twist = _vector(trace, "z[3 * k]", "z[3 * k + 1]", "z[3 * k + 2]"), _vector(trace, *_TWIST)
+        twin(moment_steps.step)(frame, hold, taped_step, contact(trace), z, twist, dt, new, out)
+        return tuple(new), tuple(out)
+
+    return Pieces(len(tables["share"]), 3, 1, 3, tables, traced(step), _parameters(law))
+
+
+def _published(model: ReducedModelPublished) -> Pieces:
+    (part,), law = next(iter(model.compiled.shapes.at([None]))), model.law.numbers
+    surface, root, shape = part.shape.surface.numbers, part.shape.root, PublishedPatch(*part.shape.numbers)
+    if surface.kind == CELLS:
+        raise InvalidValueError("surface", "be an ellipsoid or a table", type(part.shape.surface).__name__)
+    root = Root(float(root[0, 0]), float(root[0, 1]), float(root[1, 1]))
+
+    def contact(trace: Trace) -> PublishedContact:
+        data = Table(trace, "surface", surface.data)
+        return PublishedContact(_law(trace, law), shape, root, surface.kind, surface.size, data)
+
+    tables = {"share": np.ones(1)} | ({"surface": surface.data} if len(surface.data) else {})
+    return _of_three_states(model, law, published_step, tables, contact)
+
+
+def _moments(model: MomentModel) -> Pieces:
+    parts, law = next(iter(model.compiled.shapes.at([None]))), model.law.numbers
+    shapes, maps = [part.shape for part in parts], [part.shape.data for part in parts]
+    upper = np.array([shape.factor for shape in shapes])[:, *np.triu_indices(3)]
+
+    def contact(trace: Trace) -> ReducedContact:
+        if len(maps) == 1:
+            data, factor = Table(trace, "map", maps[0]), [float(each) for each in upper[0]]
+        else:
+            data = Table(trace, "map", None, Number(trace, "first[k]", "index"))
+            factor = [Number(trace, f"factor[6 * k + {i}]") for i in range(6)]
+        return ReducedContact(_law(trace, law), ReducedPatch(*factor, 0.0), data, 0)
+
+    tables = {"share": np.array([part.share for part in parts]), "map": np.concatenate(maps)}
+    if len(maps) > 1:
+        first = np.cumsum([0, *(len(each) for each in maps[:-1])])
+        tables |= {"first": first, "factor": upper.ravel()}
+    return _of_three_states(model, law, reduced_step, tables, contact)
+
+
+_KINDS = {DistributedModel: _distributed, ReducedModelPublished: _published, MomentModel: _moments}

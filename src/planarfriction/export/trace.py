@@ -1,0 +1,283 @@
+"""Straight-line functions traced with symbols: what they compute, operation by operation.
+
+A kernel is called in Python with `Number`s in the place of floats, which note each operation on a `Trace`. A function
+that asks which way a comparison goes is traced once for either answer, and a `Branch` joins what comes out. Loops run
+as long as their count is known. Compiled functions are called through their Python twins (see `twins`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+
+class Undecided(Exception):
+    """A comparison that decides how a function goes on."""
+
+    def __init__(self, condition: Number) -> None:
+        super().__init__(condition.name)
+        self.condition = condition
+
+
+class Operation(NamedTuple):
+    """One operation on names and constants."""
+
+    name: str
+    """Name of its result."""
+    kind: str
+    """"real", "index" or "bool"."""
+    text: str
+    """Its source with `{0}`, `{1}` for the arguments, and `$` before the name of a mathematical function."""
+    arguments: tuple[Any, ...]
+    """Names, or constants of Python."""
+
+
+class Block(NamedTuple):
+    """Operations and branches in order, and names or constants of the results."""
+
+    operations: list[Any]
+    results: tuple[Any, ...]
+
+
+class Branch(NamedTuple):
+    """Numbers that come out of one block or of another."""
+
+    outcomes: tuple[tuple[str, str], ...]
+    """Name and kind of each."""
+    condition: str
+    yes: Block
+    no: Block
+
+
+class Number:
+    """A number of which the name is known, not the value."""
+
+    __slots__ = ("kind", "name", "trace")
+
+    def __init__(self, trace: Trace, name: str, kind: str = "real") -> None:
+        self.trace, self.name, self.kind = trace, name, kind
+
+    def __bool__(self) -> bool:
+        return self.trace.decide(self)
+
+    def __add__(self, other: Any) -> Any:
+        return self if _is(other, 0.0) else self._noted("{0} + {1}", self, other)
+
+    def __radd__(self, other: Any) -> Any:
+        return self if _is(other, 0.0) else self._noted("{0} + {1}", other, self)
+
+    def __sub__(self, other: Any) -> Any:
+        return self if _is(other, 0.0) else self._noted("{0} - {1}", self, other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return -self if _is(other, 0.0) else self._noted("{0} - {1}", other, self)
+
+    def __mul__(self, other: Any) -> Any:
+        if _is(other, 0.0):
+            return other
+        if _is(other, 1.0):
+            return self
+        return -self if _is(other, -1.0) else self._noted("{0} * {1}", self, other)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Any:
+        return self if _is(other, 1.0) else self._noted("{0} / {1}", self, other)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return other if _is(other, 0.0) else self._noted("{0} / {1}", other, self)
+
+    def __neg__(self) -> Number:
+        return self._noted("-{0}", self)
+
+    def __abs__(self) -> Number:
+        return self._noted("$fabs({0})", self)
+
+    def __lt__(self, other: Any) -> Number:
+        return self._asked("{0} < {1}", other)
+
+    def __le__(self, other: Any) -> Number:
+        return self._asked("{0} <= {1}", other)
+
+    def __gt__(self, other: Any) -> Number:
+        return self._asked("{0} > {1}", other)
+
+    def __ge__(self, other: Any) -> Number:
+        return self._asked("{0} >= {1}", other)
+
+    def __eq__(self, other: Any) -> Number:  # type: ignore[override]
+        return self._asked("{0} == {1}", other)
+
+    def __ne__(self, other: Any) -> Number:  # type: ignore[override]
+        return self._asked("{0} != {1}", other)
+
+    def __and__(self, other: Any) -> Any:
+        return self._asked("{0} && {1}", other) if isinstance(other, Number) else other and self
+
+    def __or__(self, other: Any) -> Any:
+        return self._asked("{0} || {1}", other) if isinstance(other, Number) else other or self
+
+    __rand__, __ror__, __hash__ = __and__, __or__, None  # type: ignore[assignment]
+
+    def _noted(self, text: str, *arguments: Any) -> Number:
+        return self.trace.note(text, kind_of(arguments), *arguments)
+
+    def _asked(self, text: str, other: Any) -> Number:
+        return self.trace.note(text, "bool", self, other)
+
+
+def _is(value: Any, constant: float) -> bool:
+    return not isinstance(value, Number) and value == constant
+
+
+def kind_of(arguments: tuple) -> str:
+    """Return the kind of a result: an index if all arguments are."""
+    whole = all(each.kind == "index" if isinstance(each, Number) else isinstance(each, int) for each in arguments)
+    return "index" if whole else "real"
+
+
+class Trace:
+    """What a function does, operation by operation; the same operation is noted once."""
+
+    def __init__(self) -> None:
+        self.operations: list[Any] = []
+        self._known: dict[tuple, Number] = {}
+        self._answers: dict[str, bool] = {}
+        self._count = 0
+
+    def _new(self, kind: str) -> Number:
+        self._count += 1
+        return Number(self, f"t{self._count}", kind)
+
+    def note(self, text: str, kind: str, *arguments: Any) -> Number:
+        """Return the result of an operation."""
+        names = tuple(each.name if isinstance(each, Number) else each for each in arguments)
+        key = text, *((type(each), each) for each in names)
+        if key not in self._known:
+            self._known[key] = self._new(kind)
+            self.operations.append(Operation(self._known[key].name, kind, text, names))
+        return self._known[key]
+
+    def decide(self, condition: Number) -> bool:
+        """Return the answer to a condition; raise `Undecided` for one that is new."""
+        if condition.name not in self._answers:
+            raise Undecided(condition)
+        return self._answers[condition.name]
+
+    def call(self, function: Callable[..., Any], arguments: tuple) -> Any:
+        """Return the results of a function without side effects, after both ways of each of its comparisons."""
+        try:
+            return function(*arguments)
+        except Undecided as fork:
+            condition = fork.condition.name
+        (yes, if_so), (no, if_not) = (self._side(function, arguments, condition, answer) for answer in (True, False))
+        outcomes: list[Number] = []
+        inside = [[], []]
+        result = self._merged(if_so, if_not, outcomes, inside)
+        blocks = [Block(block, tuple(each)) for block, each in zip((yes, no), inside, strict=True)]
+        self.operations.append(Branch(tuple((each.name, each.kind) for each in outcomes), condition, *blocks))
+        return result
+
+    def _side(self, function: Callable, arguments: tuple, condition: str, answer: bool) -> tuple[list[Any], Any]:
+        """Return the operations of a function after an answer, and its result."""
+        before, known = len(self.operations), dict(self._known)
+        self._answers[condition] = answer
+        result = self.call(function, arguments)
+        del self._answers[condition]
+        block = self.operations[before:]
+        del self.operations[before:]
+        self._known = known
+        return block, result
+
+    def _merged(self, yes: Any, no: Any, outcomes: list[Number], inside: list[list]) -> Any:
+        """Return a result that has new names where its two forms differ."""
+        if isinstance(yes, tuple):
+            items = [self._merged(a, b, outcomes, inside) for a, b in zip(yes, no, strict=True)]
+            return type(yes)(*items) if hasattr(yes, "_fields") else tuple(items)
+        a, b = (each.name if isinstance(each, Number) else each for each in (yes, no))
+        if type(a) is type(b) and a == b:
+            return yes
+        number = self._new(kind_of((yes, no)))
+        outcomes.append(number)
+        for side, name in zip(inside, (a, b), strict=True):
+            side.append(name)
+        return number
+
+
+class Table:
+    """An array that stands in the source, from the place `first` on.
+
+    Of an array whose numbers are given, those at known places are known.
+    """
+
+    def __init__(self, trace: Trace, name: str, numbers: Any = None, first: Any = 0) -> None:
+        self.trace, self.name, self.numbers, self.first = trace, name, numbers, first
+
+    def __getitem__(self, place: Any) -> Any:
+        if self.numbers is not None and not isinstance(place, Number):
+            return float(self.numbers[place])
+        return self.trace.note(self.name + "[{0}]", "real", self.first + place)
+
+
+def traced(function: Callable[[Trace], Any]) -> Block:
+    """Return what a function of a `Trace` computes; its results are a number, or tuples of them, one after another."""
+    trace = Trace()
+    results = flat(trace.call(function, (trace,)))
+    return Block(trace.operations, tuple(each.name if isinstance(each, Number) else float(each) for each in results))
+
+
+def flat(results: Any) -> Iterator[Any]:
+    """Yield the numbers of nested tuples."""
+    if isinstance(results, tuple):
+        for each in results:
+            yield from flat(each)
+    else:
+        yield results
+
+
+# ---------------------------------------------------------------------- mathematics of symbols
+
+
+def _function(text: str, plain: Callable[..., Any], kind: str | None = "real") -> Callable[..., Any]:
+    """Return a function that notes its call, or computes it where all arguments are known; None: of their own kind."""
+
+    def call(*arguments: Any) -> Any:
+        symbols = [each for each in arguments if isinstance(each, Number)]
+        return symbols[0].trace.note(text, kind or kind_of(arguments), *arguments) if symbols else plain(*arguments)
+
+    return call
+
+
+def _where(condition: Any, a: Any, b: Any) -> Any:
+    if not isinstance(condition, Number):
+        return a if condition else b
+    if not isinstance(a, Number) and not isinstance(b, Number) and a == b:
+        return a
+    return condition.trace.note("{0} ? {1} : {2}", kind_of((a, b)), condition, a, b)
+
+
+def _power(x: Any, exponent: Any) -> Any:
+    return x * x if _is(exponent, 2.0) else _pow(x, exponent)
+
+
+_pow = _function("$pow({0}, {1})", math.pow)
+
+
+class Mathematics:
+    """Functions for symbols in the place of `math`, of `compiled_math` and of what kernels take from NumPy."""
+
+    pi, inf = math.pi, math.inf
+    where, power = staticmethod(_where), staticmethod(_power)
+    sqrt = staticmethod(_function("$sqrt({0})", math.sqrt))
+    exp = staticmethod(_function("$exp({0})", math.exp))
+    expm1 = staticmethod(_function("$expm1({0})", math.expm1))
+    log = staticmethod(_function("$log({0})", math.log))
+    sin = staticmethod(_function("$sin({0})", math.sin))
+    cos = staticmethod(_function("$cos({0})", math.cos))
+    atan2 = staticmethod(_function("$atan2({0}, {1})", math.atan2))
+    floor = staticmethod(_function("$floor({0})", math.floor))
+    minimum = staticmethod(_function("{0} < {1} ? {0} : {1}", min, None))
+    maximum = staticmethod(_function("{0} > {1} ? {0} : {1}", max, None))
+    integer = staticmethod(_function("(int)({0})", int, "index"))
+    real = float64 = staticmethod(_function("{0}", float))

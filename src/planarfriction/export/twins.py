@@ -1,0 +1,181 @@
+"""Python twins of compiled functions, which take symbols (see `trace`).
+
+A twin has the code of its function and sees other globals: twins for compiled functions, functions of symbols for those
+of `math`, and tuples for the vectors that compiled code has intrinsics for.
+"""
+
+from __future__ import annotations
+
+import dis
+import functools
+import math
+import types
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from planarfriction.compiler import compiled_math, memory
+from planarfriction.export.trace import Mathematics, Number, Table, flat
+from planarfriction.kernels import hermite, published_contact, reduced_contact, vectors
+
+
+def _plus(a: Any, c: Any, b: Any) -> Any:
+    return _like(a, [x + c * y for x, y in zip(a, b, strict=True)])
+
+
+def _like(a: Any, numbers: list) -> Any:
+    """Return a tuple of numbers, a record if `a` is one."""
+    return type(a)(*numbers) if hasattr(a, "_fields") else tuple(numbers)
+
+
+def _dot(a: Any, b: Any) -> Any:
+    return functools.reduce(lambda total, pair: total + pair[0] * pair[1], zip(a, b, strict=True), 0.0)
+
+
+class _At:
+    """What follows a place of a list, as a pointer would."""
+
+    def __init__(self, row: Any, first: int) -> None:
+        self._row, self._first = row, first
+
+    def __getitem__(self, i: int) -> Any:
+        return self._row[self._first + i]
+
+    def __setitem__(self, i: int, value: Any) -> None:
+        self._row[self._first + i] = value
+
+
+def _put(row: Any, numbers: tuple) -> None:
+    for i, number in enumerate(numbers):
+        row[i] = number
+
+
+def _placed(a: Any, i: int, x: Any) -> tuple:
+    return tuple(x if j == i else 0.0 for j in range(len(a)))
+
+
+# ---------------------------------------------------------------------- cubic patches
+
+
+def _polynomial(coefficients: tuple, x: Any) -> Any:
+    return functools.reduce(lambda total, c: total * x + c, reversed(coefficients), 0.0)
+
+
+def _weights(u: Any, v: Any) -> list[list[Any]]:
+    """Return the weights of the four numbers of four nodes: of the value, of the slope by u and of that by v."""
+    both = hermite._NEAR, hermite._NEXT, hermite._NEAR_SLOPES, hermite._NEXT_SLOPES
+    rows, columns = ([[_polynomial(each, x) for each in pair] for pair in both] for x in (u, v))
+
+    def products(a: int, b: int) -> list[Any]:
+        ends = [(rows[a + i], columns[b + j]) for i in (0, 1) for j in (0, 1)]
+        return [along[r] * across[c] for along, across in ends for c in (0, 1) for r in (0, 1)]
+
+    return [products(0, 0), products(2, 0), products(0, 2)]
+
+
+def _read(numbers: Callable[[Any, int], Any], at: Any, node: int, row: int, weights: list[Any]) -> tuple:
+    """Return three components of a patch: the sum of its 16 numbers times their weights."""
+    corners = at, at + node, at + row, at + row + node
+    places = [(corner, n) for corner in corners for n in range(4)]
+    return tuple(_dot(weights, [numbers(corner, 4 * m + n) for corner, n in places]) for m in range(3))
+
+
+def _patch(data: Any, at: Any, node: int, row: int, u: Any, v: Any) -> tuple:
+    """Return what `hermite.patch` does."""
+    return tuple(_read(lambda place, n: data[place + n], at, node, row, weights) for weights in _weights(u, v))
+
+
+def _patch_of_levels(data: Any, at: Any, node: int, row: int, t: tuple, t_slopes: tuple, u: Any, v: Any) -> tuple:
+    """Return what `hermite.patch_of_levels` does."""
+
+    def mixed(weights: tuple) -> Callable[[Any, int], Any]:
+        return lambda place, n: _dot(weights, [data[place + 12 * k + n] for k in range(4)])
+
+    by_value, by_u, by_v = _weights(u, v)
+    value = mixed(t)
+    read = [_read(value, at, node, row, weights) for weights in (by_value, by_u, by_v)]
+    return (*read, _read(mixed(t_slopes), at, node, row, by_value))
+
+
+_TWINS: dict[int, Any] = {
+    id(own): twin
+    for own, twin in (
+        (compiled_math, Mathematics),
+        (math, Mathematics),
+        (np, Mathematics),
+        (vectors.dot, _dot),
+        (vectors.times, lambda c, a: _like(a, [c * x for x in a])),
+        (vectors.plus, _plus),
+        (vectors.zeros, lambda a: tuple(0.0 for _ in a)),
+        (vectors.placed, _placed),
+        (vectors.put, _put),
+        (vectors.put_all, _put),
+        (memory.at, _At),
+        (published_contact.read, lambda record: record),
+        (reduced_contact.read, lambda record: record),
+        (hermite.patch, _patch),
+        (hermite.patch_of_levels, _patch_of_levels),
+    )
+}
+"""Twins by the `id` of what they stand for; those of functions are added as they are made."""
+
+_BUILT_IN = {"int": Mathematics.integer, "float": Mathematics.real}
+
+
+class _Module:
+    """A module whose functions are twins."""
+
+    def __init__(self, own: types.ModuleType) -> None:
+        self._own = own
+
+    def __getattr__(self, name: str) -> Any:
+        return twin(getattr(self._own, name))
+
+
+def twin(own: Any) -> Any:
+    """Return the twin of a function, a module or a record of functions; anything else is its own twin."""
+    if id(own) in _TWINS:
+        return _TWINS[id(own)]
+    if isinstance(own, types.ModuleType):
+        return _Module(own)
+    if isinstance(own, tuple):
+        return _like(own, [twin(each) for each in own])
+    function = getattr(own, "py_func", own)
+    if not isinstance(function, types.FunctionType):
+        return own
+    space: dict[str, Any] = {"__builtins__": function.__globals__.get("__builtins__"), **_BUILT_IN}
+    cells = [types.CellType() for _ in function.__closure__ or ()]
+    made = types.FunctionType(function.__code__, space, function.__name__, function.__defaults__, tuple(cells))
+    _TWINS[id(own)] = joined(made) if _has_jumps(function.__code__) else made
+    _KEPT.append(own)
+    for name in _global_names(function.__code__):
+        if name in function.__globals__:
+            space[name] = twin(function.__globals__[name])
+    for cell, given in zip(cells, function.__closure__ or (), strict=True):
+        cell.cell_contents = twin(given.cell_contents)
+    return _TWINS[id(own)]
+
+
+def joined(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that joins the ways through it where it asks its symbols (see `Trace.call`)."""
+
+    def call(*arguments: Any) -> Any:
+        symbol = next((each for each in flat(arguments) if isinstance(each, (Number, Table))), None)
+        return function(*arguments) if symbol is None else symbol.trace.call(function, arguments)
+
+    return call
+
+
+def _has_jumps(code: types.CodeType) -> bool:
+    return any(each.opcode in dis.hasjrel or each.opcode in dis.hasjabs for each in dis.get_instructions(code))
+
+
+_KEPT: list[Any] = []
+"""Functions that have twins: their `id` stays theirs."""
+
+
+def _global_names(code: types.CodeType) -> set[str]:
+    """Return the names that code may look up, with those of the code inside it."""
+    inner = [each for each in code.co_consts if isinstance(each, types.CodeType)]
+    return set(code.co_names).union(*map(_global_names, inner))
