@@ -19,6 +19,7 @@ from . import sweeps as sweeps
 from .coupling import HostStep as HostStep
 from .derivatives import rollout as rollout
 from .errors import FrictionError as FrictionError
+from .export import export_c as export_c
 from .identify import Log as Log
 from .identify import Slide as Slide
 from .laws import Coulomb as Coulomb

@@ -92,6 +92,8 @@ def test_numbers(capsys, command, value):
         ["limit-surface", "--patch"],
         ["limit-surface", "--cell-size", "0.001", "--pressure"],
         ["limit-surface", "--surface"],
+        ["export", "--out", "library"],
+        ["export", "scene.toml", "--out", "library", "--contact"],
         ["identify"],
         ["identify", "log.csv", "--patch"],
         ["identify", "log.csv", "--parameters"],
@@ -122,6 +124,7 @@ def test_counts(capsys, option, value):
     [
         (["run"], ".toml"),
         (["run"], ".json"),
+        (["export", "--out", "library"], ".toml"),
         (["run", "in-hand", "--cell-size", "0.001", "--patch"], ".csv"),
         (["run", "in-hand", "--cell-size", "0.001", "--patch"], ".npy"),
         (["limit-surface", "--cell-size", "0.001", "--pressure"], ".png"),

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.export import export_c
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
@@ -31,7 +30,7 @@ KINDS = {"double": (ctypes.c_double, float), "float": (ctypes.c_float, np.float3
 
 def library(model, folder, precision):
     """Compile a model as C99 and as C++17 without a warning, and load it."""
-    _, source = export_c(model, folder, precision=precision)
+    _, source = pf.export_c(model, folder, precision=precision)
     made = folder / "friction.so"
     subprocess.run(["gcc", "-std=c99", *STRICT, "-shared", "-o", made, source, "-lm"], check=True)
     subprocess.run(["gcc", "-x", "c++", "-std=c++17", *STRICT, "-c", "-o", folder / "cpp.o", source], check=True)
@@ -91,13 +90,13 @@ def test_bad_numbers(place, value, tmp_path):
 )
 def test_bad_options(options, words, tmp_path):
     with pytest.raises(pf.FrictionError, match=words):
-        export_c(MODELS["few"](), tmp_path, **options)
+        pf.export_c(MODELS["few"](), tmp_path, **options)
     assert not list(tmp_path.iterdir())
 
 
 def test_models_without_source(tmp_path):
     soft = pf.ReducedModel(pf.ContactPatch.disc(0.01, pressure=pf.SoftFinger(k=2.0, c=0.009, n=1.0 / 3.0)), LAW)
     with pytest.raises(pf.FrictionError, match="model must have a patch whose shape does not depend on the load"):
-        export_c(soft, tmp_path)
+        pf.export_c(soft, tmp_path)
     with pytest.raises(pf.FrictionError, match="model must be one of DistributedModel"):
-        export_c(object(), tmp_path)
+        pf.export_c(object(), tmp_path)

@@ -209,6 +209,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     },
     "scenes.pivot": {"normal_force": None, "mass": 0.02, "start": "equilibrium"},
     "scenes.curling": {"twist": (1.0, 0.0, 10.0), "start": "sliding"},
+    "export_c": {"folder": "library", "precision": "double"},
     "rollout": {"twist": TWISTS},
     "derivatives.rollout_states": {"twist": TWISTS},
     "derivatives.rollout_vjp": {"twist": TWISTS},

@@ -35,6 +35,7 @@ LEGAL = {
         "normal_force=1,2",
     ],
     "limit-surface": ["--patch", "Line"],
+    "export": ["scene.toml", "--out", "library"],
     "identify": ["log.csv", "--patch", "Line", "--parameters", "mu_c", "--starts", "1"],
     PLAN: ["--patch", "Line", "--parameters", "mu_c", "--duration", "0.2"],
     "reproduce": ["--list"],

@@ -139,6 +139,32 @@ def limit_surface(patch: str | None, pressure: Path | None, cell_size: float | N
 
 
 @app.command(
+    short_help="Write the friction model of a file as C source.",
+    help="""Write the friction model of a file as C source for a controller: NAME.h and NAME.c, C99 and C++17.
+
+    FILE (.toml, .json) is a scene, or a model alone: the tables patch and law, and model, as of a contact of a scene.
+
+    \b
+    Examples:
+      planarfriction export model.toml --out friction/
+      planarfriction export scene.toml --contact fingers --out src/ --name finger --precision float
+    """,
+)
+@click.argument("file", type=FILE, shell_complete=complete_scene)
+@click.option("--out", type=FILE, required=True, help="Folder for the two files.")
+@click.option(
+    "--name", default="friction", show_default=True, help="Name of the files, and what names in them begin with."
+)
+@click.option("--precision", default="double", show_default=True, help="double or float.")
+@click.option("--contact", metavar="NAME", help="Contact of the scene whose model it is, if they have different ones.")
+def export(file: Path, **options: Any) -> None:
+    """Write C source (the help above is what users see)."""
+    from planarfriction.cli import export as command
+
+    command.export(file, **options)
+
+
+@app.command(
     cls=FitOrPlan,
     short_help="Estimate friction parameters from logs; plan the next measurement.",
     help="""Estimate friction parameters of a contact from logs of its motion and its friction wrench.

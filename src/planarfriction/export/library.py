@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import writing
+from planarfriction import validation, writing
 from planarfriction.errors import InvalidValueError
 from planarfriction.export.c_source import Writer
 from planarfriction.export.pieces import Pieces, pieces_of
@@ -16,6 +16,9 @@ from planarfriction.formulas import LARGEST
 
 PRECISIONS = {"double": LARGEST, "float": 1e9}
 """Largest number that a step takes, by precision."""
+
+LONGEST_NAME = 40
+"""Characters of the name of a library: compilers of C99 tell apart names of 63, and files have such names too."""
 
 MEANINGS = {
     "sigma_0": "bristle stiffness per unit normal load [1/m]",
@@ -49,19 +52,16 @@ def export_c(model: Any, folder: Any, *, name: str = "friction", precision: str 
     Raises InvalidValueError for a name that is no C identifier, an unknown precision, and models without source (see
     `pieces_of`); FileError if the folder cannot be written.
     """
-    if not (isinstance(name, str) and name.isascii() and name.isidentifier()):
-        raise InvalidValueError("name", "be a C identifier", name)
-    if precision not in PRECISIONS:
-        raise InvalidValueError("precision", f"be one of {', '.join(PRECISIONS)}", precision)
-    pieces = pieces_of(model)
-    texts = _texts(model, pieces, name, precision)
-    folder = Path(folder)
-    with writing.reporting(folder):
-        folder.mkdir(parents=True, exist_ok=True)
+    if not (isinstance(name, str) and name.isascii() and name.isidentifier() and len(name) <= LONGEST_NAME):
+        raise InvalidValueError("name", f"be a C identifier of at most {LONGEST_NAME} characters", name)
+    validation.choice("precision", precision, PRECISIONS)
+    folder = validation.path("folder", folder)
+    header, source = _texts(model, pieces_of(model), name, precision)
+    writing.make_folder(folder)
     files = folder / f"{name}.h", folder / f"{name}.c"
-    for file, text in zip(files, texts, strict=True):
-        with writing.replacing(file) as buffer:
-            buffer.write(text.encode())
+    with writing.replacing(files[0]) as first, writing.replacing(files[1]) as second:  # both can be written, or none is
+        first.write(header.encode())
+        second.write(source.encode())
     return files
 
 
