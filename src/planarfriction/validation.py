@@ -247,6 +247,14 @@ def array(name: str, value: Any, shape: tuple[int | None, ...], *, largest: floa
     return result
 
 
+def positive_array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
+    """Return `value` as an array of that shape of numbers > 0."""
+    result = array(name, value, shape)
+    if not (result > 0.0).all():
+        raise InvalidValueError(name, "be > 0", f"{result.min()} at index {result.argmin()}")
+    return result
+
+
 def non_negative_array(name: str, value: Any, shape: tuple[int | None, ...], *, largest: float = LARGEST) -> np.ndarray:
     """Return `value` as a new finite float array >= 0, as `array` does."""
     result = array(name, value, shape, largest=largest)

@@ -150,7 +150,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "patch.PerCell": {"values": [1.0, 2.0, 3.0]},
     "ContactPatch.from_pressure": {"pressure": np.ones((3, 3)), "loads": None},
     "ContactPatch.compressed": {"cells": None},
-    "ContactPatch": {"pressure": None, "metric": None, "asymmetry": None, "cell_size": None},
+    "ContactPatch": {"pressure": None, "metric": None, "asymmetry": None, "cell_size": None, "point_shares": None},
     "ContactPatch.moments": {"about": None},
     "Scene.from_dict": {"data": Fresh(lambda: objects()["scene"].to_dict())},
     "Signal.from_dict": {"data": Fresh(lambda: {"times": [0.0, 1.0], "values": [1.0, 2.0]})},

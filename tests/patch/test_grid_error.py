@@ -13,15 +13,25 @@ from planarfriction.patch import PUBLISHED_PATCHES
 @pytest.mark.parametrize("cells", [5, 11])
 def test_a_cell_beside_the_centre_of_rotation_pulls_with_all_its_load(cells):
     """At a hundredth of a cell from its middle its continuous friction is 0.02 of its load: the force errs by 0.98."""
-    error = pf.ContactPatch.line(0.02, cells).grid_error()
+    error = PUBLISHED_PATCHES["Line"](cells).grid_error()
     assert error.force == pytest.approx(0.98 / cells, rel=1e-6)
     assert error.cells == cells
+
+
+@pytest.mark.parametrize("cells", [5, 11])
+def test_the_force_on_a_line_errs_by_the_loads_on_both_sides(cells):
+    """About a point of the line the force is the difference of the loads on both sides: `-2 y/L` of an even line."""
+    line = pf.ContactPatch.line(0.02, cells)
+    near = line.positions[np.abs(line.positions[:, 1]) < 0.02 / 4, 1]
+    turns = np.concatenate([near - 0.01 * 0.02 / cells, near + 0.01 * 0.02 / cells])
+    sides = np.sign(line.positions[:, 1] - turns[:, None]) @ line.weights() + 2.0 * turns / 0.02
+    assert line.grid_error().force == pytest.approx(np.abs(sides).max(), rel=1e-6)
 
 
 def test_a_spin_of_a_square_shows_what_the_points_miss():
     """The largest error of the torque is no less than that of the spin about the middle: `r_cells/r - 1`."""
     patch = pf.ContactPatch.rectangle(0.02, cells=9)
-    missing = 1.0 - patch.contact_radius() / pf.LimitSurfaceExact(patch).contact_radius
+    missing = abs(1.0 - patch.contact_radius() / pf.LimitSurfaceExact(patch).contact_radius)
     error = patch.grid_error()
     assert error.torque > 0.9 * missing > 0.0
     spin = np.array([0.0, 0.0, 1.0])

@@ -189,7 +189,9 @@ def scaled_patch(patch: ContactPatch, scale: float, centre: Any = None) -> Conta
         size = {"cell_width": scale * grid.cell_width, "cell_height": scale * grid.cell_height}
         grid = dataclasses.replace(grid, x_min=float(x), y_min=float(y), **size)
     positions = new + scale * (patch.positions - old)
-    return ContactPatch(positions, scale**2 * patch.areas, patch.weights() / patch.areas, grid, patch.name)
+    shares = patch.point_shares
+    pressure = patch.weights() / patch.areas if shares is None else None
+    return ContactPatch(positions, scale**2 * patch.areas, pressure, grid, patch.name, point_shares=shares)
 
 
 class VectorMap:

@@ -130,9 +130,13 @@ class LimitSurface(ByValue):
     def _radius(self) -> float:
         return float(self.patch.contact_radius(self.normal_force))
 
+    def _weights(self) -> np.ndarray:
+        """Return the share of the load on each cell `[N]` in the sums of this surface."""
+        return self.patch.weights(self.normal_force)
+
     def _loaded_cells(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return positions about the centre of pressure (see `lever_coordinates`) and weights of the loaded cells."""
-        weights = self.patch.weights(self.normal_force)
+        weights = self._weights()
         loaded = weights > 0.0
         offset = self.patch.positions - self.centre_of_pressure
         # the centre of pressure is a sum with rounding; a cell that stands on it stands on it exactly
@@ -160,7 +164,7 @@ class LimitSurface(ByValue):
         """Contribution of the asymmetry to `h`, `[3]`, or None."""
         if not self.patch.asymmetric:
             return None
-        weights = self.patch.weights(self.normal_force)
+        weights = self._weights()
         wrench = np.einsum("n,nij,ni->j", weights, self.patch.levers(), self.patch.asymmetries())
         return np.linalg.solve(self._frame().T, wrench)
 

@@ -142,7 +142,10 @@ class LimitSurfaceExact(LimitSurface):
             return triangles[0, 0] + offset
         if isinstance(self._outline, RoundOutline):
             return np.zeros(2)
-        return super().centre_of_pressure
+        return np.array([(self._weights() * coordinate).sum() for coordinate in self.patch.positions.T])
+
+    def _weights(self) -> np.ndarray:
+        return self.patch.tile_weights(self.normal_force)
 
     @property
     def integrates_outline(self) -> bool:

@@ -29,7 +29,7 @@ class ScaledCells:
         self.asymmetric = patch.asymmetric
         """True if `sums` has a part that is even in the direction."""
         one_metric = patch.root is None or patch.root.ndim == 2
-        weights = patch.weights(normal_force)
+        weights = patch.tile_weights(normal_force)
         loaded = weights > 0.0
         share, self.stretch = _spread(patch, weights)
         """Stretch of `s` in the map (see `kernels.steady`)."""
@@ -136,7 +136,7 @@ def _parallelograms(
     if patch.root is not None:
         x, y = factor[1, 1] * x, factor[0, 0] * y - factor[0, 1] * x
     places = np.stack([x, y], -1).reshape(-1, 6) / factor[2, 2]
-    return np.ascontiguousarray(np.concatenate([places, patch.weights(normal_force)[loaded, None]], axis=1))
+    return np.ascontiguousarray(np.concatenate([places, patch.tile_weights(normal_force)[loaded, None]], axis=1))
 
 
 def _points(patch: ContactPatch, weights: np.ndarray, factor: np.ndarray, loaded: np.ndarray, extents: np.ndarray):

@@ -17,6 +17,7 @@ from planarfriction.patch import shapes
 from planarfriction.patch.grid import MOST_CELLS, Grid, check_cells, warn_of_the_unit
 from planarfriction.patch.grid_error import GridError, grid_error
 from planarfriction.patch.moments import Moments
+from planarfriction.patch.point_shares import cell_extents, point_shares
 from planarfriction.patch.pressure import (
     Pressure,
     Uniform,
@@ -37,7 +38,8 @@ _UNIT_BOX = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 class ContactPatch(Moments):
     """A flat contact: N cells at `rho_i` with areas `a_i`, and a pressure that determines their weights.
 
-    `w_i = p_i a_i / sum(p a)`, so that `sum(w) = 1` and cell i carries the normal force `w_i f_N`.
+    `w_i = p_i a_i q_i / sum(p a q)`, so that `sum(w) = 1` and cell i carries the normal force `w_i f_N`; see
+    `point_shares` for the factors `q`.
 
     Frame: the contact frame, x to the right, y up; **row 0 of a grid or map is its top** (largest y). Grids and maps
     are centred on the origin (a polygon stays where its vertices are) and list their cells row by row from the top
@@ -72,6 +74,9 @@ class ContactPatch(Moments):
     """Name for plots and tables."""
     cell_size: tuple[float, float] | None = None
     """Width and height of a whole cell [m], with its load spread evenly over it; None for points (lines: one is 0)."""
+    point_shares: Any = None
+    """Factors `q` on the areas `[N]` [-] that give evenly pressed shapes by name or outline the second moments of their
+    areas, although each cell is a point; None: ones (other pressures, the published masks)."""
     outline: outlines.Outline | None = field(init=False, default=None)
     """Outline from which the class methods cut the cells; None for other cells."""
     _fixed_weights: np.ndarray | None = field(init=False, default=None, compare=False)
@@ -91,9 +96,7 @@ class ContactPatch(Moments):
         elif self.grid is not None:
             self._set(cell_size=(self.grid.cell_width, self.grid.cell_height))
         check_cells(len(positions))
-        areas = validation.array("areas", self.areas, (len(positions),))
-        if not (areas > 0.0).all():
-            raise InvalidValueError("areas", "be > 0", f"{areas.min()} at index {areas.argmin()}")
+        areas = validation.positive_array("areas", self.areas, (len(positions),))
         law = as_law(self.pressure, positions)
         if not law.depends_on_load:
             check_pressure(law.relative(positions), positions)
@@ -102,6 +105,11 @@ class ContactPatch(Moments):
             raise InvalidValueError("pressure", "be > 0 on at least one cell", "0 on all of them")
         self._check_anisotropy(kept)
         self._set(positions=positions[kept], areas=areas[kept], pressure=law.only(kept))
+        if type(law) is not Uniform:  # other pressures keep their ratios
+            self._set(point_shares=None)
+        elif self.point_shares is not None:
+            self._set(point_shares=validation.positive_array("point_shares", self.point_shares, (len(positions),)))
+            self.point_shares.setflags(write=False)
         self.positions.setflags(write=False)
         self.areas.setflags(write=False)
         if not law.depends_on_load:
@@ -158,7 +166,9 @@ class ContactPatch(Moments):
         height = width if height is None else validation.positive("height", height)
         grid = Grid.around_origin(width, height, *shapes.columns_and_rows(cells, width, height))
         positions, corners = grid.centres(), _UNIT_BOX * (width, height)
-        patch = cls(positions, np.full(len(positions), grid.cell_area), pressure, grid, name)
+        areas = np.full(len(positions), grid.cell_area)
+        shares = point_shares(positions, areas, (grid.cell_width, grid.cell_height))
+        patch = cls(positions, areas, pressure, grid, name, point_shares=shares)
         return outlines.with_outline(patch, outlines.polygon_outline(corners))
 
     @classmethod
@@ -198,7 +208,8 @@ class ContactPatch(Moments):
         elif profile is not None:
             profile = check_not_negative("profile", pressure_array("profile", profile, (cells,)))
         size = (side, 0.0) if along == 0 else (0.0, side)
-        return cls(positions, np.full(cells, grid.cell_area), profile, grid, name, size)
+        areas = np.full(cells, grid.cell_area)
+        return cls(positions, areas, profile, grid, name, size, point_shares(positions, areas, size))
 
     @classmethod
     def polygon(
@@ -257,21 +268,9 @@ class ContactPatch(Moments):
         Pressure laws are evaluated at the new cells; numbers per cell are repeated. Cells cut by a rim are replaced by
         cells of the same area and centroid. Points remain points. Raises InvalidValueError for too many cells.
         """
-        parts, extent = validation.count("parts", parts, at_most=MOST_CELLS), self.cell_extents()
-        if parts == 1 or not extent.any():
-            return self
-        check_cells(self.cells * parts ** int(extent.any(axis=0).sum()))
-        fine = (np.arange(parts) - (parts - 1) / 2) / parts
-        inside = np.stack(np.meshgrid(*(fine if side else [0.0] for side in extent.max(axis=0))), -1).reshape(-1, 2)
-        times, (width, height) = len(inside), self.cell_size or (0.0, 0.0)
-        own = {"metric": (self.metric, 2), "asymmetry": (self.asymmetry, 1)}  # what each cell has is repeated
-        fields = {
-            name: value if value is None or value.ndim == axes else np.repeat(value, times, axis=0)
-            for name, (value, axes) in own.items()
-        }
-        positions, areas = self.positions[:, None] + inside * extent[:, None], np.repeat(self.areas / times, times)
-        size, pressure = (width / parts, height / parts), self.pressure.repeated(times)
-        return ContactPatch(positions.reshape(-1, 2), areas, pressure, None, self.name, size, **fields)
+        from planarfriction.patch.refined import refined
+
+        return refined(self, parts)
 
     def compressed(
         self, degree: int = 5, *, cells: int | None = None, error: float | None = None, loads: Any = None
@@ -298,12 +297,7 @@ class ContactPatch(Moments):
 
     def cell_extents(self) -> np.ndarray:
         """Return the width and height over which the load of each cell is spread `[N, 2]` [m], less for cut cells."""
-        if self.cell_size is None:
-            return np.zeros((self.cells, 2))
-        width, height = self.cell_size
-        if width == 0.0 or height == 0.0:
-            return np.tile([width, height], (self.cells, 1))
-        return np.sqrt(self.areas / (width * height))[:, None] * np.array([width, height])
+        return cell_extents(self.areas, self.cell_size)
 
     @property
     def cells(self) -> int:
@@ -316,7 +310,7 @@ class ContactPatch(Moments):
         return self.pressure.depends_on_load
 
     def weights(self, normal_force: ArrayLike | None = None, moments: ArrayLike | None = None) -> np.ndarray:
-        """Return the share of the normal force on each cell, `w_i = p_i a_i / sum(p a)`, shape `[..., N]` [-].
+        """Return the share of the normal force on each cell, `w_i = p_i a_i q_i / sum(p a q)`, shape `[..., N]` [-].
 
         With `moments` `[..., 2]` [N m] of the normal forces `N_i` on the moving body about the origin, `(m_x, m_y) =
         (sum(y N), -sum(x N))`, the pressure follows them: `w_i max(0, c + a x_i + b y_i)`, whose centre is `(-m_y, m_x)
@@ -340,13 +334,24 @@ class ContactPatch(Moments):
         weights = self._shares(self.pressure.relative(self.positions, np.where(loaded, load, 1.0)))
         return np.where(loaded[..., None], weights, 0.0)
 
+    def tile_weights(self, normal_force: ArrayLike | None = None) -> np.ndarray:
+        """Return the share of the normal force on the area of each cell, `p_i a_i / sum(p a)`, shape `[..., N]` [-].
+
+        For sums that spread the load of a cell over its `cell_extents`. Raises InvalidValueError as `weights` does.
+        """
+        weights = self.weights(normal_force)
+        if self.point_shares is None:
+            return weights
+        weights = weights / self.point_shares
+        return weights / np.maximum(weights.sum(-1, keepdims=True), validation.SMALLEST)
+
     def pressure_values(self, normal_force: ArrayLike) -> np.ndarray:
-        """Return the pressure on each cell, `w_i f_N / a_i`, shape `[..., N]` [Pa].
+        """Return the pressure on each cell, `p_i f_N / sum(p a)`, shape `[..., N]` [Pa].
 
         Raises InvalidValueError for a load below zero.
         """
         load = validation.non_negative_numbers("normal_force", normal_force)
-        return self.weights(load) * load[..., None] / self.areas
+        return self.tile_weights(load) * load[..., None] / self.areas
 
     def plot(self, *, normal_force: float | None = None) -> Any:
         """Draw the pressure map with its centre of pressure; returns a matplotlib Figure."""
@@ -365,7 +370,7 @@ class ContactPatch(Moments):
         peak = relative.max(-1, keepdims=True)
         if not (peak > 0.0).all():
             raise InvalidValueError("pressure", "be > 0 on at least one cell at every load", f"a peak of {peak.min()}")
-        load = relative / peak * self.areas
+        load = relative / peak * (self.areas if self.point_shares is None else self.areas * self.point_shares)
         return load / load.sum(-1, keepdims=True)
 
     def to_dict(self) -> dict[str, Any]:
@@ -374,7 +379,7 @@ class ContactPatch(Moments):
             "shape": "cells", "name": self.name, "positions": self.positions, "areas": self.areas,
             "pressure": self.pressure.to_dict(), "metric": self.metric, "asymmetry": self.asymmetry,
             "outline": self.outline and self.outline.to_dict(), "cell_size": self.cell_size and list(self.cell_size),
-            "grid": self.grid and dataclasses.asdict(self.grid),
+            "grid": self.grid and dataclasses.asdict(self.grid), "point_shares": self.point_shares,
         }  # fmt: skip
         plain = {name: part.tolist() if isinstance(part, np.ndarray) else part for name, part in parts.items()}
         return {name: part for name, part in plain.items() if part is not None}
@@ -385,7 +390,8 @@ class ContactPatch(Moments):
 
         Raises InvalidValueError for those, and for values that break a rule of the patch.
         """
-        optional = ("shape", "name", "pressure", "grid", "cell_size", "metric", "asymmetry", "outline")
+        options = ("cell_size", "metric", "asymmetry", "point_shares")
+        optional = ("shape", "name", "pressure", "grid", "outline", *options)
         validation.keys("patch", data, required=("positions", "areas"), optional=optional)
         validation.choice("patch shape", data.get("shape", "cells"), ("cells",))
         pressure, grid = data.get("pressure"), data.get("grid")
@@ -394,6 +400,6 @@ class ContactPatch(Moments):
         if grid is not None:
             validation.keys("grid", grid, required=[entry.name for entry in dataclasses.fields(Grid)])
             grid = Grid(**grid)
-        options = {key: data.get(key) for key in ("cell_size", "metric", "asymmetry")}
-        patch = cls(data["positions"], data["areas"], pressure, grid, data.get("name", "patch"), **options)
+        given = {key: data.get(key) for key in options}
+        patch = cls(data["positions"], data["areas"], pressure, grid, data.get("name", "patch"), **given)
         return outlines.with_outline(patch, outlines.outline_from_dict(data.get("outline")))

@@ -12,6 +12,7 @@ from planarfriction import validation
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import shapes
+from planarfriction.patch.point_shares import point_shares
 
 if TYPE_CHECKING:
     from planarfriction.patch.contact_patch import ContactPatch
@@ -97,7 +98,8 @@ def clipped(kind: type[ContactPatch], outline: Outline, grid: Grid, pressure: An
     if not polygon.is_valid:
         raise InvalidValueError("vertices", "form a simple polygon", shapely.is_valid_reason(polygon))
     try:
-        cells = shapes.clip(polygon, grid)
+        positions, areas = shapes.clip(polygon, grid)
     except shapely.errors.GEOSException as error:  # rounding of coordinates far apart in size
         raise InvalidValueError("vertices", "form a polygon that can be cut into cells", str(error)) from None
-    return with_outline(kind(*cells, pressure, grid, name), outline)
+    shares = point_shares(positions, areas, (grid.cell_width, grid.cell_height))
+    return with_outline(kind(positions, areas, pressure, grid, name, point_shares=shares), outline)

@@ -180,7 +180,7 @@ def part_of(patch: ContactPatch, cells: np.ndarray) -> ContactPatch:
     whole = {field.name: getattr(patch, field.name) for field in dataclasses.fields(patch)}
     part = object.__new__(type(patch))  # what the whole has been checked for holds, and it has been warned of its size
     part.__dict__.update(whole, grid=None, outline=None)
-    for name, of_one in (("positions", 1), ("areas", 0), ("metric", 2), ("asymmetry", 1)):
+    for name, of_one in (("positions", 1), ("areas", 0), ("point_shares", 0), ("metric", 2), ("asymmetry", 1)):
         values = whole[name]
         if values is not None and values.ndim > of_one:
             part.__dict__[name] = values[cells]

@@ -6,11 +6,14 @@ and the lines follow their own rules, which depend on the number of cells).
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from planarfriction import validation
 from planarfriction.patch.contact_patch import ContactPatch
 from planarfriction.patch.grid import MOST_CELLS, check_cells
+from planarfriction.patch.outline import with_outline
 
 PUBLISHED_CELLS = 21
 """Rows and columns of the grid that the published masks are written on."""
@@ -18,7 +21,7 @@ PUBLISHED_CELLS = 21
 
 def square(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return a uniform square, `width` [m] wide."""
-    return ContactPatch.rectangle(width, cells=cells, name="Square")
+    return _even(ContactPatch.rectangle(width, cells=cells, name="Square"))
 
 
 def circle(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
@@ -28,17 +31,17 @@ def circle(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
 
 def line(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return a uniform line along y, `width` [m] long."""
-    return ContactPatch.line(width, cells, name="Line")
+    return _even(ContactPatch.line(width, cells, name="Line"))
 
 
 def line_grad(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return a line along y, `width` [m] long, with weights cells, ..., 2, 1 from the top."""
-    return ContactPatch.line(width, cells, profile=_steps(cells), name="LineGrad")
+    return _even(ContactPatch.line(width, cells, profile=_steps(cells), name="LineGrad"))
 
 
 def line_grad_x(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return a line along x, `width` [m] long, with weights cells, ..., 2, 1 from the left."""
-    return ContactPatch.line(width, cells, direction="x", profile=_steps(cells), name="LineGradX")
+    return _even(ContactPatch.line(width, cells, direction="x", profile=_steps(cells), name="LineGradX"))
 
 
 def non_convex_1(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
@@ -49,6 +52,11 @@ def non_convex_1(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPa
 def non_convex_2(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return a lying T of two bars: rows 9..11 x columns 0..13, and rows 4..17 x columns 18..20 (of 21 x 21 cells)."""
     return _masked([(slice(9, 12), slice(0, 14)), (slice(4, 18), slice(18, 21))], cells, width, "NonConvex2")
+
+
+def _even(patch: ContactPatch) -> ContactPatch:
+    """Return the patch with weights in proportion to pressure and area alone, as published."""
+    return with_outline(dataclasses.replace(patch, point_shares=None), patch.outline)
 
 
 def _steps(cells: int) -> np.ndarray:

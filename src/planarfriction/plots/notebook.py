@@ -79,7 +79,8 @@ def _pressure(patch: pf.ContactPatch, weights: np.ndarray) -> style.PlotFigure:
     else:
         grid = patch.grid
         pixels = np.full((grid.rows, grid.columns), np.nan)
-        pixels[grid.locate(patch.positions)] = weights / patch.areas
+        shares = 1.0 if patch.point_shares is None else patch.point_shares
+        pixels[grid.locate(patch.positions)] = weights / (patch.areas * shares)
         box = np.array([0.0, grid.columns * grid.cell_width, 0.0, grid.rows * grid.cell_height])
         axes.imshow(pixels, cmap=style.PRESSURE_MAP, vmin=0.0, extent=tuple(box), interpolation="nearest")
     axes.set(aspect="equal")

@@ -24,7 +24,7 @@ _CORNERS = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 def plot_patch(patch: pf.ContactPatch, *, normal_force: float | None = None) -> style.PlotFigure:
     """Draw the pressure on a patch, and its centre of pressure.
 
-    Cells of a grid are drawn with their true area at their true centroid and coloured by their pressure `w f_N / a`; a
+    Cells of a grid are drawn with their true area at their true centroid and coloured by their pressure; a
     patch without a grid is drawn as points coloured by the force on them, `w f_N`. Without `normal_force` [N] the
     colours show both per newton of load. Lengths in mm.
 
@@ -40,7 +40,9 @@ def plot_patch(patch: pf.ContactPatch, *, normal_force: float | None = None) -> 
     if patch.grid is None:
         drawn, label = _draw_points(axes, patch, weights * load, normal_force)
     else:
-        drawn, label = _draw_cells(axes, patch, patch.grid, weights * load / patch.areas, normal_force)
+        drawn, label = _draw_cells(
+            axes, patch, patch.grid, patch.tile_weights(normal_force) * load / patch.areas, normal_force
+        )
     figure.colorbar(drawn, ax=axes, label=label)
     mark = {"marker": "+", "markersize": 13, "linestyle": "none"}
     axes.plot(*centre, **mark, markeredgewidth=4.0, color="white")
