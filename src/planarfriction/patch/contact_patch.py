@@ -334,25 +334,6 @@ class ContactPatch(Moments):
         weights = self._shares(self.pressure.relative(self.positions, np.where(loaded, load, 1.0)))
         return np.where(loaded[..., None], weights, 0.0)
 
-    def tile_weights(self, normal_force: ArrayLike | None = None) -> np.ndarray:
-        """Return the share of the normal force on the area of each cell, `p_i a_i / sum(p a)`, shape `[..., N]` [-].
-
-        For sums that spread the load of a cell over its `cell_extents`. Raises InvalidValueError as `weights` does.
-        """
-        weights = self.weights(normal_force)
-        if self.point_shares is None:
-            return weights
-        weights = weights / self.point_shares
-        return weights / np.maximum(weights.sum(-1, keepdims=True), validation.SMALLEST)
-
-    def pressure_values(self, normal_force: ArrayLike) -> np.ndarray:
-        """Return the pressure on each cell, `p_i f_N / sum(p a)`, shape `[..., N]` [Pa].
-
-        Raises InvalidValueError for a load below zero.
-        """
-        load = validation.non_negative_numbers("normal_force", normal_force)
-        return self.tile_weights(load) * load[..., None] / self.areas
-
     def plot(self, *, normal_force: float | None = None) -> Any:
         """Draw the pressure map with its centre of pressure; returns a matplotlib Figure."""
         return picture("patch", self, normal_force=normal_force)

@@ -1,7 +1,7 @@
-"""Sums over the pressure of a patch: its centre, the contact radius, the area, moments of any degree."""
+"""Shares of areas and sums over the pressure of a patch: centre, contact radius, area, moments of any degree."""
 
 # pyright: reportAttributeAccessIssue=false
-# `positions`, `areas` and `weights` are those of the patch that is made from this.
+# `positions`, `areas`, `point_shares` and `weights` are those of the patch that is made from this.
 
 from __future__ import annotations
 
@@ -22,6 +22,25 @@ MOST_DEGREE = 40
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Moments(Anisotropy):
     """Moments of a patch: sums over the positions of its cells, weighted with their shares of the load."""
+
+    def tile_weights(self, normal_force: ArrayLike | None = None) -> np.ndarray:
+        """Return the share of the normal force on the area of each cell, `p_i a_i / sum(p a)`, shape `[..., N]` [-].
+
+        For sums that spread the load of a cell over its `cell_extents`. Raises InvalidValueError as `weights` does.
+        """
+        weights = self.weights(normal_force)
+        if self.point_shares is None:
+            return weights
+        tiles = weights / self.point_shares
+        return tiles / tiles.sum(-1, keepdims=True)
+
+    def pressure_values(self, normal_force: ArrayLike) -> np.ndarray:
+        """Return the pressure on each cell, `p_i f_N / sum(p a)`, shape `[..., N]` [Pa].
+
+        Raises InvalidValueError for a load below zero.
+        """
+        load = validation.non_negative_numbers("normal_force", normal_force)
+        return self.tile_weights(load) * load[..., None] / self.areas
 
     def centre_of_pressure(self, normal_force: ArrayLike | None = None) -> np.ndarray:
         """Return the centre of pressure `sum(w rho)`, shape `[..., 2]` [m].
