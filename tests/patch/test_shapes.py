@@ -101,7 +101,7 @@ def test_second_moments_of_even_shapes_are_those_of_the_area(patch, exact):
 
 
 @pytest.mark.parametrize(("columns", "rows"), [(1, 1), (2, 2), (2, 7), (1, 9)])
-def test_one_or_two_rows_of_cells_keep_their_own_second_moment_across(columns, rows):
+def test_one_or_two_rows_of_cells_stay_as_they_are(columns, rows):
     """Their squared distances are all the same, so that no weights change the mean."""
     patch = pf.ContactPatch.rectangle(0.002 * columns, 0.002 * rows, (columns, rows))
     along = 0.002**2 / 12 * np.array([columns**2 - 1, rows**2 - (rows < 3)])
@@ -109,7 +109,7 @@ def test_one_or_two_rows_of_cells_keep_their_own_second_moment_across(columns, r
 
 
 @pytest.mark.parametrize("name", list(PUBLISHED_PATCHES))
-def test_published_masks_and_other_pressures_keep_the_ratios_of_their_pressures(name):
+def test_published_masks_and_other_pressures_keep_their_ratios(name):
     patch = PUBLISHED_PATCHES[name]()
     load = patch.pressure.relative(patch.positions)
     load = load / load.max() * patch.areas
