@@ -125,6 +125,36 @@ def test_parts_add_up_to_the_patch():
             np.testing.assert_allclose(squares, whole.T @ whole, rtol=1e-12, atol=1e-18)
 
 
+def second_moments(positions, weights, extents):
+    """Second moments `[2, 2]` about the origin of tiles with the width and height `extents` `[N, 2]`."""
+    return np.einsum("n,ni,nj->ij", weights, positions, positions) + np.diag(weights @ extents**2) / 12.0
+
+
+@pytest.mark.parametrize("count", [2, 4, 7])
+def test_points_of_parts_have_the_moments_of_their_areas(count):
+    for patch in (ContactPatch.disc(0.01), ContactPatch.rectangle(0.03, 0.02), PATCHES["L"], PATCHES["ring"]):
+        size, points, whole = patch.second_moment(), np.zeros((2, 2)), np.zeros((2, 2))
+        for k in range(count):
+            mine = labels_of(patch, count) == k
+            part, tiles = part_of(patch, mine), patch.tile_weights()[mine]
+            share = tiles.sum()
+            np.testing.assert_allclose(part.tile_weights(), tiles / share, rtol=1e-12)
+            np.testing.assert_allclose(part.weights() @ part.positions, tiles @ part.positions / share, atol=1e-16)
+            points += share * second_moments(part.positions, part.weights(), np.zeros((part.cells, 2)))
+            whole += second_moments(part.positions, tiles, part.cell_extents())
+            np.testing.assert_allclose(points, whole, atol=1e-12 * size)
+        of_patch = second_moments(patch.positions, patch.weights(), np.zeros((patch.cells, 2)))
+        np.testing.assert_allclose(points, of_patch, atol=1e-12 * size)
+
+
+def test_parts_too_small_for_factors_keep_their_areas():
+    patch = ContactPatch.rectangle(0.02, cells=4)
+    parts = [part_of(patch, labels_of(patch, 16) == k) for k in range(16)]
+    assert all(part.point_shares is None and part.weights() == [1.0] for part in parts)
+    model = pf.models.MomentModel(patch, PLAIN, parts=16, **SMALL)
+    assert [part.share for part in model.parts_at(None)] == pytest.approx([1 / 16] * 16, rel=1e-14)
+
+
 @pytest.mark.parametrize("parts", [True, 0, -1, 2.5, "six", None, [2], float("nan"), 85, 2000])
 def test_other_parts_are_refused_in_one_line(parts):
     with pytest.raises(InvalidValueError, match="parts must be") as error:

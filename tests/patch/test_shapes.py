@@ -100,6 +100,15 @@ def test_second_moments_of_even_shapes_are_those_of_the_area(patch, exact):
     assert not np.array_equal(patch.weights(), patch.tile_weights())
 
 
+def test_weights_of_a_ring_thinner_than_its_cells_stay_positive():
+    """A sixth of a cell wide: all of its second moment would take factors of up to 1.96."""
+    patch = pf.ContactPatch.ring(0.0097, 0.01, 11)
+    assert np.abs(patch.point_shares - 1.0).max() == pytest.approx(0.8, rel=1e-12)
+    assert np.abs(patch.centre_of_pressure()).max() < 1e-15
+    exact = (0.01**2 + 0.0097**2) / 2
+    assert tile_moment(patch) < patch.second_moment() < exact
+
+
 @pytest.mark.parametrize(("columns", "rows"), [(1, 1), (2, 2), (2, 7), (1, 9)])
 def test_one_or_two_rows_of_cells_stay_as_they_are(columns, rows):
     """Their squared distances are all the same, so that no weights change the mean."""

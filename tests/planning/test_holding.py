@@ -57,9 +57,11 @@ def test_a_central_force_without_stribeck_needs_what_statics_says():
 
 
 def test_a_plan_ends_above_what_holds_the_cells_of_the_model():
-    """The radius of 5 x 5 cells is 2.7 % short, which shows if mu_s = mu_c; bounds that no plan meets are refused."""
+    """The radius of areas of 5 x 5 cells is 2.7 % short, which shows if mu_s = mu_c; bounds that no plan meets are
+    refused."""
     law = pf.LuGre(mu_c=1.0, elasto_plastic=0.9)
-    coarse = pf.DistributedModel(pf.ContactPatch.disc(0.01, cells=5), law)
+    by_area = pf.ContactPatch.disc(0.01, cells=5, pressure=lambda x, y: 1.0)
+    coarse = pf.DistributedModel(by_area, law)
     scene = pf.scenes.in_hand(coarse, centre_of_mass=(LEVER, 0.0), normal_force=4.0, t_end=1.0)
     with pytest.raises(InvalidValueError, match=r"bounds must reach the 3\.9"):
         plan_grip(scene, {"angle": np.radians(-10.0)}, knots=8, margin=0.0, bounds=(0.06, 3.885))

@@ -121,7 +121,8 @@ class ReducedShapes:
         shapes = zip(*(part.at(loads) for part in self.each), strict=True)
         if self.count == 1:
             return [(Part(1.0, shape),) for (shape,) in shapes]
-        weights = self._patch.weights(None if loads[0] is None else np.array(loads)).reshape(-1, self._patch.cells)
+        given = None if loads[0] is None else np.array(loads)
+        weights = self._patch.tile_weights(given).reshape(-1, self._patch.cells)
         # rows that lie in one piece: NumPy sums others in an order that depends on how many there are
         shares = np.stack([np.ascontiguousarray(weights[:, mine]).sum(-1) for mine in self._cells], -1).tolist()
         return [tuple(map(Part, *loaded)) for loaded in zip(shares, shapes, strict=True)]

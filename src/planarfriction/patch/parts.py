@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planarfriction.equality import ByValue
+from planarfriction.patch.point_shares import point_shares
 from planarfriction.patch.pressure import Pressure
 
 if TYPE_CHECKING:
@@ -176,17 +177,21 @@ def part_of(patch: ContactPatch, cells: np.ndarray) -> ContactPatch:
     """Return the `cells` `[N]` (bool) of a patch as a patch, whose weights are their shares in their own load.
 
     A normal force is that of the whole patch. Where it leaves these cells without load, they carry none of it evenly.
+    If the whole has `point_shares`, so has the part, of its own area: points and areas have the same centre in each
+    part. Second moments that they cannot give (one or two rows of cells) are those of the areas at points.
     """
     whole = {field.name: getattr(patch, field.name) for field in dataclasses.fields(patch)}
     part = object.__new__(type(patch))  # what the whole has been checked for holds, and it has been warned of its size
     part.__dict__.update(whole, grid=None, outline=None)
-    for name, of_one in (("positions", 1), ("areas", 0), ("point_shares", 0), ("metric", 2), ("asymmetry", 1)):
+    for name, of_one in (("positions", 1), ("areas", 0), ("metric", 2), ("asymmetry", 1)):
         values = whole[name]
         if values is not None and values.ndim > of_one:
             part.__dict__[name] = values[cells]
     part.__dict__["pressure"] = OfPart(patch.pressure, patch.positions, cells)
+    if patch.point_shares is not None:
+        part.__dict__["point_shares"] = point_shares(part.positions, part.areas, part.cell_size)
     if not patch.depends_on_load:
-        weights = patch.weights()[cells]
+        weights = patch.tile_weights()[cells] * (1.0 if part.point_shares is None else part.point_shares)
         part.__dict__["_fixed_weights"] = weights / weights.sum()
     return part
 

@@ -7,8 +7,8 @@ import numpy as np
 LEAST_SPREAD = 1e-6
 """Variance of a quadratic over its mean square below which it is linear on the cells (one or two rows) [-]."""
 
-LEAST_SHARE = 0.2
-"""Smallest correction that is taken; fewer than three cells along an axis would need others."""
+LARGEST_CHANGE = 0.8
+"""Largest relative change of a weight, which stays positive; few cells across a thin shape would need larger ones."""
 
 
 def cell_extents(areas: np.ndarray, cell_size: tuple[float, float] | None) -> np.ndarray:
@@ -21,13 +21,14 @@ def cell_extents(areas: np.ndarray, cell_size: tuple[float, float] | None) -> np
     return np.sqrt(areas / (width * height))[:, None] * np.array([width, height])
 
 
-def point_shares(positions: np.ndarray, areas: np.ndarray, cell_size: tuple[float, float]) -> np.ndarray | None:
+def point_shares(positions: np.ndarray, areas: np.ndarray, cell_size: tuple[float, float] | None) -> np.ndarray | None:
     """Return factors `q` `[N]` on the areas with which points at the cells have the second moments of the areas.
 
     `sum(a q p) = sum(a p)` for all polynomials of degree 1, and `sum(a q rho rho') = sum(a (rho rho' + e e'/12))` with
     the width and height `e` of the cells (`cell_extents`) as a diagonal. The least `sum(a (q - 1)^2)`:
     `q - 1` is a quadratic polynomial, of the order of the squared cell size over that of the patch. Second moments that
-    no factors change (across one or two rows of cells) are left out. None: there is nothing to correct.
+    no factors change (across one or two rows of cells) are left out, and a change beyond `LARGEST_CHANGE` is
+    shortened to it. None: there is nothing to correct.
     """
     w = areas / areas.sum()
     rho = positions - w @ positions
@@ -45,5 +46,6 @@ def point_shares(positions: np.ndarray, areas: np.ndarray, cell_size: tuple[floa
     axes = axes[:, variances > LEAST_SPREAD]
     missing = np.array([w @ own[:, 0], 0.0, w @ own[:, 1]]) / np.where(scale > 0.0, scale, 1.0)
     found = axes @ (axes.T @ missing / variances[variances > LEAST_SPREAD])
-    factors = 1.0 + free @ found
-    return factors if found.any() and factors.min() >= LEAST_SHARE else None
+    change = free @ found
+    largest = np.abs(change).max()
+    return 1.0 + change * min(1.0, LARGEST_CHANGE / largest) if largest > 0.0 else None

@@ -36,12 +36,12 @@ def line(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
 
 def line_grad(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return a line along y, `width` [m] long, with weights cells, ..., 2, 1 from the top."""
-    return _even(ContactPatch.line(width, cells, profile=_steps(cells), name="LineGrad"))
+    return ContactPatch.line(width, cells, profile=_steps(cells), name="LineGrad")
 
 
 def line_grad_x(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return a line along x, `width` [m] long, with weights cells, ..., 2, 1 from the left."""
-    return _even(ContactPatch.line(width, cells, direction="x", profile=_steps(cells), name="LineGradX"))
+    return ContactPatch.line(width, cells, direction="x", profile=_steps(cells), name="LineGradX")
 
 
 def non_convex_1(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
