@@ -25,10 +25,10 @@ def point_shares(positions: np.ndarray, areas: np.ndarray, cell_size: tuple[floa
     """Return factors `q` `[N]` on the areas with which points at the cells have the second moments of the areas.
 
     `sum(a q p) = sum(a p)` for all polynomials of degree 1, and `sum(a q rho rho') = sum(a (rho rho' + e e'/12))` with
-    the width and height `e` of the cells (`cell_extents`) as a diagonal. The least `sum(a (q - 1)^2)`:
-    `q - 1` is a quadratic polynomial, of the order of the squared cell size over that of the patch. Second moments that
-    no factors change (across one or two rows of cells) are left out, and a change beyond `LARGEST_CHANGE` is
-    shortened to it. None: there is nothing to correct.
+    the width and height `e` of the cells (`cell_extents`) as a diagonal. Of all such factors these have the least
+    `sum(a (q - 1)^2)`: `q - 1` is a quadratic polynomial, of the order of the squared cell size over that of the patch.
+    Second moments that no factors change (across one or two rows of cells) are left out, and a change beyond
+    `LARGEST_CHANGE` is shortened to it. None: there is nothing to correct.
     """
     w = areas / areas.sum()
     rho = positions - w @ positions
