@@ -111,7 +111,8 @@ def test_other_contacts_keep_mujocos_own_friction(cone, solver):
     <body name="upper" pos="0.005 0 0.06"><freejoint/>
     <geom name="upper" type="box" size="0.03 0.03 0.02" mass="0.5" contype="0" conaffinity="1"/>
     <site name="upper" pos="0 0 -0.02"/></body></worldbody></mujoco>"""
-    _, d, friction = _made(text, [PatchContact(PAD, site="upper", geoms=("lower", "upper"))])
+    face = pf.ReducedModel(pf.ContactPatch.rectangle(0.06, cells=9), LAW, parts=1)
+    _, d, friction = _made(text, [PatchContact(face, site="upper", geoms=("lower", "upper"))])
     slid = np.zeros(2)
     for _ in range(400):
         d.qfrc_applied[6] = 6.0 * np.sin(12.0 * d.time)
@@ -210,7 +211,7 @@ def test_other_models_are_left_alone_and_copies_are_not():
 def test_another_model_of_the_same_size_is_not_served():
     """It has the same joints and user data, and pads with other friction; a model prepared for the same is a copy."""
     scene = mujoco_scenes.grip()
-    _, d, friction = _held(scene)
+    friction = _held(scene)[2]
     law = dataclasses.replace(LAW, mu_c=0.4)
     m, other, slippery = scene.ours(model=pf.ReducedModel(PAD.patch, law, parts=1))
     assert (m.nv, m.nuserdata) == (friction.m.nv, friction.m.nuserdata)
@@ -362,7 +363,7 @@ def test_options_changed_at_run_time_are_refused_before_the_step(name):
 def test_implicit_steps_may_be_longer_than_contacts_are_stiff(integrator):
     """A quarter of what Euler takes: MuJoCo makes contacts softer (`refsafe`), unless it may not."""
     scene = dataclasses.replace(mujoco_scenes.grip(), time=1.0)
-    with pytest.raises(pf.errors.InvalidValueError, match="or 0.01 s with refsafe and implicit or implicitfast, got"):
+    with pytest.raises(pf.errors.InvalidValueError, match=r"or 0\.01 s with refsafe and implicit or implicitfast, got"):
         scene.ours(5e-3, "Euler", 0.004)
     m, d, friction = scene.ours(5e-3, integrator, 0.004)
     path = scene.run(m, d, lambda: friction.step(d))
@@ -430,7 +431,7 @@ def test_unprepared_models_and_unknown_names_are_refused():
     ):
         with pytest.raises(pf.errors.InvalidValueError, match=message):
             prepare(mujoco.MjSpec.from_string(text), wrong)
-    with pytest.raises(pf.errors.InvalidValueError, match="centre must be one of site, contact"):
+    with pytest.raises(pf.errors.InvalidValueError, match="centre must be one of auto, site, contact"):
         PatchContact(PAD, site="L", geoms=pads, centre="middle")
 
 

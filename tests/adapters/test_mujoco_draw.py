@@ -82,7 +82,7 @@ def test_the_gripper_holds_still_with_any_pads():
     places, weights = rng.uniform(-0.01, 0.01, (7, 2)), rng.uniform(0.2, 1.0, 7)
     law = pf.LuGre(mu_c=1.0, mu_s=1.0, sigma_0=1e5, sigma_1=300.0, elasto_plastic=0.9)
     pad = pf.DistributedModel(pf.ContactPatch.points(places, weights), law)
-    m, d, friction = example.hand(pad)
+    _, d, friction = example.hand(pad)
     d.ctrl[:2] = example.FIRM
     for _ in range(500):
         friction.step(d)

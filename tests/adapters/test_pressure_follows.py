@@ -20,12 +20,12 @@ BOX = f"""<inertial pos="{PLATE.centre_of_mass} 0 {PLATE.height - 0.02}" mass="{
 TABLE = '<geom name="table" type="plane" size="2 2 0.1"/>'
 
 
-def made(pressure="auto", body=BOX, table=TABLE, joint="<freejoint/>"):
+def made(body=BOX, table=TABLE, joint="<freejoint/>", **options):
     """Model, data after the box has come to rest, and friction."""
     spec = mujoco.MjSpec.from_string(f"""<mujoco><option timestep="{DT}" integrator="implicitfast"/><worldbody>
         {table}<body name="box" pos="0 0 0.02">{joint}{body}<site name="under" pos="0 0 -0.02"/></body>
         </worldbody></mujoco>""")
-    patches = [PatchContact(PLATE.model(), site="under", geoms=("table", "box"), pressure=pressure)]
+    patches = [PatchContact(PLATE.model(), site="under", geoms=("table", "box"), **options)]
     prepare(spec, patches)
     m = spec.compile()
     d, friction = mujoco.MjData(m), Friction(m, patches)
@@ -56,23 +56,35 @@ def test_a_box_slides_as_a_plate_with_linear_pressure(start):
     assert end[2] == pytest.approx(truth[2], abs=np.radians(0.1))
 
 
+@pytest.mark.parametrize("start", [(0.0, 0.6, 0.0), (0.6, 0.0, 0.0)])
+def test_a_patch_at_the_centre_of_the_contact_forces_slides_straight(start):
+    """Within 0.5 mm and 0.1 degrees; 20 degrees off for the first in the middle of the contact points."""
+    end, truth = stopped(start, centre="contact", pressure="fixed"), PLATE.stops(*start)
+    np.testing.assert_allclose(end[:2], truth[:2], atol=5e-4)
+    assert abs(end[2]) < np.radians(0.1)
+
+
 def test_a_fixed_pressure_turns_the_box():
     assert stopped((0.0, 0.6, 0.0), pressure="fixed")[2] > np.radians(15.0)
 
 
-def test_friction_is_continuous_while_points_drop_out():
+@pytest.mark.parametrize("centre", ["site", "contact"])
+def test_friction_is_continuous_while_points_drop_out(centre):
     """A box slides steadily and a torque moves its weight to a corner, until three of four points bear it."""
     slides = "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1"))
     turns = '<joint axis="1 0 0"/><joint axis="0 1 0"/>'  # no yaw: it would turn
     body = '<geom name="box" type="box" size="0.05 0.03 0.02" mass="0.3"/>'
-    _, d, friction = made(body=body, joint=slides + turns)
+    _, d, friction = made(body=body, joint=slides + turns, centre=centre)
     weight, force, bearing = 0.3 * GRAVITY, [], []
     d.qvel[0] = 3.0
     for k in range(300):
         share = 0.6 * min(k / 280.0, 1.0)  # of the way to the corner; the diagonal is at 0.5
         d.xfrc_applied[1, 3:] = share * weight * 0.03, -share * weight * 0.05, 0.0
         friction.step(d)
-        force.append(friction.wrenches(d)[0] / (PLATE.mu * weight))
+        wrench, (origin, axes) = friction.wrenches(d)[0].copy(), friction.frame(d, 0)
+        x, y = (origin - d.site_xpos[0]) @ axes[:2].T  # torques about the site, wherever the origin is
+        wrench[2] += x * wrench[1] - y * wrench[0]
+        force.append(wrench / (PLATE.mu * weight))
         bearing.append(int((d.efc_force > 1e-6 * weight).sum()))
     assert bearing[20] == 4 and bearing[-1] == 3
     steps = abs(np.diff(force[20:], axis=0)) / (1.0, 1.0, 0.03)  # torques by the half width

@@ -11,10 +11,10 @@ def twists_and_loads(friction, d) -> tuple[np.ndarray, np.ndarray]:
     m, k = friction.m, len(friction.patches)
     twists, loads = np.zeros((k, 3)), np.zeros(k)
     for p, placed in enumerate(friction.placed):
-        chosen, sign = placed.contacts(d)
+        chosen, _ = placed.contacts(d)
         if not len(chosen):
             continue
-        centre, axes = placed.frame(d, chosen, sign)
+        centre, axes = friction.frame(d, p)
         loads[p] = d.efc_force[d.contact.efc_address[chosen]].sum()
         for side, body in zip((-1.0, 1.0), placed.bodies, strict=True):
             moves, turns = np.zeros((3, m.nv)), np.zeros((3, m.nv))

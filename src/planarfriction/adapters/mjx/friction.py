@@ -93,7 +93,7 @@ class Friction:
         radius = np.array([np.sqrt((patch.model.patch.positions**2).sum(1).mean()) for patch in patches])
         shapes = tuple(self.models[i].state_shape for i in which)
         follows = tuple(each.follows for each in placed)
-        self._fixed = _Fixed(responses.places(placed), which, follows, shapes, radius, at, m.nuserdata)
+        self._fixed = _Fixed(responses.places(placed, radius), which, follows, shapes, radius, at, m.nuserdata)
 
     def replace(self, models: Sequence[FrictionPytree]) -> Self:
         """Return the same patches with other models, which must be of the same kinds in the same order.
@@ -178,22 +178,24 @@ class Friction:
             raise InvalidValueError("userdata", rule, f"shape {list(d.userdata.shape)}")
         given, dt, at = d, m.opt.timestep, self._fixed.memory
         states, guess = self.states(d), self._now(d, at.wrench, at.guess, 3 * len(self._fixed.which))
+        held = self._now(d, at.centre, at.held, 3 * len(self._fixed.which)).reshape(-1, 3)
         d = _moved(m, d)
-        where = responses.geometry(m, d, self._fixed.places)
+        where = responses.geometry(m, d, self._fixed.places, held)
         guess = jnp.where(jnp.repeat(where.touching, 3), guess, 0.0)
         found = self._search(*jax.lax.stop_gradient((self.models, m, d, where, states, guess)))
         answer = responses.answer(m, d, where.jacobian, where.rows, found.active)
         centre = where.centres(answer.forces(d, guess))  # that of the search, with its derivatives
-        pressed = self._pressed(self.models, found.centre + centre - jax.lax.stop_gradient(centre))
+        shift, pressed = self._pressed(self.models, where, found.centre + centre - jax.lax.stop_gradient(centre))
 
         def unit(twist):
-            return self._evaluate(self.models, pressed, states, twist, jnp.ones(len(where.rows)), dt)[1]
+            return self._evaluate(self.models, pressed, shift, states, twist, jnp.ones(len(where.rows)), dt)[1]
 
         wrench = newton.fitting(unit, answer.host, found.wrench)
         twist, load = answer.host.twists(wrench), answer.host.loads(wrench)
-        new, _ = self._evaluate(self.models, pressed, states, twist, load, dt)
+        new, _ = self._evaluate(self.models, pressed, shift, states, twist, load, dt)
         d = self._integrated(m, d, where.jacobian, wrench, answer)
-        kept = {"state": states, "new": new, "guess": guess, "wrench": wrench, "twist": twist, "load": load}
+        kept = {"state": states, "new": new, "guess": guess, "load": load, "held": held, "centre": where.moved(shift)}
+        kept |= {"wrench": responses.back(wrench.reshape(-1, 3), -shift), "twist": responses.about(twist, shift)}
         kept |= {"time": given.time, "next": d.time, "iterations": found.iterations, "passes": found.passes}
         kept |= {"residual": found.residual, "converged": found.converged & (found.slack <= SLACK)}
         d = d.replace(userdata=self._written(d.userdata, kept))
@@ -209,10 +211,10 @@ class Friction:
             active = responses.active_rows(mjx.solve(m, pushed.replace(qacc_warmstart=last.acceleration)))
             answer = responses.answer(m, d, where.jacobian, where.rows, active)
             centre = jnp.where(last.passes == 0, where.centres(answer.forces(d, last.wrench)), last.centre)
-            pressed = self._pressed(models, centre)
+            shift, pressed = self._pressed(models, where, centre)
 
             def unit(twist):
-                return self._evaluate(models, pressed, states, twist, jnp.ones(len(where.rows)), dt)[1]
+                return self._evaluate(models, pressed, shift, states, twist, jnp.ones(len(where.rows)), dt)[1]
 
             solved = newton.solve(unit, answer.host, last.wrench, radius, TOLERANCE, ITERATIONS)
             acceleration = answer.acceleration(solved.wrench)
@@ -236,12 +238,18 @@ class Friction:
         for kind in dict.fromkeys(kinds):
             yield *kind, [p for p, each in enumerate(kinds) if each == kind]
 
-    def _pressed(self, models, centre: jax.Array) -> list[Any]:
-        """Return the models of each group with pressures about the centres `[k, 2]`, None if they are fixed."""
-        return [models[i].pressed(centre[np.array(own)]) if follows else None for i, follows, own in self._groups()]
+    def _pressed(self, models, where: responses.Geometry, centre: jax.Array) -> tuple[jax.Array, list[Any]]:
+        """Return displacements of origins towards the centres `[k, 2]`, and the models of each group that press there.
 
-    def _evaluate(self, models, pressed, states, twist, load, dt) -> tuple[list[jax.Array], jax.Array]:
+        Models are None if their pressure is fixed.
+        """
+        shift = where.share[:, None] * centre
+        rest = centre - shift
+        return shift, [models[i].pressed(rest[np.array(own)]) if follow else None for i, follow, own in self._groups()]
+
+    def _evaluate(self, models, pressed, shift, states, twist, load, dt) -> tuple[list[jax.Array], jax.Array]:
         """Return the new states and wrenches of steps; patches of the same model side by side."""
+        twist = responses.about(twist, shift)
         new, wrenches = [jnp.empty(0)] * len(states), [jnp.empty(0)] * len(states)
         for (number, _, own), followed in zip(self._groups(), pressed, strict=True):
             model, index = models[number], np.array(own)
@@ -249,7 +257,7 @@ class Friction:
             after, wrench = model.step(*given) if followed is None else model.step_pressed(followed, *given)
             for i, p in enumerate(own):
                 new[p], wrenches[p] = after[i], wrench[i]
-        return new, jnp.stack(wrenches)
+        return new, responses.back(jnp.stack(wrenches), shift)
 
     def _integrated(self, m, d, jacobian, wrench, answer: responses.WrenchResponse) -> Any:
         """Return the data after the step, with the forces of the user as they were."""

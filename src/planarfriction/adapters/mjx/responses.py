@@ -18,6 +18,8 @@ import numpy as np
 from mujoco import mjx
 
 from planarfriction.adapters.mjx.newton import HostResponse
+from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
+from planarfriction.adapters.mujoco.loops.geometry import ALONG
 from planarfriction.adapters.mujoco.patches import Placed
 from planarfriction.jax.pressure import centre_of
 
@@ -133,14 +135,16 @@ class PatchPlaces(NamedTuple):
     other: Any
     owner: Any
     support: Any
-    at_site: Any
-    """True where the origin is at the site."""
+    at_contact: Any
+    """True where the origin follows the contact forces."""
+    radius: Any
+    """Lever arms of the patches [m]."""
 
 
-def places(placed: Sequence[Placed]) -> PatchPlaces:
+def places(placed: Sequence[Placed], radius: np.ndarray) -> PatchPlaces:
     """Return the places of patches found in a model."""
-    numbers = [(p.site, p.own, p.other, p.bodies[1], p.bodies[0], p.patch.centre == "site") for p in placed]
-    return PatchPlaces(*map(np.array, zip(*numbers, strict=True)))
+    numbers = [(p.site, p.own, p.other, p.bodies[1], p.bodies[0], p.at_contact) for p in placed]
+    return PatchPlaces(*map(np.array, zip(*numbers, strict=True)), radius)
 
 
 class Geometry(NamedTuple):
@@ -154,29 +158,58 @@ class Geometry(NamedTuple):
     """Moments (m_x, m_y) of unit forces of these about the origin of the patch, `[k, 2, nefc]` [m]."""
     touching: jax.Array
     """True for patches in contact, `[k]`."""
+    origin: jax.Array
+    """Origins in the frames of the sites, `[k, 3]` [m]."""
+    axes: jax.Array
+    """Axes of the patches in the frames of the sites, as rows, `[k, 3, 3]`."""
+    share: jax.Array
+    """Share of the displacement to the centre of the contact forces that the origin takes in the step, `[k]`."""
 
     def centres(self, force: jax.Array) -> jax.Array:
         """Return the centres of pressure `[k, 2]` [m] of forces of constraints `[nefc]`."""
         return centre_of(self.levers @ force, self.rows @ force)
 
+    def moved(self, shift: jax.Array) -> jax.Array:
+        """Return origins `[k, 3]` that move by `[k, 2]` [m] in the patches, in the frames of the sites."""
+        held = self.origin + jnp.einsum("pi,pij->pj", shift, self.axes[:, :2])
+        return jnp.where((self.share > 0.0)[:, None], held, 0.0)
 
-def geometry(m: Any, d: Any, where: PatchPlaces) -> Geometry:
-    """Return the geometry of the contacts of patches."""
+
+def about(twist: jax.Array, shift: jax.Array) -> jax.Array:
+    """Return twists `[k, 3]` at origins that move by `[k, 2]` [m]."""
+    vx, vy, spin = twist.T
+    return jnp.stack([vx - spin * shift[:, 1], vy + spin * shift[:, 0], spin], axis=1)
+
+
+def back(wrench: jax.Array, shift: jax.Array) -> jax.Array:
+    """Return wrenches `[k, 3]` about the origin from those about origins that have moved by `[k, 2]` [m]."""
+    fx, fy, torque = wrench.T
+    return jnp.stack([fx, fy, torque + shift[:, 0] * fy - shift[:, 1] * fx], axis=1)
+
+
+def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array) -> Geometry:
+    """Return the geometry of the contacts of patches with their last origins `[k, 3]`, in the frames of the sites.
+
+    See `planarfriction.adapters.mujoco.loops.centres`.
+    """
     contact = d._impl.contact
     single = jnp.asarray(contact.dim == 1) & (contact.dist < contact.includemargin)
     frames = contact.frame.reshape(-1, 3, 3)
 
-    def one(place: PatchPlaces):
+    def one(place: PatchPlaces, held: jax.Array):
         forward = (contact.geom[:, 0] == place.other) & (contact.geom[:, 1] == place.own)
         backward = (contact.geom[:, 0] == place.own) & (contact.geom[:, 1] == place.other)
         chosen = (forward | backward) & single
         touching = chosen.any()
         normal = (jnp.where(chosen, jnp.where(forward, 1.0, -1.0), 0.0)[:, None] * frames[:, 0]).sum(0)
         normal = _unit(normal, touching)
-        x = d.site_xmat[place.site].reshape(3, 3)[:, 0]
-        x = _unit(x - normal * (x @ normal), touching)
+        turned, site = d.site_xmat[place.site].reshape(3, 3), d.site_xpos[place.site]
+        across = turned - jnp.outer(normal, normal @ turned)
+        x = _unit(jnp.where(across[:, 0] @ across[:, 0] >= ALONG, across[:, 0], across[:, 1]), touching)
         middle = jnp.where(chosen[:, None], contact.pos, 0.0).sum(0) / jnp.maximum(chosen.sum(), 1)
-        centre = jnp.where(place.at_site, d.site_xpos[place.site], middle)
+        last, new = site + turned @ held, (held == 0.0).all()
+        last = jnp.where(new, middle, last + normal * (normal @ (middle - last)))
+        centre = jnp.where(place.at_contact, last, site)
         moves, turns = (
             own - other
             for own, other in zip(mjx.jac(m, d, centre, place.owner), mjx.jac(m, d, centre, place.support), strict=True)
@@ -184,11 +217,22 @@ def geometry(m: Any, d: Any, where: PatchPlaces) -> Geometry:
         y = jnp.cross(normal, x)
         jacobian, away = jnp.stack([moves @ x, moves @ y, turns @ normal]), contact.pos - centre
         own = jnp.where(chosen, jnp.stack([jnp.ones(len(away)), away @ y, -away @ x]), 0.0)
-        return jnp.where(touching, jacobian, 0.0), own, touching
+        tilt, slip = (turns @ jnp.stack([x, y]).T).T @ d.qvel, jacobian[:2] @ d.qvel
+        rolled = _norm(tilt) + jnp.where(place.radius > 0.0, _norm(slip) / place.radius, 0.0)
+        share = jnp.where(new, 1.0, jnp.minimum(1.0, m.opt.timestep * rolled / FOLLOWS))
+        share = jnp.where(touching & place.at_contact, share, 0.0)
+        axes = jnp.stack([x, y, normal]) @ turned
+        return jnp.where(touching, jacobian, 0.0), own, touching, turned.T @ (centre - site), axes, share
 
-    jacobian, own, touching = jax.vmap(one)(jax.tree.map(jnp.asarray, where))
+    jacobian, own, *others = jax.vmap(one)(jax.tree.map(jnp.asarray, where), held)
     rows = jnp.zeros((len(where.site), 3, d._impl.efc_J.shape[0])).at[:, :, contact.efc_address].set(own)
-    return Geometry(jacobian.reshape(-1, m.nv), rows[:, 0], rows[:, 1:], touching)
+    return Geometry(jacobian.reshape(-1, m.nv), rows[:, 0], rows[:, 1:], *others)
+
+
+def _norm(vector: jax.Array) -> jax.Array:
+    """Return the length of a vector, which has derivatives at zero too."""
+    square = vector @ vector
+    return jnp.where(square > 0.0, jnp.sqrt(jnp.where(square > 0.0, square, 1.0)), 0.0)
 
 
 def _unit(vector: jax.Array, given: jax.Array) -> jax.Array:

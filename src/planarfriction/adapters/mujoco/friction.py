@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple
@@ -16,6 +17,7 @@ import numpy as np
 from planarfriction.adapters.mujoco.draw import draw_patch
 from planarfriction.adapters.mujoco.library import layout, same
 from planarfriction.adapters.mujoco.loops import step as loops
+from planarfriction.adapters.mujoco.loops.centres import FAULTS
 from planarfriction.adapters.mujoco.loops.records import Host, scratch_layout
 from planarfriction.adapters.mujoco.patches import PatchContact, Placed, check_once, memory
 from planarfriction.compiler.memory import place_of, row_of
@@ -63,6 +65,7 @@ class Friction:
                 rule = "have a shape that does not change with the load: compiled steps need fixed numbers"
                 raise InvalidValueError("model", rule, type(patch.model).__name__)
         self._check()
+        self._said: set[str | None] = set()
         self._memory = memory(patches, m.nv, m.nuserdata)
 
     def _check(self) -> None:
@@ -103,6 +106,23 @@ class Friction:
         """Return the normal forces at the end of the last step `[k]` [N]."""
         return self._own(d, self._memory.load, len(self.patches))
 
+    def frame(self, d: Any, p: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the origin [3] of patch p in the world, and its axes [3, 3] as rows: x, y, normal.
+
+        It is that of the last step; without contact it is the site, and its axes are not numbers.
+        """
+        placed, at = self.placed[p], self._memory.centre + 3 * p
+        return placed.frame(d, *placed.contacts(d), d.userdata[at : at + 3])
+
+    def misplaced(self, d: Any) -> str | None:
+        """Return a line about a patch that did not lie in its contact in the last step, None if all did.
+
+        Its site is so far from the contact forces that they act beyond the patch, or on another side of its geom, or
+        has its x axis along the normal. `step` warns of it once.
+        """
+        found = int(d.userdata[self._memory.misplaced])
+        return self.placed[found // FAULTS].fault(found % FAULTS) if found else None
+
     def report(self, d: Any) -> Report:
         """Return the statistics of the last step."""
         at, u = self._memory, d.userdata
@@ -121,10 +141,10 @@ class Friction:
         Raises `InvalidValueError` if the scene has no room for more geoms.
         """
         newton, wrenches, twists = self.m.vis.map.force / self.m.stat.meanmass, self.wrenches(d), self.twists(d)
-        for placed, wrench, twist in zip(self.placed, wrenches, twists, strict=True):
-            chosen, sign = placed.contacts(d)
+        for p, (placed, wrench, twist) in enumerate(zip(self.placed, wrenches, twists, strict=True)):
+            chosen, _ = placed.contacts(d)
             if len(chosen):
-                origin, axes = placed.frame(d, chosen, sign)
+                origin, axes = self.frame(d, p)
                 # between the two surfaces, which overlap by what the contact gives
                 middle = origin + axes[2] * (axes[2] @ (d.contact.pos[chosen].mean(axis=0) - origin))
                 draw_patch(scene, placed.patch.model.patch, (middle, axes), wrench, twist, newton)
@@ -145,6 +165,9 @@ class Friction:
         if iterations == loops.UNFIT:
             self._check()
         mujoco.mj_step2(self.m, d)
+        if d.userdata[self._memory.misplaced] != 0.0 and (line := self.misplaced(d)) not in self._said:
+            self._said.add(line)
+            warnings.warn(line, stacklevel=2)
         if iterations < 0.0:
             raise InvalidValueError("state", "be finite", "a number that is not")
 
@@ -180,14 +203,15 @@ class Friction:
             scratch_layout(packed.words, k, self.m.nv),
         )
         chosen = [
-            (each.site, each.own, each.other, *reversed(each.bodies), each.pair, each.patch.centre == "contact")
+            (each.site, each.own, each.other, *reversed(each.bodies), each.pair, each.at_contact, each.has_faces)
             for each in self.placed
         ]
         columns = np.ascontiguousarray(np.array(chosen, np.int64).T)
-        names = ("sites", "own", "other", "own_bodies", "other_bodies", "pairs", "at_contact")
+        names = ("sites", "own", "other", "own_bodies", "other_bodies", "pairs", "at_contact", "faces")
         joints = np.flatnonzero(self.m.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE))
         free = np.array([joints, self.m.jnt_dofadr[joints]], np.int64)
-        self._kept = problem, columns, free, packed
+        extents = np.array([each.extent() for each in self.placed])
+        self._kept = problem, columns, free, packed, extents
         places = dict(zip(names, (place_of(columns) + 8 * k * np.arange(len(names))).tolist(), strict=True))
         host = Host(
             m=self.m._address, same_count=len(same()), same=place_of(same()),
@@ -195,7 +219,7 @@ class Friction:
             scratch_words=scratch.size, problem=place_of(problem), patches=place_of(packed.row),
             solve=kernels.solve_address(), plan=loops.plan_address(), free_count=len(joints),
             free_joints=place_of(free), free_dofs=place_of(free) + 8 * len(joints),
-            memory=self._memory, scratch=scratch.offsets, **places, **layout(),
+            extents=place_of(extents), memory=self._memory, scratch=scratch.offsets, **places, **layout(),
         )  # fmt: skip
         return row_of(host)
 

@@ -14,6 +14,9 @@ import mujoco
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.adapters.mujoco.loops.centres import ALONG as ALONG_X
+from planarfriction.adapters.mujoco.loops.centres import BEHIND, BEYOND
+from planarfriction.adapters.mujoco.loops.geometry import ALONG
 from planarfriction.adapters.mujoco.loops.models import LONGEST
 from planarfriction.adapters.mujoco.loops.records import Memory, memory_layout
 from planarfriction.compiler.memory import Layout
@@ -24,7 +27,7 @@ from planarfriction.models import FrictionModel
 RECORD = "planarfriction"
 """Name of the custom numeric of a prepared model."""
 
-CENTRES = ("site", "contact")
+CENTRES = ("auto", "site", "contact")
 
 PRESSURES = ("auto", "follows", "fixed")
 
@@ -32,6 +35,8 @@ _ROUND = {int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("SPHERE", 
 """Geoms that touch in points, not faces."""
 
 _IMPLICIT = {int(getattr(mujoco.mjtIntegrator, f"mjINT_{name}")) for name in ("IMPLICIT", "IMPLICITFAST")}
+
+_CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
 
 _PLANE, _BOX = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_BOX)
 """Geoms whose faces touch in several points: boxes each other, and planes all but what is round. Elsewhere MuJoCo
@@ -53,8 +58,9 @@ class PatchContact(Checked):
     """Name of a site on the body that owns the patch."""
     geoms: tuple[str, str]
     """Names of the two geoms in contact; one is on the site's body."""
-    centre: str = "site"
-    """Origin of the patch: that of the "site", or the middle of the points of "contact"."""
+    centre: str = "auto"
+    """Origin of the patch: that of the "site", or the centre of the forces of "contact"; "auto" follows the contact of
+    a sphere, a capsule or an ellipsoid, and of a cylinder with the site on its curved side."""
     pressure: str = "auto"
     """Pressure that "follows" the moments of the contact forces (see `ContactPatch.weights`), or is "fixed" to the
     patch; "auto" follows between two boxes, and between a plane and what is not a sphere, a capsule or an ellipsoid."""
@@ -147,6 +153,12 @@ class Placed:
         faces = kinds == {_BOX} or (_PLANE in kinds and not _ROUND.intersection(kinds))
         self.follows = patch.pressure == "follows" or (patch.pressure == "auto" and faces)
         """True if the pressure follows the contact forces."""
+        curved = bool(_ROUND.intersection(kinds)) or self._on_curved_side(m)
+        self.at_contact = patch.centre == "contact" or (patch.centre == "auto" and curved)
+        """True if the origin follows the contact forces."""
+        own = int(m.geom_type[self.own])
+        self.has_faces = own != _PLANE and own not in _ROUND and not self._on_curved_side(m)
+        """True if the sides of the geom on the site's body can be told apart."""
         for pair in range(m.npair):
             if {int(m.pair_geom1[pair]), int(m.pair_geom2[pair])} == set(self.geoms.tolist()):
                 self.pair = pair
@@ -178,15 +190,42 @@ class Placed:
         chosen = np.flatnonzero((forward | backward) & (d.contact.efc_address >= 0))
         return chosen, np.where(forward[chosen], 1.0, -1.0)
 
-    def frame(self, d: Any, chosen: np.ndarray, sign: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return origin [3] and axes [3, 3], as rows, of its frame in the world."""
+    def frame(self, d: Any, chosen: np.ndarray, sign: np.ndarray, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return origin [3] and axes [3, 3], as rows, of its frame in the world; `centre` [3] is in that of the site.
+
+        An x axis of the site along the normal gives way to its y axis.
+        """
         normal = sign @ d.contact.frame[chosen, :3]
         normal /= np.linalg.norm(normal)
-        x = d.site_xmat[self.site].reshape(3, 3)[:, 0]
-        x = x - normal * (x @ normal)
-        x /= np.linalg.norm(x)
-        centre = d.site_xpos[self.site] if self.patch.centre == "site" else d.contact.pos[chosen].mean(axis=0)
-        return centre, np.array([x, np.cross(normal, x), normal])
+        turned = d.site_xmat[self.site].reshape(3, 3)
+        across = turned - np.outer(normal, normal @ turned)
+        x = across[:, 0] if across[:, 0] @ across[:, 0] >= ALONG else across[:, 1]
+        x = x / np.linalg.norm(x)
+        return d.site_xpos[self.site] + turned @ centre, np.array([x, np.cross(normal, x), normal])
+
+    def extent(self) -> tuple[float, ...]:
+        """Return least and largest x and y of the patch and its largest distance from its origin [m]."""
+        patch = self.patch.model.patch
+        (x, y), half = patch.positions.T, 0.5 * math.sqrt(patch.areas.max())
+        return x.min() - half, x.max() + half, y.min() - half, y.max() + half, float(np.hypot(x, y).max()) + half
+
+    def fault(self, number: int) -> str:
+        """Return a line about a patch that does not lie in its contact."""
+        words = {
+            BEYOND: 'contact forces act beyond the patch: put the site into the contact, or use centre="contact"',
+            BEHIND: "it lies on another side of its geom than the contact",
+            ALONG_X: "its x axis lies along the normal of the contact, where the patch takes any direction",
+        }
+        return f"site {self.patch.site} of the contact between {' and '.join(self.patch.geoms)}: {words[number]}"
+
+    def _on_curved_side(self, m: Any) -> bool:
+        """Return True if the geom on the site's body is a cylinder, and the site nearer to its curved side."""
+        if int(m.geom_type[self.own]) != _CYLINDER:
+            return False
+        axis, away = np.zeros(3), m.site_pos[self.site] - m.geom_pos[self.own]
+        mujoco.mju_rotVecQuat(axis, np.array([0.0, 0.0, 1.0]), m.geom_quat[self.own])
+        along, (radius, half, _) = axis @ away, m.geom_size[self.own]
+        return bool(abs(along) / half < math.sqrt(max(away @ away - along**2, 0.0)) / radius)
 
 
 def _named(m: Any, what: str, name: str, kind: Any) -> int:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+
+from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call_c
 from planarfriction.compiler.memory import arrays_at, at, doubles, integers, integers32
@@ -34,7 +37,7 @@ def _collect(own, d, s, nefc):
     for r in range(nefc):
         owners[r] = -1
     for p in range(own.count):
-        counts[p] = 0
+        counts[p], s.depths[2 * p + 1] = 0, 0.0
         for i in range(6):
             frames[6 * p + i] = 0.0
     for c in range(ncon):
@@ -53,6 +56,7 @@ def _collect(own, d, s, nefc):
                     frames[6 * p + 3 + i] += doubles(contact + own.contact.pos)[i]
                 counts[p] += 1
                 owners[row] = p
+                s.depths[2 * p + 1] = xp.maximum(s.depths[2 * p + 1], -doubles(contact + own.contact.dist)[0])
 
 
 ALONG = 1e-12
@@ -60,10 +64,10 @@ ALONG = 1e-12
 
 
 @kernel
-def _axes(own, d, frame, site):
+def axes(own, d, frame, site):
     """Return the axes of a patch: x along that of its site, across the normal."""
     n = times(1.0 / norm(three(frame)), three(frame))
-    turned = doubles(at(integers(d + own.data.site_xmat)[0], 9 * site))
+    turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
     x, y = (turned[0], turned[3], turned[6]), (turned[1], turned[4], turned[7])
     x = plus(x, -dot(x, n), n)
     x = plus(y, -dot(y, n), n) if square(x) < ALONG else x
@@ -84,20 +88,41 @@ def _put_places(own, d, s, nefc, p, centre, x, y):
 
 
 @kernel
-def _rows(own, m, d, s, nefc, p):
-    """Write the three rows of patch p into the Jacobian, and the places of its contacts."""
+def in_world(own, d, site, local):
+    """Return the place in the world of a point in the frame of a site."""
+    turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
+    place = at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site)
+    x, y, z = three(turned), three(at(turned, 3)), three(at(turned, 6))
+    return plus(three(place), 1.0, (dot(x, local), dot(y, local), dot(z, local)))
+
+
+@kernel
+def _put_origin(own, d, s, p, normal, held):
+    """Write the origin of patch p in place of the sum of its contacts: at the site, or at the last centre, if any.
+
+    The latter moves with the body of the site, within the plane of the contacts.
+    """
+    frame, local = at(s.frames, 6 * p), three(held)
+    middle = times(1.0 / s.counts[p], three(at(frame, 3)))
+    origin, free = in_world(own, d, integers(own.sites)[p], local), integers(own.at_contact)[p] != 0
+    if free:
+        new = square(local) == 0.0
+        origin = middle if new else plus(origin, dot(normal, plus(middle, -1.0, origin)), normal)
+    s.depths[2 * p] = dot(normal, plus(middle, -1.0, origin))
+    frame[3], frame[4], frame[5] = origin
+
+
+@kernel
+def _rows(own, m, d, s, nefc, p, held):
+    """Write the three rows of patch p into the Jacobian, the places of its contacts, and how fast its bodies roll."""
     nv, frame, site = own.nv, at(s.frames, 6 * p), integers(own.sites)[p]
-    x, y, normal = _axes(own, d, frame, site)
-    centre, rows = at(s.frames, 6 * p + 3), at(s.jacobian, 3 * nv * p)
-    if integers(own.at_contact)[p] != 0:
-        for i in range(3):
-            frame[3 + i] /= s.counts[p]
-    else:
-        centre = at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site)
+    x, y, normal = axes(own, d, frame, site)
+    centre, rows = at(frame, 3), at(s.jacobian, 3 * nv * p)
+    _put_origin(own, d, s, p, normal, at(held, 3 * p))
     _put_places(own, d, s, nefc, p, centre, x, y)
     for i in range(3 * nv):
         rows[i] = 0.0
-    moves, turns = s.moves, s.turns
+    moves, turns, velocity, roll, rock = s.moves, s.turns, doubles(integers(d + own.data.qvel)[0]), 0.0, 0.0
     for side in range(2):
         body = integers(own.own_bodies)[p] if side == 0 else integers(own.other_bodies)[p]
         if body == 0:
@@ -108,17 +133,23 @@ def _rows(own, m, d, s, nefc, p):
             move = moves[i], moves[nv + i], moves[2 * nv + i]
             rows[i] += sign * dot(x, move)
             rows[nv + i] += sign * dot(y, move)
-            rows[2 * nv + i] += sign * dot(normal, (turns[i], turns[nv + i], turns[2 * nv + i]))
+            turn = turns[i], turns[nv + i], turns[2 * nv + i]
+            rows[2 * nv + i] += sign * dot(normal, turn)
+            roll, rock = roll + sign * dot(x, turn) * velocity[i], rock + sign * dot(y, turn) * velocity[i]
+    s.tilts[p] = math.sqrt(roll * roll + rock * rock)
 
 
 @kernel
-def place(own, m, d, s, nefc):
-    """Write the Jacobian of the twists, zero without contact. How many patches are in contact."""
+def place(own, m, d, s, nefc, held):
+    """Write the Jacobian of the twists, zero without contact; return the number of patches in contact.
+
+    `held` [3k] are their last origins, in the frames of their sites.
+    """
     _collect(own, d, s, nefc)
     touching = 0
     for p in range(own.count):
         if s.counts[p] > 0:
-            _rows(own, m, d, s, nefc, p)
+            _rows(own, m, d, s, nefc, p, held)
             touching += 1
         else:
             for i in range(3 * own.nv):

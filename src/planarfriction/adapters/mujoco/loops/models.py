@@ -29,10 +29,10 @@ def serves(own, m):
     """Return True for the model itself, and for its copies: those of the same bodies, names and prepared patches."""
     if m == own.m:
         return True
+    alike = True
     for i in range(own.same_count):
-        if not _alike(own, m, i):
-            return False
-    return True
+        alike = alike and _alike(own, m, i)
+    return alike
 
 
 @kernel

@@ -24,14 +24,15 @@ ModelOffsets = _integers(
 DataOffsets = _integers(
     "DataOffsets",
     "time ncon nefc contact efc_type efc_J efc_J_rownnz efc_J_rowadr efc_J_colind efc_D efc_R efc_frictionloss "
-    "efc_aref efc_state efc_force qvel qacc qacc_warmstart qfrc_passive qDeriv userdata site_xpos site_xmat",
+    "efc_aref efc_state efc_force qvel qacc qacc_warmstart qfrc_passive qDeriv userdata site_xpos site_xmat "
+    "geom_xpos",
 )
 """Offsets of `mjData`."""
 
 SlopeOffsets = _integers("SlopeOffsets", "in_model D_rownnz D_rowadr D_colind")
 """Offsets of the sparsity of `qDeriv`, in the model (`in_model` is 1) or, in older versions, in the data (0)."""
 
-ContactOffsets = _integers("ContactOffsets", "size pos frame H dim geom efc_address")
+ContactOffsets = _integers("ContactOffsets", "size dist pos frame H dim geom efc_address")
 """Size of an `mjContact`, and its offsets."""
 
 Functions = _integers(
@@ -64,6 +65,10 @@ class Remembered(NamedTuple):
     """[3k]"""
     load: Doubles
     """[k]"""
+    held: Doubles
+    """Origins of patches at the beginning of the step, in the frames of their sites, [3k]; 0 at a site, or for none."""
+    centre: Doubles
+    """Origins of patches in the step, [3k]."""
     warmstart: Doubles
     """`qacc_warmstart` at the beginning of the step, [nv]."""
     passive: Doubles
@@ -78,6 +83,8 @@ class Remembered(NamedTuple):
     """[1], as all that follows."""
     passes: Doubles
     residual: Doubles
+    misplaced: Doubles
+    """0, or `FAULTS p + fault` of a patch p that does not lie in its contact (see `centres`)."""
     converged: Doubles
 
 
@@ -88,7 +95,7 @@ Memory = offsets_of(Remembered)
 def memory_layout(states: int, k: int, nv: int) -> Layout:
     """Return the layout of `Remembered` for k patches with so many states in all."""
     shapes = dict.fromkeys(Remembered._fields, 1) | dict.fromkeys(("state", "new"), states) | {"load": k}
-    shapes |= dict.fromkeys(("guess", "wrench", "twist"), 3 * k)
+    shapes |= dict.fromkeys(("guess", "wrench", "twist", "held", "centre"), 3 * k)
     return Layout(Remembered, **shapes | dict.fromkeys(("warmstart", "passive", "total"), nv))
 
 
@@ -124,7 +131,11 @@ class Scratch(NamedTuple):
     counts: Integers
     """Contacts of each patch, [k]."""
     frames: Doubles
-    """Sums over these: normals into the own body, and positions, [k, 6]."""
+    """Sums over these of normals into the own body; origins, [k, 6]."""
+    tilts: Doubles
+    """Speeds at which the bodies roll or rock on each other [rad/s], [k]."""
+    depths: Doubles
+    """Means over these of positions along the normal from the origin, and the largest overlap [m], [k, 2]."""
     misses: Doubles
     """J qacc - aref, [nefc]; behind them `owners_of` finds the patch of each constraint, -1 of others, and `places_of`
     the points of contacts."""
@@ -138,6 +149,7 @@ def scratch_layout(words: int, k: int, nv: int) -> Layout:
     """Return the layout of `Scratch` without its rows for constraints, for k patches and problems of so many words."""
     n = 3 * k
     shapes = {"problem": words, "jacobian": n * nv, "more": nv, "block": 36, "counts": k, "frames": 6 * k, "misses": 0}
+    shapes |= {"tilts": k, "depths": 2 * k}
     shapes |= dict.fromkeys(("inertia", "stiff"), nv * nv) | dict.fromkeys(("answers", "held"), nv * (n + 1))
     return Layout(
         Scratch, **shapes | dict.fromkeys(("moves", "turns"), 3 * nv) | dict.fromkeys(("start", "goal", "move"), n)
@@ -179,7 +191,11 @@ class Host(NamedTuple):
     pairs: int
     """Contact pairs of the model."""
     at_contact: int
-    """Address of flags: 1 where the origin is in the middle of the contacts."""
+    """Address of flags: 1 where the origin is at the centre of the contact forces."""
+    faces: int
+    """Address of flags: 1 where a side of the geom on the site's body, and an axis on it, can be told from others."""
+    extents: int
+    """Address of least and largest x and y of each patch and of its largest distance from the origin, [k, 5] [m]."""
     free_count: int
     """Number of free joints."""
     free_joints: int

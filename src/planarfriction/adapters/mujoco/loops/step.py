@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from numba import types
 
+from planarfriction.adapters.mujoco.loops.centres import follow_centres
 from planarfriction.adapters.mujoco.loops.geometry import place, take
 from planarfriction.adapters.mujoco.loops.models import fits, serves
 from planarfriction.adapters.mujoco.loops.records import Host, Remembered, Scratch, read
@@ -68,10 +69,12 @@ def _recall(host, kept, d):
     if now == kept.next[0] and started:
         _copy(kept.new, kept.state, host.states)
         _copy(kept.wrench, kept.guess, 3 * host.count)
+        _copy(kept.centre, kept.held, 3 * host.count)
     else:
         # other times than those of the last step, or a roll-out, which clears where the solver starts but not this
         _clear(kept.state, host.states)
         _clear(kept.guess, 3 * host.count)
+        _clear(kept.held, 3 * host.count)
     _copy(warmstart, kept.warmstart, host.nv)
     kept.time[0] = now
     return again
@@ -194,8 +197,10 @@ def _forget(host, kept, d):
     _clear(kept.wrench, 3 * host.count)
     _clear(kept.twist, 3 * host.count)
     _clear(kept.load, host.count)
+    _clear(kept.centre, 3 * host.count)
     _copy(doubles(integers(d + host.data.qfrc_passive)[0]), kept.total, host.nv)
     kept.iterations[0], kept.passes[0], kept.residual[0], kept.converged[0] = 0.0, 0.0, 0.0, 1.0
+    kept.misplaced[0] = 0.0
 
 
 @kernel
@@ -226,7 +231,7 @@ def plan(place_of_host, m, d):
     if not fits(host, m):
         _forget(host, kept, d)
         kept.iterations[0], kept.converged[0] = UNFIT, 0.0
-    elif place(host, m, d, s, nefc) == 0:
+    elif place(host, m, d, s, nefc, kept.held) == 0:
         _forget(host, kept, d)
     else:
         problem = arrays_at(patches.row, s.problem)
@@ -240,6 +245,8 @@ def plan(place_of_host, m, d):
         _apply(own, d, problem.guess)
         call_c(host.functions.mj_fwdActuation, (m, d))
         _accelerate(host, m, d)
+        follow_centres(host, m, d, s, nefc, patches.radius, problem.guess, kept)
+        _copy(problem.guess, problem.wrench, 3 * host.count)
         iterations, passes = _solve(own, patches, m, d, nefc)
         _remember(own, iterations, passes)
     call_c(host.functions.mj_freeStack, (d,))

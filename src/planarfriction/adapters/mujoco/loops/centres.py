@@ -1,0 +1,110 @@
+"""Origins of patches that follow the contact forces, and patches that do not lie in their contacts.
+
+The centre of the contact forces is known once these are, with the friction of the last step. The patch then moves
+there, by as much as its bodies move on each other: forces on faces at rest jump about from step to step, as MuJoCo
+finds other points or gives them other shares, and a patch that followed them would let go bit by bit what it holds.
+"""
+
+from __future__ import annotations
+
+import math
+
+from planarfriction.adapters.mujoco.loops.geometry import axes, owners_of, places_of
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import kernel
+from planarfriction.compiler.memory import at, doubles, integers
+from planarfriction.kernels.vectors import dot, plus, square, three
+
+FOLLOWS = 1e-3
+"""Angle [rad] by which bodies roll on each other, and displacement in lever arms of the patch by which they slide, in a
+step in which the origin moves all the way to the centre of the contact forces; less in proportion."""
+
+FAULTS = 4
+"""Number of faults, none included: 0."""
+
+BEYOND, BEHIND, ALONG = 1, 2, 3
+"""Faults: the contact forces act beyond the patch; it lies on another side of the geom; x lies along the normal."""
+
+MARGIN = 0.1
+"""Share of its size by which a patch may lie beside its contact, and sine of the least angle of x to the normal."""
+
+
+@kernel
+def _centre(d, own, s, nefc, p):
+    """Return the force of the contacts of patch p, and their centre in its frame."""
+    owners, places, total, x, y = owners_of(s, nefc), places_of(s, nefc), 0.0, 0.0, 0.0
+    force = doubles(integers(d + own.data.efc_force)[0])
+    for r in range(nefc):
+        if owners[r] == p:
+            total, x, y = total + force[r], x + force[r] * places[r], y + force[r] * places[nefc + r]
+    return (total, x / total, y / total) if total > 0.0 else (0.0, 0.0, 0.0)
+
+
+@kernel
+def _share(own, d, s, p, radius, dt):
+    """Return the share of the displacement to the centre that patch p takes in this step."""
+    velocity, rows, vx, vy = doubles(integers(d + own.data.qvel)[0]), at(s.jacobian, 3 * own.nv * p), 0.0, 0.0
+    for i in range(own.nv):
+        vx, vy = vx + rows[i] * velocity[i], vy + rows[own.nv + i] * velocity[i]
+    slid = math.sqrt(vx * vx + vy * vy) / radius if radius > 0.0 else 0.0
+    return xp.minimum(1.0, dt * (s.tilts[p] + slid) / FOLLOWS)
+
+
+@kernel
+def _move(own, d, s, nefc, p, guess, dx, dy):
+    """Move the origin of patch p: its Jacobian, its contacts, and the guess of its wrench, whose forces stay."""
+    nv, rows, frame = own.nv, at(s.jacobian, 3 * own.nv * p), at(s.frames, 6 * p)
+    for i in range(nv):
+        rows[i] -= dy * rows[2 * nv + i]
+        rows[nv + i] += dx * rows[2 * nv + i]
+    guess[2] -= dx * guess[1] - dy * guess[0]
+    owners, places = owners_of(s, nefc), places_of(s, nefc)
+    for r in range(nefc):
+        if owners[r] == p:
+            places[r], places[nefc + r] = places[r] - dx, places[nefc + r] - dy
+    x, y, _ = axes(own, d, frame, integers(own.sites)[p])
+    frame[3], frame[4], frame[5] = plus(plus(three(at(frame, 3)), dx, x), dy, y)
+
+
+@kernel
+def _fault(own, d, s, p, x, y):
+    """Return the fault of patch p, with the centre of its contact forces at x, y in its frame."""
+    frame, site, extent = at(s.frames, 6 * p), integers(own.sites)[p], at(doubles(own.extents), 5 * p)
+    normal, faces = axes(own, d, frame, site)[2], integers(own.faces)[p] != 0
+    if integers(own.at_contact)[p] == 0:
+        slack = MARGIN * extent[4] + s.depths[2 * p + 1]
+        if x < extent[0] - slack or x > extent[1] + slack or y < extent[2] - slack or y > extent[3] + slack:
+            return BEYOND
+        geom = three(at(doubles(integers(d + own.data.geom_xpos)[0]), 3 * integers(own.own)[p]))
+        if faces and dot(normal, plus(three(at(frame, 3)), -1.0, geom)) > MARGIN * extent[4]:
+            return BEHIND
+        if abs(s.depths[2 * p]) > extent[4] + slack:
+            return BEYOND
+    turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
+    along = (turned[0], turned[3], turned[6])
+    return ALONG if faces and square(plus(along, -dot(normal, along), normal)) < MARGIN**2 else 0
+
+
+@kernel
+def follow_centres(own, m, d, s, nefc, radius, guess, kept):
+    """Move origins towards the centres of the contact forces, remember them, and note a patch that is misplaced."""
+    kept.misplaced[0], dt = 0.0, doubles(m + own.model.timestep)[0]
+    for p in range(own.count):
+        held, centre, site = at(kept.held, 3 * p), at(kept.centre, 3 * p), integers(own.sites)[p]
+        centre[0], centre[1], centre[2] = 0.0, 0.0, 0.0
+        if s.counts[p] == 0:
+            continue
+        force, x, y = _centre(d, own, s, nefc, p)
+        if force > 0.0:
+            fault = _fault(own, d, s, p, x, y)
+            if fault != 0:
+                kept.misplaced[0] = FAULTS * p + fault
+        if integers(own.at_contact)[p] == 0:
+            continue
+        share = 1.0 if square(three(held)) == 0.0 else _share(own, d, s, p, radius[p], dt)
+        _move(own, d, s, nefc, p, at(guess, 3 * p), share * x, share * y)
+        turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
+        place = three(at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site))
+        away = plus(three(at(s.frames, 6 * p + 3)), -1.0, place)
+        for i in range(3):
+            centre[i] = dot((turned[i], turned[3 + i], turned[6 + i]), away)
