@@ -10,11 +10,9 @@ import jax.numpy as jnp
 from planarfriction.derivatives.parameters import Packed
 from planarfriction.errors import InvalidValueError
 from planarfriction.jax.namespace import xp
-from planarfriction.jax.pressure import Pressed, centre_of, follow
 from planarfriction.laws import FrictionLaw
 from planarfriction.patch import ContactPatch
-from planarfriction.tensors.inputs import finite, non_negative, shaped
-from planarfriction.tensors.steps import TensorModel, step
+from planarfriction.tensors.steps import TensorModel
 
 
 class FrictionPytree(TensorModel):
@@ -57,30 +55,6 @@ class FrictionPytree(TensorModel):
     def rest(self) -> jax.Array:
         """Return the state of a contact at rest, `[*state_shape]`."""
         return jnp.zeros(self.state_shape, jnp.result_type(self.parameters.sigma_0))
-
-    def step(
-        self, state: Any, twist: Any, normal_force: Any, dt: Any, *, moments: Any = None, parameters: Any = None
-    ) -> tuple[jax.Array, jax.Array]:
-        """Return the state after `dt` [s] of a constant twist, and the wrench at the end.
-
-        Stable at any `dt`; the bristles of a contact without load relax. With `moments` `[..., 2]` [N m] the pressure
-        follows them, as in `planarfriction.models.FrictionModel.step`.
-        """
-        if moments is None:
-            return super().step(state, twist, normal_force, dt, parameters=parameters)
-        z, v, load = self._inputs(state, twist, normal_force)
-        held = finite(self.xp, "moments", shaped("moments", self._number("moments", moments), (2,)))
-        dt = non_negative(self.xp, "dt", self._number("dt", dt))
-        return self.step_pressed(self.pressed(centre_of(held, load), parameters), z, v, load, dt)
-
-    def pressed(self, centre: jax.Array, parameters: Any = None) -> Pressed:
-        """Return the model with its pressure about `centre` `[..., 2]` [m], for any number of steps."""
-        return follow(self.equations, self._parts_at(parameters), centre)
-
-    def step_pressed(self, pressed: Pressed, state: Any, twist: Any, load: Any, dt: Any) -> tuple[jax.Array, jax.Array]:
-        """Return state and wrench after a step of the model that `pressed` has returned, with inputs as arrays."""
-        new, wrench = step(self.xp, self.equations, pressed.parts, state, pressed.seen(twist), load, dt)
-        return new, pressed.pull(wrench)
 
     def rollout(self, state, twist, normal_force, dt, *, parameters: Any = None) -> tuple[jax.Array, jax.Array]:
         """Return the last state and the wrenches `[..., T, 3]` of steps, each an operation of JAX, in `lax.scan`."""

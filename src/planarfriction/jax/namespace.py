@@ -11,6 +11,7 @@ from jax.core import Tracer
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.jax.pressure import pressing
 from planarfriction.tensors.namespace import Namespace
 
 
@@ -50,6 +51,7 @@ xp = Namespace(
     integers=lambda x: x.astype(jnp.int32),
     real=_real,
     extremes=_extremes,
+    pressing=pressing,
     to_numpy=lambda value: np.asarray(value) if isinstance(value, jax.Array) else value,
     from_numpy=lambda array, like: jnp.asarray(array, like.dtype),
     widened=lambda x: x,

@@ -1,27 +1,13 @@
-"""Pressure that follows the moments of the load: `kernels.tilt` written with operations of JAX, with derivatives.
-
-Which cells press is found without derivatives. With these the plane has a closed form, whose derivatives are those of
-the rule: cells that are about to lift press with nothing.
-"""
+"""Search of the cells that press where the pressure follows its load: `kernels.tilt` in operations of JAX."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from planarfriction.kernels.tilt import FARTHEST, NARROW, OVERSHOT, REACH, SHORTENINGS, SOFTNESS, STEPS
-from planarfriction.tensors.distributed import Cells, positions_of
-from planarfriction.tensors.steps import Part
-
-
-def centre_of(moments: jax.Array, load: jax.Array) -> jax.Array:
-    """Return the centre of pressure `(-m_y, m_x)/f_N` `[..., 2]` [m]; 0 without load."""
-    loaded = (load > 0.0)[..., None]
-    turned = jnp.stack([-moments[..., 1], moments[..., 0]], -1)
-    return jnp.clip(jnp.where(loaded, turned / jnp.where(loaded, load[..., None], 1.0), 0.0), -REACH, REACH)
+from planarfriction.kernels.tilt import OVERSHOT, SHORTENINGS, SOFTNESS, STEPS
 
 
 class _Tilt(NamedTuple):
@@ -72,82 +58,30 @@ class _Tilt(NamedTuple):
         start = whole, jnp.zeros_like(first), whole, *ends(whole), jnp.asarray(1)
         return jax.lax.while_loop(lambda last: ~last[5] & (last[6] < SHORTENINGS), body, start)[0]
 
-    def pressing(self, narrow: jax.Array) -> tuple[jax.Array, jax.Array]:
-        """Return the cells that press in the end, bool `[N]`, and the softness with which their plane is found."""
+    def pressing(self, narrow: jax.Array) -> jax.Array:
+        """Return the cells that press in the end, bool `[N]`."""
 
         def body(last):
-            plane, _, _, count = last
+            plane, _, count = last
             soft = jnp.where((count > 0) | narrow, SOFTNESS, 0.0)
             before = self.corners @ plane > 0.0
             whole = self.fitted(before, soft)
             done = ((self.corners @ whole > 0.0) == before).all()
             far = jax.lax.cond(done, lambda step: jnp.ones(()), lambda step: self.share_of(plane, step), whole - plane)
-            return plane + far * (whole - plane), soft, done, count + 1
+            return plane + far * (whole - plane), done, count + 1
 
-        first = jnp.array([1.0, 0.0, 0.0]), jnp.asarray(0.0), jnp.asarray(False), jnp.asarray(0)
-        plane, soft, _, _ = jax.lax.while_loop(lambda last: ~last[2] & (last[3] < STEPS), body, first)
-        return self.corners @ plane > 0.0, soft
-
-
-def tilted(positions: jax.Array, weights: jax.Array, centre: jax.Array) -> jax.Array:
-    """Return weights `[..., N]` of cells at `positions` `[2, N]` that press about a `centre` `[..., 2]` [m]."""
-    batch = jnp.broadcast_shapes(weights.shape[:-1], centre.shape[:-1])
-    given = jnp.broadcast_to(weights, (*batch, weights.shape[-1])).reshape(-1, weights.shape[-1])
-    asked = jnp.broadcast_to(centre, (*batch, 2)).reshape(-1, 2)
-    return jax.vmap(lambda w, c: _tilted(positions, w, c))(given, asked).reshape(*batch, -1)
+        first = jnp.array([1.0, 0.0, 0.0]), jnp.asarray(False), jnp.asarray(0)
+        plane, _, _ = jax.lax.while_loop(lambda last: ~last[1] & (last[2] < STEPS), body, first)
+        return self.corners @ plane > 0.0
 
 
-def _tilted(positions: jax.Array, weights: jax.Array, centre: jax.Array) -> jax.Array:
-    total = weights.sum()
-    share = weights / jnp.where(total > 0.0, total, 1.0)
-    middle = positions @ share
-    away = positions - middle[:, None]
-    spread = (share * away) @ away.T
-    size = spread[0, 0] + spread[1, 1]
-    per_length = jnp.where(size > 0.0, 1.0 / jnp.sqrt(jnp.where(size > 0.0, size, 1.0)), 0.0)
-    narrow = ~(spread[0, 0] * spread[1, 1] - spread[0, 1] ** 2 > NARROW * size**2)
-    asked = (centre - middle) * per_length
-    square = asked @ asked
-    asked *= jnp.where(square > FARTHEST**2, FARTHEST / jnp.sqrt(jnp.where(square > 0.0, square, 1.0)), 1.0)
-    one = jnp.ones((1, len(share)))
-    tilt = _Tilt(jnp.concatenate([one, away * per_length]).T, share, jnp.concatenate([jnp.ones(1), asked]))
-    pressing, soft = _Tilt(*jax.lax.stop_gradient(tuple(tilt))).pressing(jax.lax.stop_gradient(narrow))
-    pressed = share * jnp.where(pressing, jnp.maximum(tilt.corners @ tilt.fitted(pressing, soft), 0.0), 0.0)
-    found = pressed.sum()
-    return jnp.where(total > 0.0, pressed * total / jnp.where(found > 0.0, found, 1.0), weights)
+def pressing(u, v, share, x, y, narrow) -> jax.Array:
+    """Return the cells that press, bool `[..., N]` (see `Namespace.pressing`)."""
+    one = jnp.ones_like(u)
+    corners, asked = jnp.stack([one, u, v], -1), jnp.concatenate([one[..., :1], x, y], -1)
 
+    def found(corners, share, asked, narrow):
+        return _Tilt(corners, share, asked).pressing(narrow)
 
-class Pressed(NamedTuple):
-    """A model whose pressure has followed its load."""
-
-    parts: tuple[Part, ...]
-    moved: jax.Array | None
-    """Displacement of parts besides `[..., 2]` [m]; None of cells."""
-
-    def seen(self, twist: jax.Array) -> jax.Array:
-        """Return the twist that the parts see."""
-        if self.moved is None:
-            return twist
-        vx, vy, spin = jnp.moveaxis(twist, -1, 0)
-        return jnp.stack(jnp.broadcast_arrays(vx - spin * self.moved[..., 1], vy + spin * self.moved[..., 0], spin), -1)
-
-    def pull(self, wrench: jax.Array) -> jax.Array:
-        """Return their wrench about the origin."""
-        if self.moved is None:
-            return wrench
-        return wrench.at[..., 2].add(self.moved[..., 0] * wrench[..., 1] - self.moved[..., 1] * wrench[..., 0])
-
-
-def follow(equations: Any, parts: Sequence[Part], centre: jax.Array) -> Pressed:
-    """Return parts with their pressure about `centre` `[..., 2]` [m].
-
-    Cells follow by themselves; parts share the load as if they were cells, and move where that does not reach.
-    """
-    if isinstance(parts[0].shape, Cells):
-        part = parts[0]
-        weights = tilted(positions_of(jnp, part.shape), part.shape.weights, centre)[..., None, :]
-        return Pressed((part._replace(shape=part.shape._replace(weights=weights)),), None)
-    places = jnp.stack([jnp.stack(equations.centre(part.shape)) for part in parts], -1)
-    shares = tilted(places, jnp.stack([jnp.asarray(part.share, float) for part in parts]), centre)
-    shared = tuple(part._replace(share=shares[..., k, None]) for k, part in enumerate(parts))
-    return Pressed(shared, centre - shares @ places.T)
+    flat = (corners.reshape(-1, *corners.shape[-2:]), *(each.reshape(-1, each.shape[-1]) for each in (share, asked)))
+    return jax.vmap(found)(*flat, narrow.reshape(-1)).reshape(u.shape)

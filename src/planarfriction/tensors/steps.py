@@ -15,6 +15,7 @@ from planarfriction.laws.base import refuse_creep, refuse_rate_law
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors.inputs import broadcast, finite, non_negative, shaped
 from planarfriction.tensors.namespace import Namespace
+from planarfriction.tensors.pressure import Pressed, centre_of, follow
 
 LAW = PARAMETERS[:8]
 """Parameters of the friction law; the others describe the shape of the patch."""
@@ -111,23 +112,33 @@ class TensorModel:
         """Return the state of a contact at rest, `[*state_shape]`."""
         raise NotImplementedError
 
-    def rate(self, state: Any, twist: Any, normal_force: Any, *, parameters: Any = None) -> Any:
-        """Return the rate of the state, of its shape; it does not depend on the load."""
-        return self._evaluated(state, twist, normal_force, parameters)[0]
+    def rate(self, state: Any, twist: Any, normal_force: Any, *, moments: Any = None, parameters: Any = None) -> Any:
+        """Return the rate of the state, of its shape; of the load it depends on the moments alone, as in `step`."""
+        return self._evaluated(state, twist, normal_force, parameters, moments)[0]
 
-    def wrench(self, state: Any, twist: Any, normal_force: Any, *, parameters: Any = None) -> Any:
-        """Return the friction wrench on the moving body, `[..., 3]` [N, N, N m]."""
-        return self._evaluated(state, twist, normal_force, parameters)[1]
+    def wrench(self, state: Any, twist: Any, normal_force: Any, *, moments: Any = None, parameters: Any = None) -> Any:
+        """Return the friction wrench on the moving body, `[..., 3]` [N, N, N m]; `moments` as in `step`."""
+        return self._evaluated(state, twist, normal_force, parameters, moments)[1]
 
-    def step(self, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None) -> tuple[Any, Any]:
+    def step(
+        self, state: Any, twist: Any, normal_force: Any, dt: Any, *, moments: Any = None, parameters: Any = None
+    ) -> tuple[Any, Any]:
         """Return the state after `dt` [s] of a constant twist, and the wrench at the end.
 
-        Stable at any `dt`; the bristles of a contact without load relax.
+        Stable at any `dt`; the bristles of a contact without load relax. With `moments` `[..., 2]` [N m] the pressure
+        follows them, as in `planarfriction.models.FrictionModel.step`.
         """
-        parts = self._parts_at(parameters)
-        inputs = self._inputs(state, twist, normal_force)
-        dt = non_negative(self.xp, "dt", self._number("dt", dt))
-        return step(self.xp, self.equations, parts, *inputs, dt)
+        inputs, pressed = self._inputs_pressed(state, twist, normal_force, parameters, moments)
+        return self.step_pressed(pressed, *inputs, non_negative(self.xp, "dt", self._number("dt", dt)))
+
+    def pressed(self, centre: Any, parameters: Any = None) -> Pressed:
+        """Return the model with its pressure about `centre` `[..., 2]` [m], for any number of steps."""
+        return follow(self.xp, self.equations, self._parts_at(parameters), centre)
+
+    def step_pressed(self, pressed: Pressed, state: Any, twist: Any, load: Any, dt: Any) -> tuple[Any, Any]:
+        """Return state and wrench after a step of the model that `pressed` has returned, with inputs as arrays."""
+        new, wrench = step(self.xp, self.equations, pressed.parts, state, pressed.seen(self.xp, twist), load, dt)
+        return new, pressed.pull(self.xp, wrench)
 
     def rollout(self, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None) -> Any:
         """Return the last state and the wrenches `[..., T, 3]` of steps through twists `[..., T, 3]` and loads.
@@ -157,9 +168,25 @@ class TensorModel:
         law = {name: wide.get(name, math.nan) for name in LAW}
         return self._parts(LawNumbers(**law, elasto_plastic=float(self.elasto_plastic)), wide)
 
-    def _evaluated(self, state: Any, twist: Any, normal_force: Any, parameters: Any) -> tuple[Any, Any]:
-        parts = self._parts_at(parameters)
-        return evaluate(self.xp, self.equations, parts, *self._inputs(state, twist, normal_force))
+    def _evaluated(
+        self, state: Any, twist: Any, normal_force: Any, parameters: Any, moments: Any = None
+    ) -> tuple[Any, Any]:
+        (z, v, load), pressed = self._inputs_pressed(state, twist, normal_force, parameters, moments)
+        rate, wrench = evaluate(self.xp, self.equations, pressed.parts, z, pressed.seen(self.xp, v), load)
+        return rate, pressed.pull(self.xp, wrench)
+
+    def _inputs_pressed(
+        self, state: Any, twist: Any, normal_force: Any, parameters: Any, moments: Any
+    ) -> tuple[tuple[Any, Any, Any], Pressed]:
+        """Return checked inputs, whose twists have the axes of moments too, and the model under these."""
+        z, v, load = self._inputs(state, twist, normal_force)
+        if moments is None:
+            return (z, v, load), Pressed(self._parts_at(parameters), None)
+        held = finite(self.xp, "moments", shaped("moments", self._number("moments", moments), (2,)))
+        shapes = {"twist": v.shape[:-1], "normal_force": load.shape, "moments": held.shape[:-1]}
+        batch = broadcast(self.xp, "batch axes", "broadcast", shapes)
+        v = self.xp.broadcast_to(v, (*batch, 3))
+        return (z, v, load), self.pressed(centre_of(self.xp, held, load), parameters)
 
     def _inputs(self, state: Any, twist: Any, normal_force: Any) -> tuple[Any, Any, Any]:
         """Return checked state, twist and load as arrays whose batch axes broadcast."""

@@ -103,10 +103,16 @@ class FrictionModule(TensorModel, nn.Module):
         return self.physical.values.new_zeros((*batch, *self.state_shape))
 
     def forward(
-        self, state: Tensor, twist: Tensor, normal_force: Tensor | float, *, parameters: Tensor | None = None
+        self,
+        state: Tensor,
+        twist: Tensor,
+        normal_force: Tensor | float,
+        *,
+        moments: Tensor | None = None,
+        parameters: Tensor | None = None,
     ) -> tuple[Tensor, Tensor]:
-        """Return the rate of the state, and the wrench."""
-        return self._evaluated(state, twist, normal_force, parameters)
+        """Return the rate of the state, and the wrench; `moments` as in `step`."""
+        return self._evaluated(state, twist, normal_force, parameters, moments)
 
     def compiled(self) -> Compiled:
         """Return the model as compiled rollouts take it."""

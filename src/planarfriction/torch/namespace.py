@@ -12,6 +12,7 @@ from torch import Tensor
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.tensors.namespace import Namespace
+from planarfriction.torch.pressure import pressing
 
 
 def _real(name: str, value: Any, like: Tensor | None = None) -> Tensor:
@@ -59,6 +60,7 @@ xp = Namespace(
     integers=lambda x: x.long(),
     real=_real,
     extremes=_extremes,
+    pressing=pressing,
     to_numpy=lambda value: value.detach().cpu().numpy() if isinstance(value, Tensor) else value,
     from_numpy=lambda array, like: torch.tensor(array, dtype=like.dtype, device=like.device),
     widened=_widened,

@@ -21,7 +21,8 @@ from planarfriction.adapters.mjx.newton import HostResponse
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
 from planarfriction.adapters.mujoco.loops.geometry import ALONG
 from planarfriction.adapters.mujoco.patches import Placed
-from planarfriction.jax.pressure import centre_of
+from planarfriction.jax.namespace import xp
+from planarfriction.tensors.pressure import centre_of
 
 
 class Active(NamedTuple):
@@ -167,7 +168,7 @@ class Geometry(NamedTuple):
 
     def centres(self, force: jax.Array) -> jax.Array:
         """Return the centres of pressure `[k, 2]` [m] of forces of constraints `[nefc]`."""
-        return centre_of(self.levers @ force, self.rows @ force)
+        return centre_of(xp, self.levers @ force, self.rows @ force)
 
     def moved(self, shift: jax.Array) -> jax.Array:
         """Return origins `[k, 3]` that move by `[k, 2]` [m] in the patches, in the frames of the sites."""

@@ -1,0 +1,99 @@
+"""Pressure that follows the moments of the load over `xp`: `kernels.tilt` in operations with derivatives.
+
+A front end finds which cells press, without derivatives (`Namespace.pressing`). With these the plane has a closed form,
+whose derivatives are those of the rule: cells that are about to lift press with nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from planarfriction.kernels.tilt import FARTHEST, NARROW, REACH, SOFTNESS
+from planarfriction.tensors.distributed import Cells, positions_of
+
+
+def centre_of(xp: Any, moments: Any, load: Any) -> Any:
+    """Return the centre of pressure `(-m_y, m_x)/f_N` `[..., 2]` [m]; 0 without load."""
+    loaded = (load > 0.0)[..., None]
+    turned = xp.stack([-moments[..., 1], moments[..., 0]], -1)
+    return xp.clip(xp.where(loaded, turned / xp.where(loaded, load[..., None], 1.0), 0.0), -REACH, REACH)
+
+
+def tilted(xp: Any, positions: Any, weights: Any, centre: Any) -> Any:
+    """Return weights `[..., N]` of cells at `positions`, x then y `[..., N]`, that press about a centre `[..., 2]`."""
+
+    def mean(values: Any, by: Any) -> Any:
+        return (by * values).sum(-1, keepdims=True)
+
+    total = weights.sum(-1, keepdims=True)
+    share = weights / xp.where(total > 0.0, total, 1.0)
+    (x, y), away = positions, []
+    for each, to in ((x, centre[..., :1]), (y, centre[..., 1:])):
+        middle = mean(each, share)
+        away.append((each - middle, to - middle))
+    (dx, cx), (dy, cy) = away
+    xx, xy, yy = mean(dx * dx, share), mean(dx * dy, share), mean(dy * dy, share)
+    size = xx + yy
+    per_length = xp.where(size > 0.0, 1.0 / xp.sqrt(xp.where(size > 0.0, size, 1.0)), 0.0)
+    narrow = ~(xx * yy - xy * xy > NARROW * size * size)
+    u, v, cx, cy = (each * per_length for each in (dx, dy, cx, cy))
+    square = cx * cx + cy * cy
+    back = xp.where(square > FARTHEST**2, FARTHEST / xp.sqrt(xp.where(square > 0.0, square, 1.0)), 1.0)
+    u, v, share, cx, cy, narrow = xp.broadcast_arrays(u, v, share, back * cx, back * cy, narrow)
+    held = (xp.stop_gradient(each) for each in (u, v, share, cx[..., :1], cy[..., :1], narrow[..., :1]))
+    pressing = xp.pressing(*held)
+
+    one = xp.where(pressing, share, 0.0)
+    own = one.sum(-1, keepdims=True)
+    mx, my = mean(u, one) / own, mean(v, one) / own
+    du, dv = u - mx, v - my
+    soft = xp.where(narrow[..., :1] | ~pressing.all(-1)[..., None], SOFTNESS, 0.0)
+    xx, xy, yy, right, up = mean(du * du, one) + soft, mean(du * dv, one), mean(dv * dv, one) + soft, cx - mx, cy - my
+    per = 1.0 / (xx * yy - xy * xy)
+    a, b = per * (yy * right - xy * up), per * (xx * up - xy * right)
+    plane = 1.0 / own + a * du + b * dv
+    pressed = xp.where(pressing, share * xp.where(plane > 0.0, plane, 0.0), 0.0)
+    found = pressed.sum(-1, keepdims=True)
+    return xp.where(total > 0.0, pressed * total / xp.where(found > 0.0, found, 1.0), weights)
+
+
+class Pressed(NamedTuple):
+    """A model whose pressure has followed its load."""
+
+    parts: tuple[Any, ...]
+    moved: Any
+    """Displacement of parts besides `[..., 2]` [m]; None of cells."""
+
+    def seen(self, xp: Any, twist: Any) -> Any:
+        """Return the twist that the parts see."""
+        if self.moved is None:
+            return twist
+        spin = twist[..., 2]
+        vx, vy = twist[..., 0] - spin * self.moved[..., 1], twist[..., 1] + spin * self.moved[..., 0]
+        return xp.stack(xp.broadcast_arrays(vx, vy, spin), -1)
+
+    def pull(self, xp: Any, wrench: Any) -> Any:
+        """Return their wrench about the origin."""
+        if self.moved is None:
+            return wrench
+        fx, fy = wrench[..., 0], wrench[..., 1]
+        tau = wrench[..., 2] + self.moved[..., 0] * fy - self.moved[..., 1] * fx
+        return xp.stack(xp.broadcast_arrays(fx, fy, tau), -1)
+
+
+def follow(xp: Any, equations: Any, parts: Sequence[Any], centre: Any) -> Pressed:
+    """Return parts with their pressure about `centre` `[..., 2]` [m].
+
+    Cells follow by themselves; parts share the load as if they were cells, and move where that does not reach.
+    """
+    if isinstance(parts[0].shape, Cells):
+        part = parts[0]
+        weights = tilted(xp, positions_of(xp, part.shape), part.shape.weights, centre)[..., None, :]
+        return Pressed((part._replace(shape=part.shape._replace(weights=weights)),), None)
+    x, y = (xp.stack(each, -1) for each in zip(*(equations.centre(part.shape) for part in parts), strict=True))
+    if len(parts) == 1:
+        return Pressed(tuple(parts), centre - xp.concatenate([x, y], -1))
+    shares = tilted(xp, (x, y), xp.stack([part.share for part in parts], -1), centre)
+    shared = tuple(part._replace(share=shares[..., k, None]) for k, part in enumerate(parts))
+    return Pressed(shared, centre - xp.stack([(shares * x).sum(-1), (shares * y).sum(-1)], -1))
