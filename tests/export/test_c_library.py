@@ -1,83 +1,120 @@
-"""C libraries against the compiled steps that they are traced from."""
+"""C libraries against the compiled steps that they are traced from, and their derivatives."""
 
 import ctypes
+import re
 import shutil
-import subprocess
 
 import numpy as np
 import pytest
 
 import planarfriction as pf
+from planarfriction.derivatives import parameter_names, parameters_of, rollout_vjp
+from tests.support.c_libraries import KINDS, LAW, MODELS, library, run, samples
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
-DISC = pf.ContactPatch.disc(0.01)
-METRIC = pf.ContactPatch.rectangle(0.02, 0.01).with_friction_metric([[1.0, 0.2], [0.2, 1.5]])
-LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
-MODELS = {
-    "few": lambda: pf.ReducedModel(DISC, LAW),
-    "plain": lambda: pf.ReducedModel(DISC, pf.LuGre(mu_s=1.2)),
-    "one": lambda: pf.ReducedModel(DISC, LAW, parts=1),
-    "three": lambda: pf.ReducedModel(DISC, LAW, parts=3),
-    "distributed": lambda: pf.DistributedModel(METRIC, LAW),
-    "table": lambda: pf.ReducedModelPublished(DISC, LAW),
-    "potential": lambda: pf.ReducedModelPublished(METRIC, LAW, surface=pf.LimitSurfaceTable(METRIC)),
-    "ellipsoid": lambda: pf.ReducedModelPublished(DISC, LAW, surface=pf.LimitSurfaceEllipsoid(DISC)),
-}
-STRICT = "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2", "-fPIC"
-KINDS = {"double": (ctypes.c_double, float), "float": (ctypes.c_float, np.float32)}
+
+SLOW = [pytest.param(each, marks=pytest.mark.slow) for each in ("plain", "one", "ellipsoid")]
+NAMES = [*(each for each in MODELS if each not in ("plain", "one", "ellipsoid")), *SLOW]
+"""Models that compile quickly, and others."""
 
 
-def library(model, folder, precision):
-    """Compile a model as C99 and as C++17 without a warning, and load it."""
-    _, source = pf.export_c(model, folder, precision=precision)
-    made = folder / "friction.so"
-    subprocess.run(["gcc", "-std=c99", *STRICT, "-shared", "-o", made, source, "-lm"], check=True)
-    subprocess.run(["gcc", "-x", "c++", "-std=c++17", *STRICT, "-c", "-o", folder / "cpp.o", source], check=True)
-    step, (real, _) = ctypes.CDLL(made).friction_step_default, KINDS[precision]
-    step.argtypes = [ctypes.c_void_p, ctypes.c_void_p, real, real, ctypes.c_void_p]
-    return step
-
-
-def samples(model, kind, count=3000):
-    """Draw states, twists, loads and steps from rest to slip, rounded to a precision."""
-    rng = np.random.default_rng(0)
-    twist = rng.normal(size=(count, 3)) * [1.0, 1.0, 150.0] * 10.0 ** rng.uniform(-6.0, -0.5, (count, 1))
-    load, dt = 10.0 ** rng.uniform(-2.0, 2.0, count), 10.0 ** rng.uniform(-5.0, -2.0, count)
-    load[::50], twist[::70] = 0.0, 0.0
-    state, _ = model.step(np.broadcast_to(model.rest(), (count, *model.state_shape)), twist[::-1], 1.0, 1e-3)
-    return [np.ascontiguousarray(each.astype(kind).astype(float)) for each in (state, twist, load, dt)]
+def misfit(name, precision, count, seed=0):
+    """Return the errors of states, in largest deflections, and of wrenches, in the largest per load [count]."""
+    made = library(name, precision)
+    inputs = samples(made.model, made.kind, count, seed)
+    new, wrench = made.model.step(*inputs)
+    found, pressed = run(made, inputs)
+    # damping alone gives 100 f_N at 0.3 m/s: so the errors stand beside the largest wrench of all samples
+    lever, load = np.array([1.0, 1.0, made.model.patch.contact_radius()]), inputs[2]
+    per_load = 1.0 / lever / np.maximum(load, 1e-9)[:, None]
+    off = np.abs(pressed - wrench) * per_load / np.abs(wrench * per_load).max()
+    assert np.all(found[load == 0.0] == 0.0) and np.all(pressed[load == 0.0] == 0.0)
+    return np.abs(found - new).max() / LAW.largest_deflection, off.max(axis=1)
 
 
 @pytest.mark.parametrize("precision", KINDS)
+@pytest.mark.parametrize("name", NAMES)
+def test_steps(name, precision):
+    of_states, of_wrenches = misfit(name, precision, 3000)
+    assert of_states < (1e-11 if precision == "double" else 1e-3)
+    assert of_wrenches.max() < (1e-12 if precision == "double" else 1e-3)
+    assert np.quantile(of_wrenches, 0.999) < (1e-12 if precision == "double" else 1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("precision", KINDS)
 @pytest.mark.parametrize("name", MODELS)
-def test_steps(name, precision, tmp_path):
-    model, (_, kind) = MODELS[name](), KINDS[precision]
-    step = library(model, tmp_path, precision)
-    state, twist, load, dt = samples(model, kind)
-    new, wrench = model.step(state, twist, load, dt)
-    states, twists, found = state.astype(kind), twist.astype(kind), np.empty(wrench.shape, kind)
-    for i in range(len(load)):
-        assert step(states[i].ctypes.data, twists[i].ctypes.data, load[i], dt[i], found[i].ctypes.data) == 0
-    # errors of the wrench beside the largest per load: damping alone gives 100 f_N at 0.3 m/s
-    lever = [1.0, 1.0, model.patch.contact_radius()]
-    off = np.abs(found - wrench) / lever / np.maximum(load, 1e-9)[:, None]
-    largest = (np.abs(wrench) / lever / np.maximum(load, 1e-9)[:, None]).max()
-    assert (np.abs(states - new).max() / LAW.largest_deflection) < (1e-11 if precision == "double" else 1e-3)
-    assert off.max() / largest < (1e-12 if precision == "double" else 1e-4)
-    assert np.quantile(off.max(axis=1), 0.999) / largest < (1e-12 if precision == "double" else 1e-5)
-    assert np.all(states[load == 0.0] == 0.0) and np.all(found[load == 0.0] == 0.0)
+def test_a_million_steps(name, precision):
+    parts = [misfit(name, precision, 10_000, seed) for seed in range(100)]
+    of_wrenches = np.concatenate([each for _, each in parts])
+    print(f"\n{name} {precision}: {max(each for each, _ in parts):.1e} {of_wrenches.max():.1e}", end=" ")
+    print(f"{np.quantile(of_wrenches, 0.999):.1e}")
+    assert of_wrenches.max() < (1e-12 if precision == "double" else 1e-3)
+    assert np.quantile(of_wrenches, 0.999) < (1e-12 if precision == "double" else 1e-5)
 
 
+# ---------------------------------------------------------------------- derivatives
+
+
+def by_cell(name, derivative, shape):
+    """Return derivatives of the library [..., 2, 2, N] or [..., P, 3, 3] as those of C are laid out."""
+    if name == "state_state" and derivative.shape[-1] != 3:
+        derivative = np.swapaxes(derivative, -1, -2)
+    return derivative.reshape(shape)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_slopes(name):
+    """Off the bound of slip, where derivatives are one-sided; to 1e-9 of the largest per load."""
+    made = library(name)
+    inputs = [each[1::2] for each in samples(made.model, made.kind, 600)]
+    found, pressed, slopes = run(made, inputs, slopes=True)
+    for one, other in zip((found, pressed), run(made, inputs), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * np.abs(other).max())
+    exact, per_load = made.model.step_jacobians(*inputs), 1.0 / np.maximum(inputs[2], 1e-9)
+    for field in exact._fields:
+        own = slopes[field]
+        scale = per_load if field.startswith("wrench") and field != "wrench_load" else np.ones(len(per_load))
+        scale = scale.reshape(-1, *[1] * (own.ndim - 1))
+        wanted = by_cell(field, getattr(exact, field), own.shape) * scale
+        assert np.abs(own * scale - wanted).max() < 1e-9 * np.abs(wanted).max(), field
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_slopes_by_parameters(name):
+    made, rng, count = library(name), np.random.default_rng(1), 40
+    inputs = [each[1::2] for each in samples(made.model, made.kind, 2 * count)]
+    *_, slopes = run(made, inputs, slopes=True)
+    bars = rng.normal(size=(count, 3)) * [1.0, 1.0, 100.0], rng.normal(size=inputs[0].shape)
+    given = parameters_of(made.model)
+    wanted = np.array([
+        rollout_vjp(made.model, z, v[None], load[None], dt[None], w_bar[None], z_bar, parameters=given).parameters
+        for z, v, load, dt, w_bar, z_bar in zip(*inputs, *bars, strict=True)
+    ])  # fmt: skip
+    names = re.findall(r"friction_real (\w+); /\*", (made.folder / "friction.h").read_text())
+    wanted = wanted[:, [parameter_names(made.model).index(each) for each in names]]
+    own = np.einsum("bi,bip->bp", bars[0], slopes["wrench_params"])
+    own += np.einsum("bi,bip->bp", bars[1].reshape(count, -1), slopes["state_params"])
+    assert len(names) == own.shape[1] >= 6
+    assert np.all(np.abs(own - wanted).max(axis=0) < 1e-9 * np.abs(wanted).max(axis=0))
+
+
+# ---------------------------------------------------------------------- what is refused
+
+
+@pytest.mark.parametrize("slopes", [False, True])
 @pytest.mark.parametrize("place, value", [("twist", np.nan), ("state", np.inf), ("load", -1.0), ("dt", np.nan)])
-def test_bad_numbers(place, value, tmp_path):
-    model = MODELS["few"]()
-    step = library(model, tmp_path, "double")
-    given = {"state": model.rest(), "twist": np.array([0.01, 0.0, 1.0]), "load": np.ones(1), "dt": np.full(1, 1e-3)}
+def test_bad_numbers(place, value, slopes):
+    made = library("few")
+    given = {
+        "state": made.model.rest()[None], "twist": np.array([[0.01, 0.0, 1.0]]), "load": np.ones(1),
+        "dt": np.full(1, 1e-3),
+    }  # fmt: skip
     given[place].flat[0] = value
-    before, wrench = given["state"].copy(), np.full(3, 7.0)
-    pointers = given["state"].ctypes.data, given["twist"].ctypes.data
-    assert step(*pointers, given["load"][0], given["dt"][0], wrench.ctypes.data) == 2
+    before, wrench, room = given["state"].copy(), np.full(3, 7.0), np.empty(10_000)
+    pointers = [each.ctypes.data_as(ctypes.c_void_p) for each in (*given.values(), wrench, room)]
+    assert made.functions.run(1, *pointers[:5], pointers[5] if slopes else None) == 2
     assert np.array_equal(given["state"], before, equal_nan=True) and np.all(wrench == 7.0)
 
 
@@ -85,6 +122,7 @@ def test_bad_numbers(place, value, tmp_path):
     "options, words",
     [
         ({"name": "2d"}, "name must be a C identifier"),
+        ({"name": "n" * 41}, "name must be a C identifier of at most 40 characters"),
         ({"precision": "half"}, "precision must be one of double, float"),
     ],
 )

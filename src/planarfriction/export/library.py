@@ -75,14 +75,19 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str) -> list[str]:
     states = pieces.count * pieces.states
     first = f"{pieces.spacing} * k" if pieces.spacing > 1 else "k"
     places = [f"next[{first} + {i * pieces.stride}]" for i in range(pieces.states)]
-    lines = list(writer.lines(pieces.step, [*places, "w[0]", "w[1]", "w[2]"]))
+    results = [*places, "w[0]", "w[1]", "w[2]"]
+    columns = pieces.states + 3 + len(pieces.parameters)
+    cells = [f"rows[{row}][{column}]" for row in range(3 + pieces.states) for column in range(columns)]
+    lines = list(writer.lines(pieces.step, results))
+    slopes = list(writer.lines(pieces.slopes(), [*results, *cells]))
     tables = {
         table: ("int", numbers.tolist()) if numbers.dtype.kind == "i" else _table(writer, numbers)
         for table, numbers in pieces.tables.items()
         if table == "share" or any(f"{table}[" in line for line in lines)
     }
-    if not any("[k]" in line or "* k" in line for line in lines):
-        lines.insert(0, "    (void)k;")
+    for each in (lines, slopes):
+        if not any("[k]" in line or "* k" in line for line in each):
+            each.insert(0, "    (void)k;")
     values = {
         "name": name,
         "version": planarfriction.__version__,
@@ -95,9 +100,14 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str) -> list[str]:
         "ranges": " && ".join(RANGES[each] for each in pieces.parameters),
         "tables": tables,
         "step": "\n".join(lines),
+        "slopes": "\n".join(slopes),
+        "columns": columns,
+        "stride": pieces.stride,
+        "first": first,
         "suffix": writer.suffix,
         "largest": writer.constant(PRECISIONS[precision]),
         "zero": writer.constant(0.0),
+        "one": writer.constant(1.0),
         "operations": pieces.count * sum("=" in line for line in lines),
         "functions": pieces.count * sum(any(f"{each}{writer.suffix}(" in line for each in _SLOW) for line in lines),
     }
@@ -116,6 +126,5 @@ def _table(writer: Writer, numbers: np.ndarray) -> tuple[str, list[str]]:
     """Return the type and the constants of a table: in single precision where that is how it is stored."""
     single = numbers.dtype == np.float32
     return ("float" if single else "real"), [
-        repr(float(np.float32(each))) + "f" if single else writer.constant(float(each)).strip("()")
-        for each in numbers.ravel()
+        f"{np.float32(each)!s}f" if single else writer.constant(float(each)).strip("()") for each in numbers.ravel()
     ]

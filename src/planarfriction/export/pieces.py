@@ -11,7 +11,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.export.trace import Block, Number, Table, Trace, traced
 from planarfriction.export.twins import twin
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, distributed_step, moment_steps, published_step, reduced_step
+from planarfriction.kernels import cells, cells_rollout, distributed_step, moment_steps, published_step, reduced_step
 from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, Root
 from planarfriction.kernels.reduced_contact import ReducedContact, ReducedPatch
 from planarfriction.kernels.surfaces import CELLS
@@ -37,6 +37,8 @@ class Pieces(NamedTuple):
     """New states, then the wrench per unit load, from `p`, `k`, `z`, `v` and `dt`."""
     parameters: dict[str, float]
     """Numbers of the law that may change at run time."""
+    slopes: Callable[[], Block]
+    """Trace new states, wrench and derivatives by states, twist and parameters: rows of the wrench, then of states."""
 
 
 def pieces_of(model: Any) -> Pieces:
@@ -96,8 +98,20 @@ def _distributed(model: DistributedModel) -> Pieces:
         new, traction = twin(distributed_step.cell)(_law(trace, law), z, u, dt)
         return new, lever.wrench(own, traction)
 
+    def slopes(trace: Trace) -> Any:
+        own = _vector(trace, *(f"{name}[k]" for name in names))
+        forth, back = twin(cells_rollout._WRITTEN.forth), twin(cells_rollout._WRITTEN.back)
+        u, none, units = lever.seen(own, _vector(trace, *_TWIST)), (0.0, 0.0), np.eye(3).tolist()
+        z, dt = _vector(trace, "z[k]", f"z[{n} + k]"), Number(trace, "dt")
+        (new, traction), tape = forth(_law(trace, law), z, u, dt)
+        bars = [back(tape, (none, lever.seen(own, unit))) for unit in units]
+        bars += [back(tape, (unit, none)) for unit in ((1.0, 0.0), (0.0, 1.0))]
+        kept = [cells_rollout.PARAMETERS.index(name) for name in _parameters(law)]
+        rows = tuple((by_z, lever.wrench(own, by_u), *(by_law[i] for i in kept)) for by_z, by_u, *by_law in bars)
+        return new, lever.wrench(own, traction), rows
+
     tables = {**dict(zip(names, numbers, strict=False)), "share": model.patch.weights()}
-    return Pieces(n, 2, n, 1, tables, traced(step), _parameters(law))
+    return Pieces(n, 2, n, 1, tables, traced(step), _parameters(law), lambda: traced(slopes))
 
 
 def _of_three_states(model: Any, law: LawNumbers, steps: Any, tables: dict, contact: Callable[[Trace], Any]) -> Pieces:
@@ -110,7 +124,27 @@ def _of_three_states(model: Any, law: LawNumbers, steps: Any, tables: dict, cont
         twin(moment_steps.step)(frame, hold, taped_step, contact(trace), z, twist, dt, new, out)
         return tuple(new), tuple(out)
 
-    return Pieces(len(tables["share"]), 3, 1, 3, tables, traced(step), _parameters(law))
+    def slopes(trace: Trace) -> Any:
+        laws: list[LawNumbers] = []
+
+        def pull_back(*arguments: Any) -> Any:
+            bar = twin(steps.MODEL.pull_back)(*arguments)
+            laws.append(bar.law)
+            return bar
+
+        new, out, dt = [0.0] * 3, [0.0] * 39, Number(trace, "dt")
+        z, twist = _vector(trace, "z[3 * k]", "z[3 * k + 1]", "z[3 * k + 2]"), _vector(trace, *_TWIST)
+        hold_slopes = twin(steps.MODEL.hold_slopes)
+        given = contact(trace), z, twist, dt, new, out
+        twin(moment_steps.slopes)(frame, hold_slopes, taped_step, pull_back, True, *given)
+        by_law = [tuple(getattr(each, name) for name in _parameters(law)) for each in laws]
+        rows = [
+            (*out[at + 18 : at + 21], *out[at : at + 3], bar) for at, bar in zip(range(3, 21, 3), by_law, strict=True)
+        ]
+        return tuple(new), tuple(out[:3]), tuple(rows)
+
+    count = len(tables["share"])
+    return Pieces(count, 3, 1, 3, tables, traced(step), _parameters(law), lambda: traced(slopes))
 
 
 def _published(model: ReducedModelPublished) -> Pieces:

@@ -166,15 +166,28 @@ class Trace:
         return self._answers[condition.name]
 
     def call(self, function: Callable[..., Any], arguments: tuple) -> Any:
-        """Return the results of a function without side effects, after both ways of each of its comparisons."""
+        """Return the results of a function after both ways of each of its comparisons.
+
+        The function has no side effects but on lists that it is given.
+        """
+        rows = [each for each in flat(arguments) if isinstance(each, list)]
+        before = [list(row) for row in rows]
         try:
             return function(*arguments)
         except Undecided as fork:
             condition = fork.condition.name
-        (yes, if_so), (no, if_not) = (self._side(function, arguments, condition, answer) for answer in (True, False))
+        sides = []
+        for answer in (True, False):
+            for row, numbers in zip(rows, before, strict=True):
+                row[:] = numbers
+            block, result = self._side(function, arguments, condition, answer)
+            sides.append((block, (result, *(tuple(row) for row in rows))))
+        (yes, if_so), (no, if_not) = sides
         outcomes: list[Number] = []
         inside = [[], []]
-        result = self._merged(if_so, if_not, outcomes, inside)
+        result, *contents = self._merged(if_so, if_not, outcomes, inside)
+        for row, numbers in zip(rows, contents, strict=True):
+            row[:] = numbers
         blocks = [Block(block, tuple(each)) for block, each in zip((yes, no), inside, strict=True)]
         self.operations.append(Branch(tuple((each.name, each.kind) for each in outcomes), condition, *blocks))
         return result

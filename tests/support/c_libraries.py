@@ -1,0 +1,105 @@
+"""Exported C libraries, compiled and loaded, and random inputs for their steps."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import planarfriction as pf
+
+DISC = pf.ContactPatch.disc(0.01)
+METRIC = pf.ContactPatch.rectangle(0.02, 0.01).with_friction_metric([[1.0, 0.2], [0.2, 1.5]])
+LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
+SMALL = {"segments": 8, "speeds": 6}
+MODELS = {
+    "few": lambda: pf.ReducedModel(DISC, LAW),
+    "plain": lambda: pf.ReducedModel(DISC, pf.LuGre(mu_s=1.2)),
+    "one": lambda: pf.ReducedModel(DISC, LAW, parts=1, **SMALL),
+    "three": lambda: pf.ReducedModel(DISC, LAW, parts=3, **SMALL),
+    "distributed": lambda: pf.DistributedModel(METRIC, LAW),
+    "table": lambda: pf.ReducedModelPublished(DISC, LAW),
+    "potential": lambda: pf.ReducedModelPublished(METRIC, LAW, surface=pf.LimitSurfaceTable(METRIC)),
+    "ellipsoid": lambda: pf.ReducedModelPublished(DISC, LAW, surface=pf.LimitSurfaceEllipsoid(DISC)),
+}
+REDUCED = [name for name in MODELS if name != "distributed"]
+KINDS = {"double": np.float64, "float": np.float32}
+STRICT = "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror"
+
+DRIVER = """#include "friction.h"
+
+int run(int n, friction_real *state, const friction_real *twist, const friction_real *load, const friction_real *dt,
+    friction_real *wrench, friction_slopes *slopes)
+{
+    int i, code = 0;
+    for (i = 0; i < n && code == 0; ++i) {
+        friction_real *z = state + (long)i * FRICTION_STATES, *w = wrench + 3 * i;
+        code = slopes ? friction_step_slopes(&friction_default, z, twist + 3 * i, load[i], dt[i], w, slopes + i)
+                      : friction_step_default(z, twist + 3 * i, load[i], dt[i], w);
+    }
+    return code;
+}
+"""
+
+
+class Library(NamedTuple):
+    """A model, and its C library as it was written and as it was compiled."""
+
+    model: Any
+    folder: Path
+    kind: type
+    functions: Any
+
+
+@functools.cache
+def _folder() -> tempfile.TemporaryDirectory:
+    return tempfile.TemporaryDirectory()
+
+
+@functools.cache
+def library(name: str, precision: str = "double", *options: str) -> Library:
+    """Compile the model called `name` once, without a warning, and load it."""
+    model = MODELS[name]()
+    folder = Path(_folder().name) / "-".join([name, precision, *options])
+    pf.export_c(model, folder, precision=precision)
+    (folder / "driver.c").write_text(DRIVER)
+    command = "gcc", *STRICT, *(options or ("-O1",)), "-fPIC", "-shared", "-o", "friction.so"
+    subprocess.run([*command, "friction.c", "driver.c", "-lm"], cwd=folder, check=True)
+    return Library(model, folder, KINDS[precision], ctypes.CDLL(folder / "friction.so"))
+
+
+def samples(model: Any, kind: type, count: int, seed: int = 0) -> list[np.ndarray]:
+    """Draw states, twists, loads and steps from rest to slip, rounded to a precision."""
+    rng = np.random.default_rng(seed)
+    twist = rng.normal(size=(count, 3)) * [1.0, 1.0, 150.0] * 10.0 ** rng.uniform(-6.0, -0.5, (count, 1))
+    load, dt = 10.0 ** rng.uniform(-2.0, 2.0, count), 10.0 ** rng.uniform(-5.0, -2.0, count)
+    load[::50], twist[::70] = 0.0, 0.0
+    state, _ = model.step(np.broadcast_to(model.rest(), (count, *model.state_shape)), twist[::-1], 1.0, 1e-3)
+    state[1::2] *= rng.uniform(0.2, 1.1, (len(state[1::2]), *[1] * len(model.state_shape)))  # off the bound of slip
+    return [np.ascontiguousarray(each.astype(kind).astype(float)) for each in (state, twist, load, dt)]
+
+
+def slopes_type(model: Any, kind: type) -> np.dtype:
+    """Return the record of derivatives of a model."""
+    states, own = int(np.prod(model.state_shape)), 2 if model.state_shape[-1] != 3 else 3
+    count = 7 if model.law.elasto_plastic else 6
+    shapes = {
+        "wrench_state": (3, states), "wrench_twist": (3, 3), "wrench_load": (3,), "wrench_params": (3, count),
+        "state_state": (states, own), "state_twist": (states, 3), "state_params": (states, count),
+    }  # fmt: skip
+    return np.dtype([(name, kind, shape) for name, shape in shapes.items()])
+
+
+def run(made: Library, inputs: list[np.ndarray], slopes: bool = False) -> tuple[Any, ...]:
+    """Return new states, wrenches and, if asked for, derivatives of steps in C."""
+    state, twist, load, dt = (np.array(each, made.kind, order="C") for each in inputs)
+    wrench = np.empty((len(load), 3), made.kind)
+    found = np.empty(len(load) if slopes else 0, slopes_type(made.model, made.kind))
+    pointers = [each.ctypes.data_as(ctypes.c_void_p) for each in (state, twist, load, dt, wrench)]
+    assert made.functions.run(len(load), *pointers, found.ctypes.data_as(ctypes.c_void_p) if slopes else None) == 0
+    return (state, wrench, found) if slopes else (state, wrench)
