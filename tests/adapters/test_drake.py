@@ -23,6 +23,7 @@ from pydrake.systems.framework import EventStatus
 from pydrake.systems.primitives import ConstantValueSource, ConstantVectorSource, LogVectorOutput
 
 from planarfriction.adapters.drake import Friction, PatchContact, prepare
+from planarfriction.adapters.drake.friction import EXPECTED
 from planarfriction.errors import InvalidValueError, MissingExtraError
 from planarfriction_studies import bench
 from planarfriction_studies.bench.coulomb_disc import stop
@@ -293,7 +294,7 @@ def test_ports_can_be_logged_watched_and_drawn():
     run.to(0.1)
     data = {name: log.FindLog(run.simulator.get_context()).data() for name, log in logs.items()}
     assert {name: len(each) for name, each in data.items()} == {
-        "wrenches": 3, "twists": 3, "loads": 1, "report": 5, "generalized_force": 6,
+        "wrenches": 3, "twists": 3, "loads": 1, "report": 6, "generalized_force": 6,
     }  # fmt: skip
     assert len(seen) >= 50 and max(seen) <= 5 and data["report"][0].max() == max(seen)
     np.testing.assert_array_equal(data["wrenches"][:, -1], ports["wrenches"].Eval(run.own))
@@ -312,6 +313,33 @@ def test_what_is_connected_later_is_refused_by_drake():
     with pytest.raises((RuntimeError, SystemExit), match=r"AlreadyWired|already"):
         builder.Connect(late.get_output_port(), plant.get_applied_generalized_force_input_port())
     assert builder.IsConnectedOrExported(plant.get_applied_spatial_force_input_port())
+
+
+def test_friction_is_added_once():
+    """Drake itself would end the process."""
+    builder, plant, scene_graph = on_the_floor("box", "point", 2e-3)
+    prepare(plant, scene_graph, _patches())
+    Friction.AddToBuilder(builder, plant, scene_graph, _patches())
+    with pytest.raises(InvalidValueError, match="plant must have no patch friction yet"):
+        Friction.AddToBuilder(builder, plant, scene_graph, _patches())
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
+def test_parameters_changed_in_a_context_are_noticed(contact):
+    """The plant slides with ten times the mass, or as it is: a state that is set surprises once."""
+    run, warned = sliding("disc", contact, 2e-3, DISC), "parameters in its context are not those"
+    run.to(0.1)
+    run.plant.SetVelocities(run.context, [0.0, 0.0, 0.0, 0.5, 0.0, 0.0])
+    run.to(0.102)
+    report = run.friction.GetReport(run.own)
+    assert report.surprise == pytest.approx(0.5, rel=1e-3) and report.converged
+    run.to(0.12)
+    assert run.friction.GetReport(run.own).surprise < EXPECTED
+    run.plant.GetBodyByName("disc").SetMass(run.context, 2.0)
+    with pytest.warns(UserWarning, match=warned):
+        run.to(0.14)
+    report = run.friction.GetReport(run.own)
+    assert report.surprise > 100.0 * EXPECTED and not report.converged
 
 
 def test_spatial_forces_are_seen():

@@ -37,7 +37,7 @@ JOINT, ROUND = 8, 24
 others loads follow behind: where both turn against each other, one of the two ways gets on."""
 
 SHORTER, STAGES = 4.0, 8
-"""Ratio of the lengths, and number, of the shorter steps that lead from damping alone to a step that is hard to solve."""
+"""Ratio and number of the shorter steps that lead from damping alone to a step that is hard to solve."""
 
 ROUNDING = 1e-13
 """Error of a twist, in the largest speed that goes into it, below which no step gets."""

@@ -46,6 +46,8 @@ class Asked(NamedTuple):
     twist_answers: np.ndarray
     load_answers: np.ndarray
     """Reaction of twists and loads to wrenches at the end, from which the next step starts."""
+    velocities: np.ndarray
+    """Velocities of the plant `[nv]` at the end of the step."""
     report: tuple[float, ...]
     """Passes, iterations, residual, misfit, whether the step in contact space has converged."""
 
@@ -112,7 +114,7 @@ class Asking:
                 break
         report = passes, iterations, row.residual[0], misfit, row.converged[0]
         twists, loads = row.response.ravel(), row.load_response.ravel()
-        return Asked(row.new, wrench, force, off, twist - owed, load, self._touching, twists, loads, report)
+        return Asked(row.new, wrench, force, off, twist - owed, load, self._touching, twists, loads, velocity, report)
 
     def _forget(self) -> None:
         self._touching = [False] * len(self._touching)

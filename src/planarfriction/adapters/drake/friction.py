@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import warnings
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -21,6 +22,11 @@ from planarfriction.adapters.drake.shadow import Shadow
 from planarfriction.coupling import CoupledPatches
 from planarfriction.errors import InvalidValueError
 
+EXPECTED = 1e-5
+"""Difference between predicted and actual velocities [m/s, rad/s] that is not noticed: rounding comes to 1e-7."""
+
+_CHANGED = "parameters in its context are not those with which friction was added"
+
 _GEOMETRY, _FORCE = "geometry_query", "applied_generalized_force"
 
 
@@ -36,14 +42,20 @@ class Report(NamedTuple):
     misfit: float
     """Difference between the twists that were solved for and those of the plant [m/s]. Spins are multiplied by the size
     of the patch; loads count as the speed they could cause."""
+    surprise: float
+    """Largest difference between the velocities of the plant and those predicted for it in the last step [m/s, rad/s].
+    It is large once where a state is set, and in every step where parameters in the plant's context are not those with
+    which friction was added."""
     converged: bool
+    """True if the step in contact space has converged and the plant did not surprise twice in a row."""
 
 
 class Friction(LeafSystem):
     """Patch friction for a discrete plant, as a system that `AddToBuilder` adds to a diagram next to the plant.
 
     The context holds the states of the bristles, the wrenches, twists and loads; the output ports give those of the
-    last step. The plant's parameters and shapes are those it has when this system is made.
+    last step. The plant's parameters and shapes are those it has when this system is made; where the plant moves
+    otherwise than they predict, `Report.converged` is False, and a warning says so once.
 
     Raises `InvalidValueError` for plants that are continuous or not finalized, names that are not in the plant, and
     pairs with friction of their own.
@@ -63,7 +75,7 @@ class Friction(LeafSystem):
         k, states = len(self.patches), self.coupled.state_shape[0]
         sizes = {
             "bristles": states, "wrenches": 3 * k, "force": self._size, "owed": 3 * k, "twists": 3 * k, "loads": k,
-            "answers": k * (1 + 12 * k), "report": len(Report._fields),
+            "answers": k * (1 + 12 * k), "velocities": self._size, "report": len(Report._fields),
         }  # fmt: skip
         bounds = np.cumsum([0, *sizes.values()])
         self._parts = {name: slice(*ends) for name, ends in zip(sizes, itertools.pairwise(bounds), strict=True)}
@@ -88,11 +100,14 @@ class Friction(LeafSystem):
 
         What was connected to the plant's `applied_generalized_force` is added to the friction.
 
-        Raises `InvalidValueError` as the class does, and for inputs of the plant that are exported.
+        Raises `InvalidValueError` as the class does, for inputs of the plant that are exported, and for a plant that
+        has patch friction already.
         """
         validation.instance("builder", builder, DiagramBuilder, "a DiagramBuilder")
         friction = Friction(plant, scene_graph, patches)
         sources = _sources(builder, plant)
+        if _FORCE in sources and isinstance(sources[_FORCE].get_system(), Friction):
+            raise InvalidValueError("plant", "have no patch friction yet: give all patches in one call", "one with it")
         builder.AddSystem(friction)
         builder.Connect(plant.get_state_output_port(), friction.GetInputPort("state"))
         for name in friction._inputs:
@@ -113,8 +128,8 @@ class Friction(LeafSystem):
 
     def GetReport(self, context: Any) -> Report:
         """Return the statistics of the last step, from this system's context."""
-        passes, iterations, residual, misfit, converged = self._read(context, "report").tolist()
-        return Report(int(passes), int(iterations), residual, misfit, converged > 0.0)
+        passes, iterations, *sizes, converged = self._read(context, "report").tolist()
+        return Report(int(passes), int(iterations), *sizes, converged > 0.0)
 
     def get_generalized_force_output_port(self) -> Any:
         """Return the port to connect to the plant: friction plus the generalized forces that others apply `[nv]`."""
@@ -133,7 +148,7 @@ class Friction(LeafSystem):
         return self.GetOutputPort("loads")
 
     def get_report_output_port(self) -> Any:
-        """Return the numbers of `Report` `[5]`."""
+        """Return the numbers of `Report` `[6]`."""
         return self.GetOutputPort("report")
 
     # ------------------------------------------------------------------ a step
@@ -173,7 +188,19 @@ class Friction(LeafSystem):
         own = context.get_discrete_state_vector().value()
         before = (own[parts[name]] for name in ("bristles", "wrenches", "force", "owed", "answers"))
         asked = self._asking.step(applied, *before)
+        *report, converged = asked.report
+        surprise, last = self._surprise(state, own), own[parts["report"]][-2]
+        if min(surprise, last) > EXPECTED:
+            converged = 0.0
+            warnings.warn(f"the plant moves otherwise than predicted, by {surprise:.3g}: {_CHANGED}", stacklevel=2)
+        asked = asked._replace(report=(*report, surprise, converged))
         solution.set_value((applied + asked.force, np.concatenate(asked)))
+
+    def _surprise(self, state: np.ndarray, own: np.ndarray) -> float:
+        """Return how far the plant's velocities are from those predicted in the last step; 0 in the first one."""
+        if own[self._parts["report"]][0] == 0.0:
+            return 0.0
+        return float(abs(state[len(state) - self._size :] - own[self._parts["velocities"]]).max(initial=0.0))
 
     def _write_force(self, context: Any, output: Any) -> None:
         output.SetFromVector(self._solution.Eval(context)[0])
