@@ -184,3 +184,6 @@ def test_jax_agrees_with_the_derivatives_forwards():
             jax.grad(jax.grad(lambda v: motion(at[0], at[1], v).sum()))(0.08)
         with pytest.raises(InvalidValueError, match="mu must be > 0"):
             motion(-1.0, at[1], at[2])
+        for number in (0.0, -1.0):
+            with pytest.raises(InvalidValueError, match="mu must be > 0"):
+                jax.grad(lambda mu: motion(mu, at[1], at[2])[0])(number)

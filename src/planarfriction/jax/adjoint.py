@@ -62,16 +62,23 @@ def _shapes(*operands, operation, name: str, outer: int, kept: bool) -> list[Any
     return [ShapedArray((*lead, *shape[outer:]), dtype) for shape, dtype in found]
 
 
-def _apply(*operands, operation, name: str, outer: int, kept: bool) -> list[jax.Array]:
-    found = _shapes(*operands, operation=operation, name=name, outer=outer, kept=kept)
+def _on_host(operands, found, *, operation, name: str, outer: int, kept: bool) -> tuple[np.ndarray, ...]:
+    """Return the results, as arrays of NumPy of the shapes and types `found`."""
+    held, *numbers = _split([np.asarray(array) for array in operands], operation, name, kept)
+    numbers = Numbers(*([np.asarray(array, float) for array in each] for each in numbers))
+    results = operation.on_host(name, outer, held, numbers, kept)
+    return tuple(value.astype(of.dtype) for value, of in zip(results, found, strict=True))
 
-    def on_host(*arrays) -> tuple[np.ndarray, ...]:
-        held, *numbers = _split([np.asarray(array) for array in arrays], operation, name, kept)
-        numbers = Numbers(*([np.asarray(array, float) for array in each] for each in numbers))
-        results = operation.on_host(name, outer, held, numbers, kept)
-        return tuple(value.astype(of.dtype) for value, of in zip(results, found, strict=True))
 
-    return jax.pure_callback(on_host, [jax.ShapeDtypeStruct(of.shape, of.dtype) for of in found], *operands)
+def _now(*operands, **options) -> list[jax.Array]:
+    """Return the results for operands that are known, as outside of `jit`: errors are those of this library."""
+    return [jnp.asarray(result) for result in _on_host(operands, _shapes(*operands, **options), **options)]
+
+
+def _later(*operands, **options) -> list[jax.Array]:
+    found = _shapes(*operands, **options)
+    shapes = [jax.ShapeDtypeStruct(of.shape, of.dtype) for of in found]
+    return jax.pure_callback(lambda *arrays: _on_host(arrays, found, **options), shapes, *operands)
 
 
 def _batch(operands, axes, *, outer: int, **options):
@@ -150,9 +157,9 @@ def _sum_to(value: jax.Array, shape: tuple[int, ...]) -> jax.Array:
     return value.sum(axes, keepdims=True) if axes else value
 
 
-_host.def_impl(_apply)
+_host.def_impl(_now)
 _host.def_abstract_eval(_shapes)
-mlir.register_lowering(_host, mlir.lower_fun(_apply, multiple_results=True))
+mlir.register_lowering(_host, mlir.lower_fun(_later, multiple_results=True))
 batching.primitive_batchers[_host] = _batch
 ad.primitive_jvps[_host] = _jvp
 ad.primitive_transposes[_host] = _transpose
