@@ -119,9 +119,9 @@ class CoupledPatches(ByValue):
         """Shape of the state of all patches, `(states,)`."""
         return (int(self._bounds[-1]),)
 
-    def rest(self) -> np.ndarray:
-        """Return the state of all patches at rest, with relaxed bristles."""
-        return np.zeros(self.state_shape)
+    def rest(self, batch: int | Sequence[int] = ()) -> np.ndarray:
+        """Return the state of all patches at rest, with relaxed bristles, or of a `batch`: `[*batch, states]`."""
+        return np.zeros(validation.batched(batch, self.state_shape))
 
     def states(self, state: np.ndarray) -> list[np.ndarray]:
         """Return views of the state of each patch in `state` `[..., states]`, each in the shape that its model uses.

@@ -31,6 +31,9 @@ SI_UNITS = frozenset({"m", "s", "kg", "N", "rad", "Pa", "J", "W", "Hz"})
 MOST_NUMBERS = 30_000_000
 """Numbers of an array that is copied: 240 MB. A view of one number may be of any size."""
 
+_MOST_AXES = 32
+"""Axes that arrays of all front ends may have."""
+
 LONGEST_NAME = 100
 """Characters of a name."""
 
@@ -200,6 +203,16 @@ def count(name: str, value: Any, at_least: int = 1, at_most: int = 2**63 - 1) ->
     if result > at_most:
         raise InvalidValueError(name, f"be at most {at_most}", value)
     return int(result)
+
+
+def batched(batch: Any, inner: tuple[int, ...]) -> tuple[int, ...]:
+    """Return a shape with batch axes, an integer or a sequence of them, before those of `inner`, or raise."""
+    lengths = batch if isinstance(batch, (tuple, list)) else (batch,)
+    shape = *(count("batch", length, 0) for length in lengths), *inner
+    if len(shape) > _MOST_AXES or math.prod(shape) > MOST_NUMBERS:
+        rule = f"give at most {_MOST_AXES} axes and {MOST_NUMBERS} numbers"
+        raise InvalidValueError("batch", rule, f"shape {list(shape)}")
+    return shape
 
 
 def vector(name: str, value: Any, size: int) -> np.ndarray:

@@ -107,6 +107,7 @@ def test_without_arguments_the_help_is_shown(capsys, monkeypatch):
         (["run", "in-hand", "--t-end", "nan"], "--t-end must be finite"),
         (["run", "in-hand", "--rtol", "0"], "--rtol must be > 0"),
         (["run", "in-hand", "--rtol", "fast"], "--rtol"),
+        (["run", "in-hand", "--max-steps", "0"], "--max-steps must be an integer >= 1"),
         (["run", "in-hand", "--model", "simple"], "--model"),
         (["limit-surface", "--patch", "Line", "--pressure", "pad.csv"], "not be given together"),
         (["limit-surface", "--out", "surface.bmp"], "surface.bmp: a picture ends in .png"),

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.derivatives import SCENE_PARAMETERS, path, scene_sensitivities
-from planarfriction.errors import InvalidValueError
+from planarfriction.derivatives import SCENE_PARAMETERS, path, scene_gradient, scene_sensitivities
+from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.scenes import SolverOptions
 
 LAW = pf.LuGre(
@@ -159,6 +159,18 @@ def test_derivatives_end_where_a_slide_stops():
     distance = found.motion[-1, 3] - found.motion[0, 3]
     # v^2/(2 mu g), nearly: speed and spin fall together
     assert found.d_motion[-1, 3, 0] == pytest.approx(-distance, rel=0.02)
+
+
+def test_derivatives_end_after_max_steps_and_before_memory_does(monkeypatch):
+    scene, few = slide("ellipsoid"), SolverOptions(max_steps=25)
+    for derivatives_of in (lambda o: scene_sensitivities(scene, ("mu",), options=o),
+                           lambda o: scene_gradient(scene, lambda _, motion: motion, ("mu",), options=o)):  # fmt: skip
+        with pytest.raises(SolverError, match="max_steps steps were taken before the end: raise it"):
+            derivatives_of(few)
+        derivatives_of(SolverOptions(max_steps=100_000))
+    monkeypatch.setattr("planarfriction.derivatives.path.MOST_KEPT", 1000)
+    with pytest.raises(SolverError, match=r"the path has more than [0-9]+ steps"):
+        scene_gradient(scene, lambda _, motion: motion, ("mu",))
 
 
 def test_wrong_input_is_named():

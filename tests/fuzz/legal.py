@@ -85,7 +85,7 @@ def objects() -> dict[str, Any]:
         "surface": surface, "reference": surface, "few": PATCH, "slide": pf.identify.Slide(time, pose), "log": log,
         "contacts": [pf.Contact(model, 1.0)], "beside": pf.LimitSurfaceEllipsoid(PATCH),
         "member": LAW, "method": pf.solvers.RODAS3, "body": pf.Body(1.0, 0.01), "progress": lambda *_: None,
-        "max_steps": 100_000,
+        "max_steps": 100_000, "batch": (2, 3),
         "make": lambda: None, "words": "words",
         # numbers
         "mass": 1.0, "inertia": 0.01, "radius": 0.01, "width": 0.02, "height": 0.01, "length": 0.02, "area": 1e-6,

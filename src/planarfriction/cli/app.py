@@ -91,6 +91,7 @@ def app() -> None:
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
 @click.option("--t-end", type=float, help="Duration in s. Default: the scene's.")
 @click.option("--rtol", type=float, help="Relative tolerance of the solver. Default: the scene's.")
+@click.option("--max-steps", type=int, help="Largest number of steps of the solver. Default: 50 million.")
 @click.option(
     "--set", "settings", metavar="PATH=VALUE", multiple=True, help="Change a value of the scene; may be repeated."
 )

@@ -198,6 +198,7 @@ def run(
     settings: Sequence[str],
     rtol: float | None,
     t_end: float | None,
+    max_steps: int | None,
     folder: Path | None,
     pictures: Sequence[str],
     **options: Any,
@@ -207,6 +208,8 @@ def run(
     limits: dict[str, Any] = {} if t_end is None else {"t_end": t_end}
     if rtol is not None:
         limits["rtol"] = validation.positive("--rtol", rtol)
+    if max_steps is not None:
+        limits["max_steps"] = validation.count("--max-steps", max_steps)
     if folder is not None:
         make_folder(folder)
     solutions: dict[str, pf.Solution] = {}

@@ -37,6 +37,9 @@ NUMBERS = 4e6
 LEAST_NODES, MOST_NODES = 16, 4096
 """Least number of ends of steps that a part of the path holds, and most where all parts stay in memory."""
 
+MOST_KEPT = 250_000_000
+"""Largest number of numbers of the states along a path that stays in memory, with as many of their rates: 4 GB."""
+
 
 @dataclass(frozen=True, eq=False)
 class SceneDerivatives(ByValue):
@@ -76,15 +79,16 @@ class MotionPath:
         """Relative accuracy of each step of the derivatives."""
         wrenches, loads = np.empty((self.instants, contacts, 3)), np.empty((self.instants, contacts))
         self._output = Output(plan.times, np.empty((self.instants, 6)), wrenches, loads, np.empty((0, 0)))
+        self._limit = plan.max_steps, "max_steps steps were taken before the end: raise it, or check the scene"
         self.reached = 0
         """Number of instants that have been recorded."""
 
     def steps(self, most: float = np.inf) -> Iterator[tuple[System, Path]]:
         """Simulate; yield the ends of the next steps, at most `most`, in arrays that are used again afterwards.
 
-        Raises SolverError if the solver fails.
+        Raises SolverError if the solver fails, or takes too many steps.
         """
-        now, outcome, n = start_of(self.batches.state), rosenbrock.DONE, len(self.scale)
+        now, outcome, n, (left, too_many) = start_of(self.batches.state), rosenbrock.DONE, len(self.scale), self._limit
         room = paths.path_for(max(int(min(NUMBERS / n, most)), LEAST_NODES), n)
         for system in self.batches:
             run = rosenbrock.Run(system, RODAS4, self._output, now, rtol=self._rtol, atol=self._atol)
@@ -92,6 +96,9 @@ class MotionPath:
             while outcome == rosenbrock.PAUSED:
                 nodes, outcome = paths.follow(run.address, room)
                 self.reached = int(now.cursor[1])
+                left -= nodes - 1
+                if left < 0:
+                    raise SolverError(too_many)
                 yield system, Path(*(each[:nodes] for each in room))
             del system, run
             if outcome != rosenbrock.DONE:
@@ -129,6 +136,8 @@ class KeptMotion(MotionPath):
 
     def __init__(self, scene: Scene, inputs: SceneInputs, options: SolverOptions | None) -> None:
         super().__init__(scene, inputs, options)
+        if (most := MOST_KEPT // len(self.scale)) < self._limit[0]:
+            self._limit = most, f"the path has more than {most} steps, too many to keep: lower t_end, or raise rtol"
         steps = self.steps(MOST_NODES)
         self._parts = [(system, Path(*(each.copy() for each in path))) for system, path in steps]
 

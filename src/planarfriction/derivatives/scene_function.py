@@ -40,7 +40,7 @@ class SceneFunction:
         parameters: Sequence[str] = (),
         signals: Mapping[str, Any] | None = None,
         initial: Sequence[str] = (),
-        **options: float | None,
+        **options: Any,
     ) -> None:
         self._parameters = validation.choices("parameters", parameters, FACTORS)
         self._knots = {name: validation.array(f"knots of {name}", t, (None,)) for name, t in (signals or {}).items()}

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar, Self
 
 import jax
 import jax.numpy as jnp
 
+from planarfriction import validation
 from planarfriction.derivatives.parameters import Packed
 from planarfriction.errors import InvalidValueError
 from planarfriction.jax.namespace import xp
@@ -52,9 +54,9 @@ class FrictionPytree(TensorModel):
         vars(model).update(zip(cls.leaves, leaves, strict=True), elasto_plastic=elasto_plastic)
         return model
 
-    def rest(self) -> jax.Array:
-        """Return the state of a contact at rest, `[*state_shape]`."""
-        return jnp.zeros(self.state_shape, jnp.result_type(self.parameters.sigma_0))
+    def rest(self, batch: int | Sequence[int] = ()) -> jax.Array:
+        """Return the state of a contact at rest, or of a `batch`: `[*batch, *state_shape]`."""
+        return jnp.zeros(validation.batched(batch, self.state_shape), jnp.result_type(self.parameters.sigma_0))
 
     def rollout(self, state, twist, normal_force, dt, *, parameters: Any = None) -> tuple[jax.Array, jax.Array]:
         """Return the last state and the wrenches `[..., T, 3]` of steps, each an operation of JAX, in `lax.scan`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import jax
@@ -16,9 +17,9 @@ from planarfriction.tensors.inputs import rollout_inputs
 from planarfriction.tensors.scenes import simulator
 
 
-def rest(model: FrictionPytree) -> jax.Array:
-    """Return the state of a contact at rest, with relaxed bristles."""
-    return model.rest()
+def rest(model: FrictionPytree, batch: int | Sequence[int] = ()) -> jax.Array:
+    """Return the state of a contact at rest, with relaxed bristles, or of a `batch`: `[*batch, *state_shape]`."""
+    return model.rest(batch)
 
 
 def rate(model: FrictionPytree, state, twist, normal_force) -> jax.Array:

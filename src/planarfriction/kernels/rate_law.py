@@ -8,7 +8,7 @@ the start and `g = 1 - 1/sqrt(2)`,
 It is of order 2 and L-stable: stiff bristles are damped to 0.5 % in a step where nothing holds them back. A bristle
 that is within its largest deflection never leaves it, so `p` and `new` are brought back there, and bristles stay in
 bounds for any dt; where that holds back p, a stiff bristle keeps up to two thirds of its deflection with the opposite
-sign. Steps of Bouc-Wen laws were passive in 10^6 random steps: a bristle stored no more than the work done on it.
+sign.
 """
 
 from __future__ import annotations

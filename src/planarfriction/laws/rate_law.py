@@ -20,13 +20,15 @@ from planarfriction.laws.base import FrictionLaw
 
 __all__ = ["RateLaw", "dot", "norm", "plus", "ratio", "times"]
 
-dot: Callable[[Any, Any], Any] = vectors.dot
+_vectors: Any = vectors  # compiled functions have types of the compiler
+
+dot: Callable[[Any, Any], Any] = _vectors.dot
 """Return `a . b` (`dot(a, b)`)."""
-norm: Callable[[Any], Any] = vectors.norm
+norm: Callable[[Any], Any] = _vectors.norm
 """Return `|a|`, whose slope at zero is zero."""
-plus: Callable[[Any, Any, Any], Any] = vectors.plus
+plus: Callable[[Any, Any, Any], Any] = _vectors.plus
 """Return `a + c b` (`plus(a, c, b)`)."""
-times: Callable[[Any, Any], Any] = vectors.times
+times: Callable[[Any, Any], Any] = _vectors.times
 """Return `c a` (`times(c, a)`)."""
 ratio: Callable[[Any, Any], Any] = rules.ratio
 """Return `x/y` for y > 0; 0 at 0 (`ratio(x, y)`)."""

@@ -80,9 +80,12 @@ class FrictionModel(ByValue):
         """Shape of the state of one contact."""
         raise NotImplementedError
 
-    def rest(self) -> np.ndarray:
-        """Return the state of a contact at rest, with relaxed bristles."""
-        return np.zeros(self.state_shape)
+    def rest(self, batch: int | Sequence[int] = ()) -> np.ndarray:
+        """Return the state of a contact at rest, with relaxed bristles, or of a `batch`: `[*batch, *state_shape]`.
+
+        Raises InvalidValueError unless `batch` is an integer >= 0 or a sequence of them.
+        """
+        return np.zeros(validation.batched(batch, self.state_shape))
 
     def with_law(self, law: FrictionLaw) -> Self:
         """Return the model with another law; both share what was computed of the patch alone."""

@@ -11,10 +11,13 @@ from planarfriction import validation
 from planarfriction.described import described
 from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
-from planarfriction.scenes.signal import SAME_TIME, sample_count
+from planarfriction.scenes.signal import MOST_SAMPLES, SAME_TIME, sample_count
 
 if TYPE_CHECKING:
     from planarfriction.scenes.scene import Scene
+
+MAX_STEPS = 5 * MOST_SAMPLES
+"""Steps that a run tries at most by default: five for each sample of the longest signal, a minute with few states."""
 
 
 class Plan(NamedTuple):
@@ -28,6 +31,8 @@ class Plan(NamedTuple):
     """Relative tolerance [-]."""
     atol: float
     """Absolute tolerance, as a share of the natural scales [-]."""
+    max_steps: int
+    """Largest number of steps."""
 
 
 @described
@@ -35,7 +40,7 @@ class Plan(NamedTuple):
 class SolverOptions(Checked):
     """Options of the simulation of a scene; None takes those of the scene, or of the function that gets them.
 
-    Raises InvalidValueError for numbers that are not > 0.
+    Raises InvalidValueError for numbers that are not > 0, and a number of steps that is no integer.
     """
 
     t_end: float | None = checked(validation.positive, default=None)
@@ -46,6 +51,8 @@ class SolverOptions(Checked):
     """Tolerance as a share of the natural scales [-], > 0 (see `simulate`); it follows `rtol` by default."""
     save_every: float | None = checked(validation.positive, default=None)
     """Recording interval [s]; the end is always recorded."""
+    max_steps: int = checked(validation.count, default=MAX_STEPS)
+    """Largest number of steps: whatever the scene asks for, a run ends."""
 
     def plan(self, scene: Scene, rtol: float | None = None) -> Plan:
         """Return what the options say for a scene; with `rtol` given, both tolerances are that by default.
@@ -59,7 +66,7 @@ class SolverOptions(Checked):
         relative = default if self.rtol is None else self.rtol
         absolute = least * (relative / default) if self.atol is None else self.atol
         every = scene.save_every if self.save_every is None else self.save_every
-        return Plan(end, recording_times(end, every), relative, absolute)
+        return Plan(end, recording_times(end, every), relative, absolute, self.max_steps)
 
 
 def recording_times(end: float, every: float) -> np.ndarray:

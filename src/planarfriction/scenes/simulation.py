@@ -12,10 +12,9 @@ from planarfriction.compiler.notice import said_when_compiling
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
 from planarfriction.kernels.integration import Method, Output
 from planarfriction.scenes.following import centres_of_pressure
-from planarfriction.scenes.options import SolverOptions
+from planarfriction.scenes.options import MAX_STEPS, SolverOptions
 from planarfriction.scenes.packing import SegmentBatches
 from planarfriction.scenes.scene import Scene
-from planarfriction.scenes.signal import MOST_SAMPLES
 from planarfriction.scenes.solution import History, Solution
 from planarfriction.solvers import RODAS4, integrate
 
@@ -24,9 +23,6 @@ BRISTLES = ("none", "all")
 
 MOST_NUMBERS = 10**9
 """Numbers of bristles that a run records at most: 8 GB."""
-
-MAX_STEPS = 5 * MOST_SAMPLES
-"""Steps that a run tries at most by default: five for each sample of the longest signal, a minute with few states."""
 
 _BODY = {"vx": "m/s", "vy": "m/s", "omega": "rad/s", "x": "m", "y": "m", "theta": "rad"}
 _WRENCH = {"fx": "N", "fy": "N", "tau": "N m"}
@@ -100,18 +96,17 @@ def simulate(
     """
     if not isinstance(scene, Scene):
         raise InvalidValueError("scene", "be a Scene", type(scene).__name__)
-    plan = SolverOptions(t_end, rtol, atol, save_every).plan(scene)
+    plan = SolverOptions(t_end, rtol, atol, save_every, max_steps).plan(scene)
     validation.choice("bristles", bristles, BRISTLES)
     if not isinstance(method, Method):
         raise InvalidValueError("method", "be solvers.RODAS4 or solvers.RODAS3", method)
     if not (progress is None or callable(progress)):
         raise InvalidValueError("progress", "be a function of the simulated time, or None", progress)
-    max_steps = validation.count("max_steps", max_steps)
     with said_when_compiling(silent=progress is not None):
         batches = SegmentBatches(scene, plan.end, times=plan.times)
         output = _output(scene, plan.times, batches, bristles)
         scales = plan.atol * batches.state_scale
-        limits = {"rtol": plan.rtol, "atol": scales, "max_steps": max_steps}
+        limits = {"rtol": plan.rtol, "atol": scales, "max_steps": plan.max_steps}
         run = integrate(batches, output, batches.state, method=method, progress=progress, **limits)
     cost = replace(run.statistics, compile_time=run.statistics.compile_time + batches.loading)
     solution = Solution(_histories(scene, batches, run.output), cost, run.status, run.message, scene)

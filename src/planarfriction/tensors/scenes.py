@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from planarfriction.derivatives.scene_function import SceneFunction
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
+from planarfriction.scenes.options import MAX_STEPS
 from planarfriction.scenes.scene import Scene
 from planarfriction.tensors.inputs import broadcast, finite, non_negative, positive, shaped
 
@@ -37,6 +38,7 @@ def simulator(xp: Any, call: Callable[..., Sequence[Any]]) -> Callable[..., Scen
         rtol: float = 1e-9,
         atol: float | None = None,
         save_every: float | None = None,
+        max_steps: int = MAX_STEPS,
     ) -> SceneMotion:
         """Simulate a scene as a differentiable function of tensors of PyTorch or arrays of JAX.
 
@@ -52,7 +54,7 @@ def simulator(xp: Any, call: Callable[..., Sequence[Any]]) -> Callable[..., Scen
         Raises `InvalidValueError` for names and numbers out of range, and `SolverError` if the solver fails; inside
         `jax.jit` these end in an error of JAX whose last line names them.
         """
-        options = {"t_end": t_end, "rtol": rtol, "atol": atol, "save_every": save_every}
+        options = {"t_end": t_end, "rtol": rtol, "atol": atol, "save_every": save_every, "max_steps": max_steps}
         function, numbers = scene_function(xp, scene, parameters, signals, initial, **options)
         motion, wrenches = call(function, numbers)
         return SceneMotion(xp.from_numpy(function.time, numbers), motion, wrenches)

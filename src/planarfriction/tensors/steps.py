@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
 
@@ -108,8 +108,8 @@ class TensorModel:
         """Shape of the state of one contact."""
         return (3,)
 
-    def rest(self) -> Any:
-        """Return the state of a contact at rest, `[*state_shape]`."""
+    def rest(self, batch: int | Sequence[int] = ()) -> Any:
+        """Return the state of a contact at rest, or of a `batch`: `[*batch, *state_shape]`."""
         raise NotImplementedError
 
     def rate(self, state: Any, twist: Any, normal_force: Any, *, moments: Any = None, parameters: Any = None) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import torch
@@ -98,9 +98,9 @@ class FrictionModule(TensorModel, nn.Module):
 
     # ------------------------------------------------------------------ evaluation
 
-    def rest(self, *batch: int) -> Tensor:
-        """Return the state of contacts at rest, `[*batch, *state_shape]`."""
-        return self.physical.values.new_zeros((*batch, *self.state_shape))
+    def rest(self, batch: int | Sequence[int] = ()) -> Tensor:
+        """Return the state of a contact at rest, or of a `batch`: `[*batch, *state_shape]`."""
+        return self.physical.values.new_zeros(validation.batched(batch, self.state_shape))
 
     def forward(
         self,

@@ -128,8 +128,8 @@ class Friction(LeafSystem):
 
     def GetReport(self, context: Any) -> Report:
         """Return the statistics of the last step, from this system's context."""
-        passes, iterations, *sizes, converged = self._read(context, "report").tolist()
-        return Report(int(passes), int(iterations), *sizes, converged > 0.0)
+        passes, iterations, residual, misfit, surprise, converged = self._read(context, "report").tolist()
+        return Report(int(passes), int(iterations), residual, misfit, surprise, converged > 0.0)
 
     def get_generalized_force_output_port(self) -> Any:
         """Return the port to connect to the plant: friction plus the generalized forces that others apply `[nv]`."""
