@@ -110,6 +110,18 @@ def test_the_frame_of_the_contact_does_not_matter():
     np.testing.assert_allclose(there, np.hstack([one.pressure_x, one.pressure_y]), atol=1e-8)
 
 
+@pytest.mark.parametrize("height", [0.005, 0.05])
+def test_wrenches_are_those_of_the_model_under_the_moments(height):
+    """Where all cells press, and where some lift: bristles, twist and moments of the data give its wrench."""
+    solution = pf.simulate(slide(MODELS["cells"], (0.4, 0.2, 3.0), 0.04, height=height), bristles="all")
+    data, twist = solution.data.isel(time=-1), solution.contact_twist("contact")[-1]
+    load, x, y = (float(data[name][0]) for name in ("normal_force", "pressure_x", "pressure_y"))
+    moments = (load * y, -load * x)
+    assert (FACE.weights(load, moments) == 0.0).any() == (height > 0.01)
+    wrench = MODELS["cells"].wrench(data.bristles_contact.values, twist, load, moments=moments)
+    np.testing.assert_allclose([float(data[name][0]) for name in ("fx", "fy", "tau")], wrench, rtol=1e-6)
+
+
 @pytest.mark.parametrize("name", MODELS)
 def test_friction_takes_energy_while_the_pressure_moves(name):
     """Driven back and forth, beyond the kern and back, friction gives back no more than bristles store."""
