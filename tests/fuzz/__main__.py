@@ -19,6 +19,7 @@ ROUND = 10
 def main(minutes: float) -> int:
     """Attack, print the counts, and return how many attacks found something."""
     matplotlib.use("Agg")
+    sys.path.append(str(Path(__file__).parents[2]))  # what tests share
     for path in sorted(Path(__file__).parent.glob("test_fuzz_*.py")):
         importlib.import_module(path.stem)
     end, found, rounds = time.monotonic() + 60.0 * minutes, {}, 0
