@@ -120,3 +120,27 @@ def test_a_box_tips_over_the_edge_of_a_table_as_with_mujocos_own_contacts():
         ends.append((d.qvel[0], d.qvel[4]))
     assert ends[0] == pytest.approx(ends[1], rel=0.1)
     assert ends[0][0] == pytest.approx(ends[1][0], rel=0.05)
+
+
+@pytest.mark.parametrize("beyond", [0.0, 0.035])
+def test_a_patch_over_the_edge_acts_with_the_part_that_is_borne(beyond):
+    """Spun in place, the box is braked as by the cells on the table, pressed by a plane with their centre below it."""
+    edge = '<geom name="table" type="box" size="0.3 0.3 0.05" pos="0 0 -0.05"/>'
+    slides = "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1"))
+    turns = '<joint axis="1 0 0"/><joint axis="0 1 0"/><joint axis="0 0 1"/>'
+    _, d, friction = made('<geom name="box" type="box" size="0.05 0.03 0.02" mass="0.3"/>', edge, slides + turns)
+    d.qpos[0] = 0.25 + beyond
+    for _ in range(100):
+        friction.step(d)
+    d.qvel[5] = 5.0
+    for _ in range(3):
+        friction.step(d)
+    patch = PLATE.model().patch.refined(4)
+    (x, y), load = patch.positions.T, 0.3 * GRAVITY
+    on = x < 0.05 - beyond
+    assert on.all() == (beyond == 0.0)
+    cells = type(patch).points(patch.positions[on], patch.weights()[on])
+    pressed = load * cells.weights(1.0, moments=(0.0, 0.0))
+    torque = PLATE.mu * (pressed * np.hypot(x[on], y[on])).sum()
+    # a cell counts where its centre does: the edge is up to half a cell off
+    assert friction.wrenches(d)[0, 2] == pytest.approx(-torque, rel=0.05)

@@ -32,6 +32,9 @@ class Problem(NamedTuple):
     """W_0, [3k]."""
     moments: Doubles
     """Moments of the normal forces at W_0, about the patches' origins, [2k] (see `following`)."""
+    support: Doubles
+    """Rectangle that bears each patch whose pressure follows: centre, cosine and sine of its first axis, half widths,
+    and width of the margin over which cells leave it, [7k]; half widths of 0 for all of it."""
     follows: Doubles
     """1 of patches whose pressure follows these, -1 of those that keep that of the last solution, else 0, [k]."""
     state: Doubles
@@ -115,7 +118,7 @@ def layout(patches: int, pieces: int, states: int, points: int, copies: int) -> 
     shapes = dict.fromkeys(Problem._fields, n)
     shapes |= dict.fromkeys(("dt", "tolerance", "most", "again", "iterations", "residual", "converged"), 1)
     shapes |= dict.fromkeys(("free_load", "load", "load_0", "best_load", "kept_load", "follows"), k)
-    shapes |= dict.fromkeys(("moments", "moved"), 2 * k) | {"weights": points, "copies": copies}
+    shapes |= dict.fromkeys(("moments", "moved"), 2 * k) | {"weights": points, "copies": copies, "support": 7 * patches}
     shapes |= dict.fromkeys(("records", "shares", "acting", "acting_shares"), pieces)
     shapes |= dict.fromkeys(("state", "new"), states)
     shapes |= dict.fromkeys(("unit_slopes", "slopes"), 9 * k) | dict.fromkeys(("response", "matrix"), n * n)

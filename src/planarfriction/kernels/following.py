@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, Integers, at, doubles, integers
 from planarfriction.kernels.tilt import centre, tilt
@@ -29,20 +30,42 @@ class Followers(NamedTuple):
 
 
 @kernel
+def _borne(x, y, w, n, support, out):
+    """Write the weights that lie on the rectangle of the support, with their total unchanged; all if none does."""
+    for i in range(n):
+        out[i] = w[i]
+    if not support[4] > 0.0:
+        return
+    total, borne, far = 0.0, 0.0, support[6]
+    for i in range(n):
+        dx, dy, share = x[i] - support[0], y[i] - support[1], 1.0
+        for half, off in (
+            (support[4], abs(support[2] * dx + support[3] * dy)),
+            (support[5], abs(support[2] * dy - support[3] * dx)),
+        ):
+            share *= xp.minimum(xp.maximum(0.5 + (half - off) / far, 0.0), 1.0)
+        total, borne, out[i] = total + w[i], borne + w[i] * share, w[i] * share
+    for i in range(n):
+        out[i] = out[i] * (total / borne) if borne > 0.0 else w[i]
+
+
+@kernel
 def _press(own, p, problem, k, n, first):
     """Write the shares of n points of patch k, which begin at `first`, and how far its pressure has to move beyond."""
     x, y, c = at(own.followers.x, first), at(own.followers.y, first), own.followers.pieces[k]
     cx, cy = centre(p.moments[2 * k], p.moments[2 * k + 1], p.free_load[k])
     words, out = own.followers.words[k], at(p.weights, first)
     if words == 0:
-        tilt(x, y, at(p.shares, c), n, cx, cy, out)
+        _borne(x, y, at(p.shares, c), n, at(p.support, 7 * k), out)
+        tilt(x, y, out, n, cx, cy, out)
         for i in range(n):
             p.acting_shares[c + i] = out[i]
             cx, cy = cx - out[i] * x[i], cy - out[i] * y[i]
         p.moved[2 * k], p.moved[2 * k + 1] = cx, cy
     elif p.records[c] != 0:
         record, copied = integers(p.records[c]), 0
-        tilt(x, y, doubles(record[words - 1]), n, cx, cy, out)
+        _borne(x, y, doubles(record[words - 1]), n, at(p.support, 7 * k), out)
+        tilt(x, y, out, n, cx, cy, out)
         for j in range(k):
             copied += own.followers.words[j]
         target = at(p.copies, copied)

@@ -162,7 +162,7 @@ def tilt(x, y, w, n, cx, cy, out):
     """Write the weights of n cells at x, y, of weights w, with their centre of pressure at (cx, cy) if cells reach it.
 
     A centre beyond all cells comes to the nearest point that they reach: the load goes to an edge, or to one cell. The
-    total stays. Cells without weight get none.
+    total stays. Cells without weight get none. `out` may be w.
     """
     total, found = 0.0, 0.0
     for i in range(n):

@@ -203,11 +203,20 @@ class Friction:
             scratch_layout(packed.words, k, self.m.nv),
         )
         chosen = [
-            (each.site, each.own, each.other, *reversed(each.bodies), each.pair, each.at_contact, each.has_faces)
+            (
+                each.site,
+                each.own,
+                each.other,
+                *reversed(each.bodies),
+                each.pair,
+                each.at_contact,
+                each.has_faces,
+                each.on_box,
+            )
             for each in self.placed
         ]
         columns = np.ascontiguousarray(np.array(chosen, np.int64).T)
-        names = ("sites", "own", "other", "own_bodies", "other_bodies", "pairs", "at_contact", "faces")
+        names = ("sites", "own", "other", "own_bodies", "other_bodies", "pairs", "at_contact", "faces", "boxes")
         joints = np.flatnonzero(self.m.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE))
         free = np.array([joints, self.m.jnt_dofadr[joints]], np.int64)
         extents = np.array([each.extent() for each in self.placed])

@@ -31,6 +31,10 @@ CENTRES = ("auto", "site", "contact")
 
 PRESSURES = ("auto", "follows", "fixed")
 
+EDGE = 0.01
+"""Displacement across the edge of a box in which a cell loses its load, in largest distances of cells from the origin:
+less than the distance of the outermost centres from the rim of a patch, so that a face is borne to its rim."""
+
 _ROUND = {int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("SPHERE", "CAPSULE", "ELLIPSOID")}
 """Geoms that touch in points, not faces."""
 
@@ -156,6 +160,7 @@ class Placed:
         curved = bool(_ROUND.intersection(kinds)) or self._on_curved_side(m)
         self.at_contact = patch.centre == "contact" or (patch.centre == "auto" and curved)
         """True if the origin follows the contact forces."""
+        self.on_box = int(m.geom_type[self.other]) == _BOX
         own = int(m.geom_type[self.own])
         self.has_faces = own != _PLANE and own not in _ROUND and not self._on_curved_side(m)
         """True if the sides of the geom on the site's body can be told apart."""
@@ -204,10 +209,11 @@ class Placed:
         return d.site_xpos[self.site] + turned @ centre, np.array([x, np.cross(normal, x), normal])
 
     def extent(self) -> tuple[float, ...]:
-        """Return least and largest x and y of the patch and its largest distance from its origin [m]."""
+        """Return least and largest x and y of the patch, its largest distance from its origin, its edge's width [m]."""
         patch = self.patch.model.patch
         (x, y), half = patch.positions.T, 0.5 * math.sqrt(patch.areas.max())
-        return x.min() - half, x.max() + half, y.min() - half, y.max() + half, float(np.hypot(x, y).max()) + half
+        far = float(np.hypot(x, y).max()) + half
+        return x.min() - half, x.max() + half, y.min() - half, y.max() + half, far, EDGE * far
 
     def fault(self, number: int) -> str:
         """Return a line about a patch that does not lie in its contact."""

@@ -130,7 +130,7 @@ def _disc(work: Work) -> Numbers:
 def _in_hand(work: Work) -> Numbers:
     ways: dict[str, Any] = {name: (way, None) for name, way in NATIVE.items()}
     ways |= {name: (None, kind) for name, kind in runs.KINDS.items()}
-    loads: Any = (2,) if work.quick else (1, 2)
+    loads: Any = (1,) if work.quick else (1, 2)
     jobs = {
         f"load {load}": {name: partial(runs.in_hand, way, load, kind) for name, (way, kind) in ways.items()}
         for load in loads

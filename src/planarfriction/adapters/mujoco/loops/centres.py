@@ -69,7 +69,7 @@ def _move(own, d, s, nefc, p, guess, dx, dy):
 @kernel
 def _fault(own, d, s, p, x, y):
     """Return the fault of patch p, with the centre of its contact forces at x, y in its frame."""
-    frame, site, extent = at(s.frames, 6 * p), integers(own.sites)[p], at(doubles(own.extents), 5 * p)
+    frame, site, extent = at(s.frames, 6 * p), integers(own.sites)[p], at(doubles(own.extents), 6 * p)
     normal, faces = axes(own, d, frame, site)[2], integers(own.faces)[p] != 0
     if integers(own.at_contact)[p] == 0:
         slack = MARGIN * extent[4] + s.depths[2 * p + 1]
@@ -86,8 +86,32 @@ def _fault(own, d, s, p, x, y):
 
 
 @kernel
-def follow_centres(own, m, d, s, nefc, radius, guess, kept):
-    """Move origins towards the centres of the contact forces, remember them, and note a patch that is misplaced."""
+def _support(own, m, d, s, p, support):
+    """Write the face of the other geom, if it is a box, into the frame of patch p; none if they meet at an edge."""
+    frame, other = at(s.frames, 6 * p), integers(own.other)[p]
+    support[4] = 0.0
+    if integers(own.boxes)[p] == 0:
+        return
+    x, y, normal = axes(own, d, frame, integers(own.sites)[p])
+    turned = at(doubles(integers(d + own.data.geom_xmat)[0]), 9 * other)
+    half = at(doubles(integers(m + own.model.geom_size)[0]), 3 * other)
+    away = plus(
+        three(at(doubles(integers(d + own.data.geom_xpos)[0]), 3 * other)), -1.0, three(at(s.frames, 6 * p + 3))
+    )
+    for k in range(3):
+        if dot(normal, (turned[k], turned[3 + k], turned[6 + k])) ** 2 > 1.0 - MARGIN**2:
+            i, j = (k + 1) % 3, (k + 2) % 3
+            first = turned[i], turned[3 + i], turned[6 + i]
+            support[0], support[1], support[2], support[3] = dot(x, away), dot(y, away), dot(x, first), dot(y, first)
+            support[4], support[5], support[6] = half[i], half[j], doubles(own.extents)[6 * p + 5]
+
+
+@kernel
+def follow_centres(own, m, d, s, nefc, radius, problem, kept):
+    """Move origins towards the centres of the contact forces, remember them, and note a patch that is misplaced.
+
+    Write the faces that bear the patches.
+    """
     kept.misplaced[0], dt = 0.0, doubles(m + own.model.timestep)[0]
     for p in range(own.count):
         held, centre, site = at(kept.held, 3 * p), at(kept.centre, 3 * p), integers(own.sites)[p]
@@ -100,9 +124,11 @@ def follow_centres(own, m, d, s, nefc, radius, guess, kept):
             if fault != 0:
                 kept.misplaced[0] = FAULTS * p + fault
         if integers(own.at_contact)[p] == 0:
+            _support(own, m, d, s, p, at(problem.support, 7 * p))
             continue
         share = 1.0 if square(three(held)) == 0.0 else _share(own, d, s, p, radius[p], dt)
-        _move(own, d, s, nefc, p, at(guess, 3 * p), share * x, share * y)
+        _move(own, d, s, nefc, p, at(problem.guess, 3 * p), share * x, share * y)
+        _support(own, m, d, s, p, at(problem.support, 7 * p))
         turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
         place = three(at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site))
         away = plus(three(at(s.frames, 6 * p + 3)), -1.0, place)

@@ -17,7 +17,8 @@ def _integers(name: str, fields: str) -> Any:
 
 ModelOffsets = _integers(
     "ModelOffsets",
-    "nv nuserdata timestep integrator disableflags enableflags noslip_iterations dof_damping pair_dim pair_solref",
+    "nv nuserdata timestep integrator disableflags enableflags noslip_iterations dof_damping pair_dim pair_solref "
+    "geom_size",
 )
 """Offsets of `mjModel`."""
 
@@ -25,7 +26,7 @@ DataOffsets = _integers(
     "DataOffsets",
     "time ncon nefc contact efc_type efc_J efc_J_rownnz efc_J_rowadr efc_J_colind efc_D efc_R efc_frictionloss "
     "efc_aref efc_state efc_force qvel qacc qacc_warmstart qfrc_passive qDeriv userdata site_xpos site_xmat "
-    "geom_xpos",
+    "geom_xpos geom_xmat",
 )
 """Offsets of `mjData`."""
 
@@ -194,8 +195,11 @@ class Host(NamedTuple):
     """Address of flags: 1 where the origin is at the centre of the contact forces."""
     faces: int
     """Address of flags: 1 where a side of the geom on the site's body, and an axis on it, can be told from others."""
+    boxes: int
+    """Address of flags: 1 where the other geom is a box, whose faces bear patches as far as they go."""
     extents: int
-    """Address of least and largest x and y of each patch and of its largest distance from the origin, [k, 5] [m]."""
+    """Address of least and largest x and y of each patch, its largest distance from the origin, and the width of a
+    cell, [k, 6] [m]."""
     free_count: int
     """Number of free joints."""
     free_joints: int

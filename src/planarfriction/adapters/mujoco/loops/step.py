@@ -245,7 +245,7 @@ def plan(place_of_host, m, d):
         _apply(own, d, problem.guess)
         call_c(host.functions.mj_fwdActuation, (m, d))
         _accelerate(host, m, d)
-        follow_centres(host, m, d, s, nefc, patches.radius, problem.guess, kept)
+        follow_centres(host, m, d, s, nefc, patches.radius, problem, kept)
         _copy(problem.guess, problem.wrench, 3 * host.count)
         iterations, passes = _solve(own, patches, m, d, nefc)
         _remember(own, iterations, passes)
