@@ -37,6 +37,7 @@ HEAVY = (
     "scipy",
     "shapely",
     "torch",
+    "warp",
     "xarray",
 )
 """Packages that `import planarfriction` must not load."""
@@ -48,6 +49,7 @@ HOMES = {
     "rich": ("cli",),
     "click": ("cli", "planarfriction_studies.commands", "planarfriction_explorer.command"),
     "torch": ("torch",),
+    "warp": ("warp",),
     "mujoco": ("adapters",),
     "pydrake": ("adapters",),
     "jax": ("jax",),

@@ -12,6 +12,7 @@ from functools import partial
 from planarfriction import validation
 from planarfriction.errors import MissingExtraError
 from planarfriction.limit_surface import LimitSurfaceExact, LimitSurfaceTable
+from planarfriction.models import ReducedModel, ReducedModelPublished
 from planarfriction_studies.bench import gradients, simulator_costs, steps, whole_runs, workflows
 from planarfriction_studies.bench.measurement import Measurement
 
@@ -38,6 +39,8 @@ BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
     "step.reduced.call": steps.reduced_call,
     "step.reduced.slopes": steps.reduced_slopes,
     "step.reduced.four": steps.reduced_four,
+    "warp.step.reduced": partial(steps.warp_step, kind=ReducedModel),
+    "warp.step.published": partial(steps.warp_step, kind=ReducedModelPublished),
     "coupled.four_feet.call": steps.coupled,
     "coupled.four_feet.batch": partial(steps.coupled, environments=1000),
     "mujoco.tray.1": partial(simulator_costs.mujoco_tray, blocks=1),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from typing import Any
 
@@ -172,3 +173,22 @@ def numpy_table(patch: ContactPatch, segments: int = 20) -> np.ndarray:
                 scale = share * weights / np.hypot(dx, dy)
                 nodes[i, j] += -(scale @ dy), scale @ dx, scale @ (x * dx + y * dy) / radius
     return nodes
+
+
+def warp_step(full: bool, kind: type[ReducedModel] | type[ReducedModelPublished]) -> Measurement:
+    """Measure a step of 1000 contacts in a kernel of Warp, single precision, on Warp's CPU device.
+
+    Raises MissingExtraError without Warp.
+    """
+    front: Any = importlib.import_module("planarfriction.warp")
+    import warp as wp
+
+    count, model = 1000, kind(disc(), law())
+    friction, twists = front.Model(model, contacts=count, device="cpu"), mixed_twists(count)
+    states, new, wrench = friction.rest(), friction.rest(), wp.zeros((count, 3), device="cpu")
+    given = wp.array(twists, dtype=wp.float32, device="cpu"), wp.full(count, 1.0, dtype=wp.float32, device="cpu")
+    ours = median(lambda: friction.step(states, *given, 1e-3, new, wrench), 9, 10)
+    rest = np.zeros((count, *model.state_shape))
+    theirs = median(lambda: model.step(rest, twists, 1.0, 1e-3), 9, 10)
+    words = "the same in one call of the compiled step, on all processors"
+    return line(ours / count * 1e6, "us", words, theirs / count * 1e6)

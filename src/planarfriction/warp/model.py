@@ -1,0 +1,165 @@
+"""Friction models whose contacts are stepped by a Warp kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.export.pieces import pieces_of
+from planarfriction.warp.kernels import Batch, kernel_of
+from planarfriction.warp.source import source_of
+
+PRECISIONS = {wp.float32: "float", wp.float64: "double"}
+
+WRONG = {1: "parameters", 2: "state, twist and normal_force"}
+"""Bits of `Model.status`."""
+
+
+class Model:
+    """A friction model for `contacts` contacts: a Warp kernel with one thread a contact.
+
+    The step is the model's own (`FrictionModel.step`), traced from the same formulas. Twists (vx, vy, omega) [m/s,
+    rad/s] and wrenches (fx, fy, tau) [N, N m] are about the origin of the contact frame.
+
+    Parameters
+    ----------
+    model
+        A `ReducedModel`, `DistributedModel` or `ReducedModelPublished` with a law of LuGre bristles.
+    contacts
+        Number of contacts.
+    parameters
+        Numbers of the law for each contact, by name (see `names`): a number, or an array [contacts]. `scale` is the
+        size of the patch as a multiple of the model's: lengths of patch and lever arms, not of bristles. What is not
+        given is the model's.
+    device
+        Warp device, by default Warp's current one.
+    dtype
+        `wp.float32` or `wp.float64`, of all arrays.
+
+    Raises InvalidValueError for models without source (see `export_c`), and parameters without that name or shape.
+    """
+
+    def __init__(
+        self,
+        model: Any,
+        *,
+        contacts: int,
+        parameters: Mapping[str, Any] | None = None,
+        device: Any = None,
+        dtype: Any = wp.float32,
+    ) -> None:
+        if dtype not in PRECISIONS:
+            raise InvalidValueError("dtype", "be wp.float32 or wp.float64", dtype)
+        pieces = pieces_of(model)
+        source = source_of(pieces, PRECISIONS[dtype])
+        self.contacts = validation.count("contacts", contacts, at_most=2**31 - 1)
+        self.device, self.dtype = wp.get_device(device), dtype
+        self.names = (*pieces.parameters, "scale")
+        """Parameters in the order of the columns of `parameters`."""
+        self.state_shape = (self.contacts, *model.state_shape)
+        rows = _rows({**pieces.parameters, "scale": 1.0}, parameters or {}, self.contacts)
+        self.parameters = wp.array(rows, dtype=dtype, device=self.device)
+        """Parameters [contacts or 1, names]; a program may write new ones between steps."""
+        self.status = wp.zeros(self.contacts, dtype=wp.int32, device=self.device)
+        """Bits of what was wrong since the last `check` [contacts]: 1 in parameters, 2 in state, twist or load."""
+        self._numbers = wp.array(source.numbers, dtype=dtype, device=self.device)
+        self._places = wp.array(source.places, dtype=wp.int32, device=self.device)
+        self.kernel = kernel_of(source.text)
+        """Kernel of `step` and `rollout`."""
+        wp.load_module(self.kernel.module, device=self.device)
+
+    def rest(self) -> wp.array[Any]:
+        """Return the state [contacts, *model.state_shape] of contacts without memory."""
+        return wp.zeros(self.state_shape, dtype=self.dtype, device=self.device)
+
+    def step(
+        self,
+        state: wp.array[Any],
+        twist: wp.array[Any],
+        normal_force: wp.array[Any],
+        dt: float,
+        new_state: wp.array[Any],
+        wrench: wp.array[Any],
+    ) -> None:
+        """Advance all contacts by dt [s] at held twists, in one kernel without allocation or synchronisation.
+
+        `twist` [contacts, 3], `normal_force` [contacts] [N]; written are `new_state`, which may be `state`, and
+        `wrench` [contacts, 3] at the end of the step. A contact without normal force forgets its state. A contact with
+        numbers that are not finite or out of range keeps its state and has no wrench (see `check`).
+
+        Raises InvalidValueError for arrays of another shape, precision or device, and a step that is negative.
+        """
+        self._launch((), state, twist, normal_force, dt, new_state, wrench)
+
+    def rollout(
+        self,
+        state: wp.array[Any],
+        twists: wp.array[Any],
+        normal_forces: wp.array[Any],
+        dt: float,
+        new_state: wp.array[Any],
+        wrenches: wp.array[Any],
+    ) -> None:
+        """Step all contacts through given twists, in one kernel without allocation or synchronisation.
+
+        `twists` [steps, contacts, 3], `normal_forces` [steps, contacts] [N]; written are the last state, `new_state`,
+        and `wrenches` [steps, contacts, 3] at the end of each step.
+
+        Raises InvalidValueError for arrays of another shape, precision or device, and a step that is negative.
+        """
+        self._launch(twists.shape[:1], state, twists, normal_forces, dt, new_state, wrenches)
+
+    def check(self) -> None:
+        """Wait for the device, and forget what was wrong.
+
+        Raises InvalidValueError if a contact had numbers that were not finite or out of range since the last check.
+        """
+        status = self.status.numpy().copy()  # on the CPU, `numpy` gives the same memory
+        self.status.zero_()
+        wrong = np.flatnonzero(status)
+        if len(wrong):
+            names = " and ".join(text for bit, text in WRONG.items() if status[wrong[0]] & bit)
+            raise InvalidValueError(names, "be finite and in range", f"other numbers in contacts {wrong.tolist()}")
+
+    def _launch(
+        self, steps: tuple[int, ...], state: Any, twist: Any, load: Any, dt: float, new: Any, wrench: Any
+    ) -> None:
+        along = (*steps, self.contacts)
+        batch = Batch()
+        batch.contacts, batch.steps, batch.rows = self.contacts, *(steps or (1,)), self.parameters.shape[0]
+        batch.dt = validation.non_negative("dt", dt)
+        batch.state = self._address("state", state, self.state_shape)
+        batch.twist = self._address("twist", twist, (*along, 3))
+        batch.normal_force = self._address("normal_force", load, along)
+        batch.new_state = self._address("new_state", new, self.state_shape)
+        batch.wrench = self._address("wrench", wrench, (*along, 3))
+        batch.parameters, batch.status = self.parameters.ptr, self.status.ptr
+        batch.numbers, batch.places = self._numbers.ptr, self._places.ptr or 0
+        wp.launch(self.kernel, dim=self.contacts, inputs=[batch], device=self.device)
+
+    def _address(self, name: str, given: Any, shape: tuple[int, ...]) -> int:
+        if not isinstance(given, wp.array):
+            raise InvalidValueError(name, "be an array of Warp", type(given).__name__)
+        found = given.shape, given.dtype, given.device
+        if found != (shape, self.dtype, self.device):
+            rule = f"have shape {shape}, {self.dtype.__name__}, on {self.device}"
+            raise InvalidValueError(name, rule, f"{found[0]}, {getattr(found[1], '__name__', found[1])}, {found[2]}")
+        if not given.is_contiguous:
+            raise InvalidValueError(name, "be contiguous", f"strides {given.strides}")
+        return given.ptr or 0
+
+
+def _rows(default: dict[str, float], given: Mapping[str, Any], contacts: int) -> np.ndarray:
+    """Return the parameters of each contact, in one row if all share them."""
+    validation.keys("parameters", dict(given), (), default)
+    values = {name: validation.finite_numbers(name, value) for name, value in given.items()}
+    for name, value in values.items():
+        if value.shape not in ((), (contacts,)):
+            raise InvalidValueError(name, f"be a number or have shape ({contacts},)", value.shape)
+    count = contacts if any(value.shape for value in values.values()) else 1
+    return np.stack([np.broadcast_to(values.get(name, own), count) for name, own in default.items()], axis=1)
