@@ -56,9 +56,9 @@ surfaces = pf.plots.plot_limit_surface(pf.LimitSurfaceTablePublished(pads))
 # -----------------------------
 #
 # The reduced model has three bristles that are driven along the limit surface, stored in a table. In the run above it
-# gives nearly the same force for a fraction of the work. `ReducedModel` in one part goes further than the paper: it keeps the
-# first moments of the bristles, which is exact before sliding and in steady sliding. Its default, bristles on a few
-# cells, lets go where all cells do.
+# gives nearly the same force for a fraction of the work. `ReducedModel` in one part goes further than the paper: it
+# keeps the first moments of the bristles, which is exact before sliding and in steady sliding. Its default, bristles on
+# a few cells, lets go where all cells do.
 reduced = {
     "published, ellipsoid": pf.ReducedModelPublished(disc, law, surface=pf.LimitSurfaceEllipsoid(disc)),
     "published": pf.ReducedModelPublished(disc, law),
