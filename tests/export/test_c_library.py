@@ -9,7 +9,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.derivatives import parameter_names, parameters_of, rollout_vjp
-from tests.support.c_libraries import KINDS, LAW, MODELS, library, run, samples
+from tests.support.c_libraries import KINDS, LAW, MODELS, library, run, run_steady, samples
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
@@ -54,6 +54,20 @@ def test_a_million_steps(name, precision):
     assert np.quantile(of_wrenches, 0.999) < (1e-12 if precision == "double" else 1e-5)
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_steady_sliding(name):
+    """Steps of an hour each lead there, but for rounding that damping multiplies by a hundred."""
+    made = library(name)
+    _, twist, load, _ = samples(made.model, made.kind, 300)
+    state = np.zeros((300, *made.model.state_shape))
+    for _ in range(3):
+        state, wrench = made.model.step(state, twist, load, 3600.0)
+    found, moves = run_steady(made, twist, load), twist.any(axis=1)
+    assert np.all(found[~moves] == 0.0)
+    off = np.abs(found - wrench)[moves] / np.maximum(load, 1e-9)[moves, None] / [1.0, 1.0, 0.01]
+    assert off.max() < 1e-9
+
+
 # ---------------------------------------------------------------------- derivatives
 
 
@@ -69,6 +83,7 @@ def test_slopes(name):
     """Off the bound of slip, where derivatives are one-sided; to 1e-9 of the largest per load."""
     made = library(name)
     inputs = [each[1::2] for each in samples(made.model, made.kind, 600)]
+    inputs[2][::25] = 0.0
     found, pressed, slopes = run(made, inputs, slopes=True)
     for one, other in zip((found, pressed), run(made, inputs), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * np.abs(other).max())

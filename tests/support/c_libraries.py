@@ -44,6 +44,15 @@ int run(int n, friction_real *state, const friction_real *twist, const friction_
     }
     return code;
 }
+
+int run_steady(int n, const friction_real *twist, const friction_real *load, friction_real *wrench)
+{
+    int i, code = 0;
+    for (i = 0; i < n && code == 0; ++i) {
+        code = friction_steady(&friction_default, twist + 3 * i, load[i], wrench + 3 * i);
+    }
+    return code;
+}
 """
 
 
@@ -103,3 +112,11 @@ def run(made: Library, inputs: list[np.ndarray], slopes: bool = False) -> tuple[
     pointers = [each.ctypes.data_as(ctypes.c_void_p) for each in (state, twist, load, dt, wrench)]
     assert made.functions.run(len(load), *pointers, found.ctypes.data_as(ctypes.c_void_p) if slopes else None) == 0
     return (state, wrench, found) if slopes else (state, wrench)
+
+
+def run_steady(made: Library, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """Return the wrenches of steady sliding in C."""
+    twist, load, wrench = np.array(twist, made.kind), np.array(load, made.kind), np.empty(twist.shape, made.kind)
+    pointers = [each.ctypes.data_as(ctypes.c_void_p) for each in (twist, load, wrench)]
+    assert made.functions.run_steady(len(load), *pointers) == 0
+    return wrench

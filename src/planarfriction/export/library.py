@@ -79,13 +79,14 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str) -> list[str]:
     columns = pieces.states + 3 + len(pieces.parameters)
     cells = [f"rows[{row}][{column}]" for row in range(3 + pieces.states) for column in range(columns)]
     lines = list(writer.lines(pieces.step, results))
+    steady = list(writer.lines(pieces.steady, results[-3:]))
     slopes = list(writer.lines(pieces.slopes(), [*results, *cells]))
     tables = {
         table: ("int", numbers.tolist()) if numbers.dtype.kind == "i" else _table(writer, numbers)
         for table, numbers in pieces.tables.items()
-        if table == "share" or any(f"{table}[" in line for line in lines)
+        if table == "share" or any(f"{table}[" in line for line in [*lines, *slopes])
     }
-    for each in (lines, slopes):
+    for each in (lines, steady, slopes):
         if not any("[k]" in line or "* k" in line for line in each):
             each.insert(0, "    (void)k;")
     values = {
@@ -100,6 +101,7 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str) -> list[str]:
         "ranges": " && ".join(RANGES[each] for each in pieces.parameters),
         "tables": tables,
         "step": "\n".join(lines),
+        "steady": "\n".join(steady),
         "slopes": "\n".join(slopes),
         "columns": columns,
         "stride": pieces.stride,

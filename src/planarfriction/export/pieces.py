@@ -7,14 +7,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction import formulas
 from planarfriction.errors import InvalidValueError
-from planarfriction.export.trace import Block, Number, Table, Trace, traced
+from planarfriction.export.trace import Block, Mathematics, Number, Table, Trace, traced
 from planarfriction.export.twins import twin
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import cells, cells_rollout, distributed_step, moment_steps, published_step, reduced_step
+from planarfriction.kernels.law import grip
 from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, Root
 from planarfriction.kernels.reduced_contact import ReducedContact, ReducedPatch
+from planarfriction.kernels.rules import ratio
 from planarfriction.kernels.surfaces import CELLS
+from planarfriction.kernels.vectors import norm, times
 from planarfriction.models import DistributedModel, MomentModel, ReducedModel, ReducedModelPublished
 
 FIXED = "gamma", "elasto_plastic", "creep_speed"
@@ -37,6 +41,8 @@ class Pieces(NamedTuple):
     """New states, then the wrench per unit load, from `p`, `k`, `z`, `v` and `dt`."""
     parameters: dict[str, float]
     """Numbers of the law that may change at run time."""
+    steady: Block
+    """Wrench of steady sliding per unit load."""
     slopes: Callable[[], Block]
     """Trace new states, wrench and derivatives by states, twist and parameters: rows of the wrench, then of states."""
 
@@ -98,6 +104,13 @@ def _distributed(model: DistributedModel) -> Pieces:
         new, traction = twin(distributed_step.cell)(_law(trace, law), z, u, dt)
         return new, lever.wrench(own, traction)
 
+    def steady(trace: Trace) -> Any:
+        own, given = _vector(trace, *(f"{name}[k]" for name in names)), _law(trace, law)
+        u = lever.seen(own, _vector(trace, *_TWIST))
+        speed = twin(norm)(u)
+        z = twin(times)(twin(ratio)(1.0, speed * twin(grip)(given, speed)), u)
+        return lever.wrench(own, twin(distributed_step.cell)(given, z, u, 0.0)[1])
+
     def slopes(trace: Trace) -> Any:
         own = _vector(trace, *(f"{name}[k]" for name in names))
         forth, back = twin(cells_rollout._WRITTEN.forth), twin(cells_rollout._WRITTEN.back)
@@ -111,11 +124,13 @@ def _distributed(model: DistributedModel) -> Pieces:
         return new, lever.wrench(own, traction), rows
 
     tables = {**dict(zip(names, numbers, strict=False)), "share": model.patch.weights()}
-    return Pieces(n, 2, n, 1, tables, traced(step), _parameters(law), lambda: traced(slopes))
+    return Pieces(n, 2, n, 1, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes))
 
 
-def _of_three_states(model: Any, law: LawNumbers, steps: Any, tables: dict, contact: Callable[[Trace], Any]) -> Pieces:
-    """Trace `moment_steps.step` of the record of a contact."""
+def _of_three_states(
+    law: LawNumbers, steps: Any, tables: dict, contact: Callable[[Trace], Any], settled: Any
+) -> Pieces:
+    """Trace `moment_steps` of the record of a contact; `settled(part, held)` is its state in steady sliding."""
     frame, hold, taped_step = (twin(each) for each in (steps._FRAME, steps.MODEL.hold, steps.MODEL.taped_step))
 
     def step(trace: Trace) -> Any:
@@ -123,6 +138,12 @@ def _of_three_states(model: Any, law: LawNumbers, steps: Any, tables: dict, cont
         z, twist = _vector(trace, "z[3 * k]", "z[3 * k + 1]", "z[3 * k + 2]"), _vector(trace, *_TWIST)
         twin(moment_steps.step)(frame, hold, taped_step, contact(trace), z, twist, dt, new, out)
         return tuple(new), tuple(out)
+
+    def steady(trace: Trace) -> Any:
+        own, part = frame.read(contact(trace))
+        held = hold(part, frame.seen(own, _vector(trace, *_TWIST)))
+        wrench = frame.wrench(own, taped_step(part, held, settled(part, held), 0.0).wrench)
+        return tuple(Mathematics.where(held.v > 0.0, each, 0.0) for each in wrench)
 
     def slopes(trace: Trace) -> Any:
         laws: list[LawNumbers] = []
@@ -144,7 +165,7 @@ def _of_three_states(model: Any, law: LawNumbers, steps: Any, tables: dict, cont
         return tuple(new), tuple(out[:3]), tuple(rows)
 
     count = len(tables["share"])
-    return Pieces(count, 3, 1, 3, tables, traced(step), _parameters(law), lambda: traced(slopes))
+    return Pieces(count, 3, 1, 3, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes))
 
 
 def _published(model: ReducedModelPublished) -> Pieces:
@@ -159,7 +180,13 @@ def _published(model: ReducedModelPublished) -> Pieces:
         return PublishedContact(_law(trace, law), shape, root, surface.kind, surface.size, data)
 
     tables = {"share": np.ones(1)} | ({"surface": surface.data} if len(surface.data) else {})
-    return _of_three_states(model, law, published_step, tables, contact)
+
+    def settled(part: Any, held: Any) -> Any:
+        grip = part.law.sigma_0 / twin(formulas.stribeck)(Mathematics, held.v, part.law)
+        x, y, s = twin(times)(twin(ratio)(1.0, grip * held.v), held.u)
+        return x, y, part.shape.contact_radius * s
+
+    return _of_three_states(law, published_step, tables, contact, settled)
 
 
 def _moments(model: MomentModel) -> Pieces:
@@ -179,7 +206,7 @@ def _moments(model: MomentModel) -> Pieces:
     if len(maps) > 1:
         first = np.cumsum([0, *(len(each) for each in maps[:-1])])
         tables |= {"first": first, "factor": upper.ravel()}
-    return _of_three_states(model, law, reduced_step, tables, contact)
+    return _of_three_states(law, reduced_step, tables, contact, lambda _, held: held.q)
 
 
 _KINDS = {DistributedModel: _distributed, ReducedModelPublished: _published, MomentModel: _moments}

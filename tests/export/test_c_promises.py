@@ -1,0 +1,150 @@
+"""Promises of C libraries to a controller: what they call, keep and need, and that every compiler agrees."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from tests.support.c_libraries import MODELS, REDUCED, STRICT, library, run, samples
+
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+
+MATH = {"atan2", "cos", "exp", "expm1", "fabs", "floor", "log", "pow", "sin", "sqrt"}
+"""Functions of math.h that steps call."""
+
+BY_COMPILERS = {"memset", "memcpy", "sincos"}
+"""Functions without state that compilers put in the place of loops, and of a sine and a cosine."""
+
+STEP_STACK, SLOPES_STACK = 4096, 6144
+"""Bytes of stack of a reduced model's step, and of its step with derivatives."""
+
+QUICK = "few", "table"
+EACH = [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in MODELS]
+REMOTE = "aarch64-linux-gnu-gcc", "qemu-aarch64"
+BARE = "arm-none-eabi-gcc"
+COMPILERS = {
+    "gcc -O0": ["gcc", "-O0"],
+    "gcc -O3": ["gcc", "-O3"],
+    "clang -O0": ["clang", "-O0"],
+    "clang -O3": ["clang", "-O3"],
+    "sanitizers": ["gcc", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"],
+    "AArch64": [REMOTE[0], "-O2", "-static"],
+}
+SHORT = "gcc -O0", "gcc -O3"
+
+MAIN = """#include "friction.h"
+#include <stdio.h>
+#include <string.h>
+
+static friction_slopes slopes;
+
+int main(void)
+{
+    friction_real state[FRICTION_STATES], given[5], wrench[3];
+    while (fread(state, sizeof state, 1, stdin) == 1 && fread(given, sizeof given, 1, stdin) == 1) {
+        friction_real again[FRICTION_STATES], same[3];
+        memcpy(again, state, sizeof state);
+        if (friction_step_default(state, given, given[3], given[4], wrench) != FRICTION_OK) {
+            return 1;
+        }
+        if (friction_step_slopes(&friction_default, again, given, given[3], given[4], same, &slopes) != FRICTION_OK) {
+            return 2;
+        }
+        fwrite(state, sizeof state, 1, stdout);
+        fwrite(wrench, sizeof wrench, 1, stdout);
+        fwrite(slopes.wrench_twist, sizeof slopes.wrench_twist, 1, stdout);
+    }
+    return 0;
+}
+"""
+
+
+def objects(name, compiler, *options):
+    """Compile a library alone, without a warning; return its folder."""
+    folder = library(name).folder
+    subprocess.run([compiler, *STRICT, "-Wvla", *options, "-c", "friction.c", "-o", "alone.o"], cwd=folder, check=True)
+    return folder
+
+
+def symbols(folder):
+    """Return the symbols of a compiled library with their kinds."""
+    lines = subprocess.run(["nm", "alone.o"], cwd=folder, check=True, capture_output=True, text=True).stdout
+    return {line.split()[-1]: line.split()[-2] for line in lines.splitlines()}
+
+
+@pytest.mark.parametrize("name", EACH)
+def test_calls_and_memory(name):
+    """No memory is asked for, nothing that changes is kept, and the stack has a known size."""
+    folder = objects(name, "gcc", "-O2", "-fstack-usage")
+    kinds = symbols(folder)
+    called = {each for each, kind in kinds.items() if kind == "U"}
+    assert called <= MATH | BY_COMPILERS
+    assert {kind.lower() for kind in kinds.values()} <= {"u", "t", "r"}  # no data that can be written
+    frames = [line.split("\t") for line in (folder / "alone.su").read_text().splitlines()]
+    assert all(kind in ("static", "dynamic,bounded") for *_, kind in frames)  # bounded: aligned for vectors
+    if name in REDUCED:
+        deep = sum(int(size) for where, size, _ in frames if "slopes" in where)
+        assert sum(int(size) for *_, size, _ in frames) - deep < STEP_STACK
+        assert deep < SLOPES_STACK
+
+
+@pytest.mark.parametrize("name", EACH)
+def test_loops_and_calls_end(name):
+    """Loops count to constants, and functions call only what stands above them."""
+    source = (library(name).folder / "friction.c").read_text()
+    code = re.sub(r"/\*.*?\*/", "", source[source.index("static int in_range") :], flags=re.DOTALL)
+    assert not re.search(r"\b(while|do|goto)\b", code)
+    loops = re.findall(r"\bfor \((.*)\) \{", code)
+    assert len(loops) > 5 and all(re.fullmatch(r"(\w) = 0; \1 < (\d+|FRICTION_\w+); \+\+\1", each) for each in loops)
+    heads = list(re.finditer(r"^(?:static )?(?:int|void) (\w+)\(", code, re.MULTILINE))
+    ends = [*(each.start() for each in heads[1:]), len(code)]
+    assert len(heads) >= 9
+    for i, (head, end) in enumerate(zip(heads, ends, strict=True)):
+        later = {each[1] for each in heads[i:]}
+        assert not later & set(re.findall(r"\b(\w+)\(", code[head.end() : end])), head[1]
+
+
+@pytest.mark.parametrize("options", ["", pytest.param("-fno-math-errno", marks=pytest.mark.slow)])
+def test_cortex_m7(options):
+    if shutil.which(BARE) is None:
+        pytest.skip(f"needs {BARE}")
+    target = "-mcpu=cortex-m7", "-mfpu=fpv5-d16", "-mfloat-abi=hard", "-mthumb", "-O2"
+    folder = objects("table", BARE, *target, *options.split())
+    assert {each for each, kind in symbols(folder).items() if kind == "U"} <= MATH | BY_COMPILERS
+
+
+CASES = [
+    pytest.param(name, each, marks=() if name in QUICK and each in SHORT else pytest.mark.slow)
+    for name in MODELS
+    for each in COMPILERS
+]
+
+
+@pytest.mark.parametrize("name, compiler", CASES)
+def test_compilers_agree(name, compiler):
+    """Steps and derivatives are the same but for rounding, whatever compiles and runs them."""
+    needed = REMOTE if compiler == "AArch64" else COMPILERS[compiler][:1]
+    missing = [each for each in needed if shutil.which(each) is None]
+    if missing:
+        pytest.skip(f"needs {' and '.join(missing)}")
+    made = library(name)
+    (made.folder / "main.c").write_text(MAIN)
+    command = [*COMPILERS[compiler], *STRICT, "-Wvla", "friction.c", "main.c", "-o", "program", "-lm"]
+    subprocess.run(command, cwd=made.folder, check=True)
+    inputs = [each[1::2] for each in samples(made.model, made.kind, 400)]
+    state, wrench, slopes = run(made, inputs, slopes=True)
+    rows = [each.reshape(len(wrench), -1) for each in inputs]
+    program = [*(REMOTE[1:] if compiler == "AArch64" else ()), str(made.folder / "program")]
+    done = subprocess.run(program, input=np.hstack(rows).tobytes(), capture_output=True, check=True)
+    found = np.frombuffer(done.stdout).reshape(len(wrench), -1)
+    n = state[0].size
+    for own, other in (
+        (found[:, :n], state.reshape(-1, n)),
+        (found[:, n : n + 3] / inputs[2][:, None], wrench / inputs[2][:, None]),
+        (found[:, n + 3 :] / inputs[2][:, None], slopes["wrench_twist"].reshape(-1, 9) / inputs[2][:, None]),
+    ):
+        assert np.abs(own - other).max() < 1e-10 * np.abs(other).max()
