@@ -198,8 +198,8 @@ class Host(NamedTuple):
     boxes: int
     """Address of flags: 1 where the other geom is a box, whose faces bear patches as far as they go."""
     extents: int
-    """Address of least and largest x and y of each patch, its largest distance from the origin, and the width of a
-    cell, [k, 6] [m]."""
+    """Address of least and largest x and y of each patch, its largest distance from the origin, and the width of
+    the edge beyond which cells carry nothing, [k, 6] [m]."""
     free_count: int
     """Number of free joints."""
     free_joints: int
