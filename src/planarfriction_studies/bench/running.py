@@ -13,7 +13,7 @@ from planarfriction import validation
 from planarfriction.errors import MissingExtraError
 from planarfriction.limit_surface import LimitSurfaceExact, LimitSurfaceTable
 from planarfriction.models import ReducedModel, ReducedModelPublished
-from planarfriction_studies.bench import gradients, simulator_costs, steps, whole_runs, workflows
+from planarfriction_studies.bench import exported, gradients, simulator_costs, steps, whole_runs, workflows
 from planarfriction_studies.bench.measurement import Measurement
 
 BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
@@ -41,6 +41,9 @@ BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
     "step.reduced.four": steps.reduced_four,
     "warp.step.reduced": partial(steps.warp_step, kind=ReducedModel),
     "warp.step.published": partial(steps.warp_step, kind=ReducedModelPublished),
+    **{f"export.step.{kind}": partial(exported.step, kind=kind) for kind in exported.MODELS},
+    "export.step.reduced.vector": partial(exported.step, kind="reduced", vector=True),
+    **{f"export.step.{kind}.999": partial(exported.percentile, kind=kind) for kind in exported.MODELS},
     "coupled.four_feet.call": steps.coupled,
     "coupled.four_feet.batch": partial(steps.coupled, environments=1000),
     "mujoco.tray.1": partial(simulator_costs.mujoco_tray, blocks=1),

@@ -1,0 +1,106 @@
+"""Costs of the steps of exported C libraries, called in a loop in C, beside the compiled steps of the library."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planarfriction.derivatives import rollout
+from planarfriction.export import export_c
+from planarfriction.models import ReducedModel, ReducedModelPublished
+from planarfriction_studies.bench.measurement import Measurement, disc, law, line, median, mixed_twists
+
+LOOP = """#define _POSIX_C_SOURCE 200809L
+#include "friction.h"
+#include <time.h>
+
+int loop(int n, double *state, const double *twists, double *wrench)
+{
+    int i, code = 0;
+    for (i = 0; i < n; ++i) {
+        code |= friction_step_default(state, twists + 3 * i, 1.0, 1e-4, wrench);
+    }
+    return code;
+}
+
+int each(int n, double *state, const double *twists, double *wrench, double *seconds)
+{
+    int i, code = 0;
+    struct timespec begin, end;
+    for (i = 0; i < n; ++i) {
+        clock_gettime(CLOCK_MONOTONIC, &begin);
+        code |= friction_step_default(state, twists + 3 * i, 1.0, 1e-4, wrench);
+        clock_gettime(CLOCK_MONOTONIC, &end);
+        seconds[i] = (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec);
+    }
+    return code;
+}
+"""
+"""Steps in a row, and steps timed one by one, with the clock's own time."""
+
+SAMPLES = 1_000_000
+"""Steps of which the 99.9th percentile is taken."""
+
+MODELS: dict[str, Any] = {
+    "reduced": lambda: ReducedModel(disc(), law()),
+    "parts1": lambda: ReducedModel(disc(), law(), parts=1),
+    "published": lambda: ReducedModelPublished(disc(), law()),
+}
+"""Models by the end of the benchmark's name."""
+
+NO_COMPILER = Measurement("", None, "", "left out: needs gcc", None, None)
+
+
+VECTOR = "-ffast-math", "-fno-finite-math-only", "-D__FAST_MATH__"
+"""Options with which cells are stepped in vectors: sums are reordered, NaN and infinity still count."""
+
+
+def library(model: Any, folder: Path, *options: str) -> ctypes.CDLL:
+    """Compile the C library of a model with loops around its step, and load it."""
+    export_c(model, folder)
+    (folder / "loop.c").write_text(LOOP)
+    command = "gcc", "-std=c99", "-O3", "-march=native", *options, "-fPIC", "-shared", "-o", "friction.so"
+    subprocess.run([*command, "friction.c", "loop.c", "-lm"], cwd=folder, check=True)
+    return ctypes.CDLL(str(folder / "friction.so"))
+
+
+def step(full: bool, kind: str, vector: bool = False) -> Measurement:
+    """Measure a step in C, in a loop in C, against the same steps in a compiled loop."""
+    return _measured(kind, _loop, *(VECTOR if vector else ()))
+
+
+def percentile(full: bool, kind: str) -> Measurement:
+    """Measure the 99.9th percentile of the time of single steps in C against their median."""
+    return _measured(kind, _percentile)
+
+
+def _measured(kind: str, measure: Any, *options: str) -> Measurement:
+    if shutil.which("gcc") is None:
+        return NO_COMPILER
+    model = MODELS[kind]()
+    with tempfile.TemporaryDirectory() as folder:
+        return measure(model, library(model, Path(folder), *options), model.rest().ravel(), np.empty(3))
+
+
+def _pointers(*arrays: np.ndarray) -> list[ctypes.c_void_p]:
+    return [each.ctypes.data_as(ctypes.c_void_p) for each in arrays]
+
+
+def _loop(model: Any, made: ctypes.CDLL, state: np.ndarray, wrench: np.ndarray) -> Measurement:
+    twists = mixed_twists(20_000)
+    ours = median(lambda: made.loop(len(twists), *_pointers(state, twists, wrench)), 9) / len(twists)
+    theirs = median(lambda: rollout(model, None, twists, 1.0, 1e-4), 9) / len(twists)
+    return line(ours * 1e6, "us", "the same step in a roll-out", theirs * 1e6)
+
+
+def _percentile(model: Any, made: ctypes.CDLL, state: np.ndarray, wrench: np.ndarray) -> Measurement:
+    twists, seconds = mixed_twists(SAMPLES), np.empty(SAMPLES)
+    made.each(SAMPLES, *_pointers(state, twists, wrench, seconds))
+    high, middle = np.quantile(seconds, 0.999), np.median(seconds)
+    return line(float(high) * 1e6, "us", "the median of the same steps", float(middle) * 1e6)
