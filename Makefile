@@ -2,7 +2,7 @@
 # make test-generic: the tests of numbers once more, compiled for any x86-64 or ARM processor instead of this one.
 # make test-bounds: the quick tests of numbers once more, with every index of compiled loops checked.
 # make test-lowest: the tests with the lowest versions of everything.
-# make fuzz MINUTES=60: attacks with random examples, an hour long.
+# make fuzz MINUTES=60: attacks with random examples, an hour long; ATTACKS=coupling: those alone whose name begins so.
 # make docs: the site, in build/docs; scripts of its gallery run once, and again when they have changed.
 
 PYTHON ?= python3
@@ -44,7 +44,7 @@ test-lowest: $(LOWEST)/.test
 MINUTES ?= 60
 
 fuzz: $(VENV)/.test
-	$(BIN)/python tests/fuzz $(MINUTES)
+	$(BIN)/python tests/fuzz $(MINUTES) $(ATTACKS)
 
 docs: $(VENV)/.docs
 	$(BIN)/python -m sphinx -W --keep-going -n docs build/docs

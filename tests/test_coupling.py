@@ -193,6 +193,7 @@ def test_axes_broadcast():
     assert step.twist.shape == (2, 4, 1, 3) and step.state.shape == (2, 4, 3) and step.converged.shape == (2, 4)
     alone = patches.step(patches.rest(), many._replace(normal_force=many.normal_force[2]), 1e-2)
     assert np.array_equal(alone.wrench, step.wrench[1, 2])
+    assert patches.step(patches.rest(), host, np.empty(0)).twist.shape == (0, 1, 3)
 
 
 # ---------------------------------------------------------------------- loads

@@ -206,7 +206,7 @@ class CoupledPatches(ByValue):
         problems = np.zeros((*batch, words))
         for name, place in zip(_INPUTS, _PLACES, strict=True):
             if name in arrays:
-                problems[..., self._parts[place]] = arrays[name].reshape(*axes[name], -1)
+                problems[..., self._parts[place]] = arrays[name].reshape(*axes[name], math.prod(inner[name]))
         problems[..., self._parts["follows"]] = float("moments" in arrays)
         return problems.reshape(count, words), batch
 

@@ -1,4 +1,4 @@
-"""Attack for as long as is asked, with examples that no run had before: `make fuzz MINUTES=60`."""
+"""Attack for as long as is asked, with examples that no run had before: `make fuzz MINUTES=60 ATTACKS=coupling`."""
 
 from __future__ import annotations
 
@@ -16,16 +16,19 @@ ROUND = 10
 """A round has as many examples of each attack as the run of a minute has, over this."""
 
 
-def main(minutes: float) -> int:
-    """Attack, print the counts, and return how many attacks found something."""
+def main(minutes: float, chosen: str = "") -> int:
+    """Attack with those whose name begins as chosen, print the counts, and return how many findings there are."""
     matplotlib.use("Agg")
     sys.path.append(str(Path(__file__).parents[2]))  # what tests share
     for path in sorted(Path(__file__).parent.glob("test_fuzz_*.py")):
         importlib.import_module(path.stem)
+    attacks = {name: attack for name, attack in ATTACKS.items() if name.startswith(chosen)}
+    if not attacks:
+        raise SystemExit(f"no attack is named {chosen!r}; there are {', '.join(ATTACKS)}")
     end, found, rounds = time.monotonic() + 60.0 * minutes, {}, 0
     while time.monotonic() < end:
         rounds += 1
-        for name, attack in ATTACKS.items():
+        for name, attack in attacks.items():
             if time.monotonic() > end:
                 break
             try:
@@ -53,4 +56,4 @@ def _note(name: str, failure: BaseException, found: dict[str, str]) -> None:
 
 if __name__ == "__main__":
     os.environ.setdefault("HYPOTHESIS_NO_PLUGINS", "1")
-    sys.exit(min(main(float(sys.argv[1]) if len(sys.argv) > 1 else 60.0), 100))
+    sys.exit(min(main(float(sys.argv[1]) if len(sys.argv) > 1 else 60.0, *sys.argv[2:]), 100))
