@@ -9,7 +9,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.derivatives import parameter_names, parameters_of, rollout_vjp
-from tests.support.c_libraries import KINDS, LAW, MODELS, library, run, run_steady, samples
+from tests.support.c_libraries import KINDS, LAW, MODELS, VECTOR, library, run, run_steady, samples
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
@@ -118,10 +118,11 @@ def test_slopes_by_parameters(name):
 # ---------------------------------------------------------------------- what is refused
 
 
+@pytest.mark.parametrize("options", [(), VECTOR], ids=["", "vectors"])
 @pytest.mark.parametrize("slopes", [False, True])
 @pytest.mark.parametrize("place, value", [("twist", np.nan), ("state", np.inf), ("load", -1.0), ("dt", np.nan)])
-def test_bad_numbers(place, value, slopes):
-    made = library("few")
+def test_bad_numbers(place, value, slopes, options):
+    made = library("few", "double", *options)
     given = {
         "state": made.model.rest()[None], "twist": np.array([[0.01, 0.0, 1.0]]), "load": np.ones(1),
         "dt": np.full(1, 1e-3),

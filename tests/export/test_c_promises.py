@@ -9,7 +9,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from tests.support.c_libraries import MODELS, REDUCED, STRICT, library, run, samples
+from tests.support.c_libraries import MODELS, REDUCED, STRICT, VECTOR, library, run, samples
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
@@ -17,7 +17,7 @@ MATH = {"atan2", "cos", "exp", "expm1", "fabs", "floor", "log", "pow", "sin", "s
 """Functions of math.h that steps call."""
 
 BY_COMPILERS = {"memset", "memcpy", "sincos"}
-"""Functions without state that compilers put in the place of loops, and of a sine and a cosine."""
+"""Functions without state that compilers put instead of loops, and of a sine and a cosine."""
 
 STEP_STACK, SLOPES_STACK = 4096, 6144
 """Bytes of stack of a reduced model's step, and of its step with derivatives."""
@@ -31,10 +31,11 @@ COMPILERS = {
     "gcc -O3": ["gcc", "-O3"],
     "clang -O0": ["clang", "-O0"],
     "clang -O3": ["clang", "-O3"],
+    "vectors": ["gcc", *VECTOR],
     "sanitizers": ["gcc", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"],
     "AArch64": [REMOTE[0], "-O2", "-static"],
 }
-SHORT = "gcc -O0", "gcc -O3"
+SHORT = "gcc -O0", "gcc -O3", "vectors"
 
 MAIN = """#include "friction.h"
 #include <stdio.h>

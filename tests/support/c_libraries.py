@@ -31,6 +31,9 @@ REDUCED = [name for name in MODELS if name != "distributed"]
 KINDS = {"double": np.float64, "float": np.float32}
 STRICT = "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror"
 
+VECTOR = "-O3", "-ffast-math", "-fno-finite-math-only", "-D__FAST_MATH__"
+"""Options that a page recommends: cells in vectors."""
+
 DRIVER = """#include "friction.h"
 
 int run(int n, friction_real *state, const friction_real *twist, const friction_real *load, const friction_real *dt,

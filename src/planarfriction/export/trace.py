@@ -1,6 +1,6 @@
 """Straight-line functions traced with symbols: what they compute, operation by operation.
 
-A kernel is called in Python with `Number`s in the place of floats, which note each operation on a `Trace`. A function
+A kernel is called in Python with `Number`s instead of floats, which note each operation on a `Trace`. A function
 that asks which way a comparison goes is traced once for either answer, and a `Branch` joins what comes out. Loops run
 as long as their count is known. Compiled functions are called through their Python twins (see `twins`).
 """
@@ -278,7 +278,7 @@ _pow = _function("$pow({0}, {1})", math.pow)
 
 
 class Mathematics:
-    """Functions for symbols in the place of `math`, of `compiled_math` and of what kernels take from NumPy."""
+    """Functions for symbols instead of `math`, of `compiled_math` and of what kernels take from NumPy."""
 
     pi, inf = math.pi, math.inf
     where, power = staticmethod(_where), staticmethod(_power)
