@@ -18,7 +18,7 @@ LEAST = 1.2e-38
 
 
 class Writer:
-    """What differs between precisions: constants and the names of mathematical functions."""
+    """Differences between precisions: constants and the names of mathematical functions."""
 
     def __init__(self, precision: str = "double") -> None:
         self.suffix = "f" if precision == "float" else ""

@@ -138,7 +138,7 @@ def kind_of(arguments: tuple) -> str:
 
 
 class Trace:
-    """What a function does, operation by operation; the same operation is noted once."""
+    """Record of what a function does, operation by operation; the same operation is noted once."""
 
     def __init__(self) -> None:
         self.operations: list[Any] = []

@@ -34,7 +34,7 @@ def _dot(a: Any, b: Any) -> Any:
 
 
 class _At:
-    """What follows a place of a list, as a pointer would."""
+    """View of a list from a place on, as a pointer would be."""
 
     def __init__(self, row: Any, first: int) -> None:
         self._row, self._first = row, first
