@@ -1,0 +1,22 @@
+"""Traces of functions that write to lists."""
+
+from planarfriction.export.trace import Branch, Number, Trace
+
+
+def test_lists_are_written_once():
+    """A function that is run again for each answer begins with the list that it was given."""
+
+    def function(x, row):
+        row[0] = row[0] + x
+        row[1] = row[0] if x > 0.0 else 1.0
+        return row[0]
+
+    trace = Trace()
+    x = Number(trace, "x")
+    row = [x, 0.0]
+    doubled = trace.call(function, (x, row))
+    total, _, branch = trace.operations
+    assert (total.text, total.arguments) == ("{0} + {1}", ("x", "x"))
+    assert row[0].name == doubled.name == total.name
+    assert isinstance(branch, Branch) and branch.outcomes == ((row[1].name, "real"),)
+    assert (branch.yes.results, branch.no.results) == ((total.name,), (1.0,))
