@@ -167,7 +167,7 @@ def test_warnings_are_one_line_too(capsys):
         ("t_end = 0.01", "", "missing key 't_end'"),
         ("mass = 1.0", f"mass = 1.0\n{LONG} = 1", "unknown key 'xxx"),
         ("mass = 1.0", "mass = 1.0\nsize = [1e200, 1e200]", "size must be at most"),
-        ("cells = 5", "cells = 100_000", "cells must be at most"),
+        ("cells = 5", "cells = 100_000", "cells (rows x columns) must be at most"),
         ("cells = 5", "cells = '5'", "cells must be a number"),
         ("normal_force = 2.0", f"normal_force = 2.0\ncount = 1{400 * '0'}", "count of contact 'contact' must be at mo"),
         ("normal_force = 2.0", "normal_force = 2.0\nname = 2026-01-01", "name of a contact must be a text"),

@@ -256,7 +256,7 @@ def test_windows_parts_and_a_shorter_motion_leave_no_trace(monkeypatch):
 def test_wrong_input_is_named():
     scene = pushed("ellipsoid")
     with pytest.raises(
-        InvalidValueError, match=r"a signal must be one of own\.normal_force, fixed\.normal_force, force"
+        InvalidValueError, match=r"signals must be one of own\.normal_force, fixed\.normal_force, force"
     ):
         scene_sensitivities(scene, signals={"own": KNOTS})
     with pytest.raises(InvalidValueError, match=r"knots of force must increase, between 0 and 0\.4 s"):

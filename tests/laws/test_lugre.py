@@ -199,7 +199,7 @@ SURFACE = pf.LimitSurfaceCells(pf.ContactPatch.rectangle(0.02, cells=3))
             lambda: pf.LuGre(elasto_plastic="early"),
             "elasto_plastic must be a breakaway ratio, an ElastoPlastic, or None, got early",
         ),
-        (lambda: pf.LuGre(elasto_plastic=1.0), "breakaway_ratio must be in [0, 1), got 1.0"),
+        (lambda: pf.LuGre(elasto_plastic=1.0), "elasto_plastic must be in [0, 1), got 1.0"),
         (lambda: pf.Dahl(mu_c=0.0), "mu_c must be > 0, got 0.0"),
         (lambda: pf.CoulombStribeck(creep_speed=0.0), "creep_speed must be > 0, got 0.0"),
         (lambda: pf.CoulombStribeck(mu_s=0.5), "mu_s must be >= mu_c, got mu_s=0.5, mu_c=1.0"),

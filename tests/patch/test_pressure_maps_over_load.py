@@ -108,7 +108,7 @@ def test_scene_files(tmp_path):
         ("light.npy", [2.0, 6.0], "pressure must have one map for each of 2 loads, got 1"),
         ([LIGHT, HEAVY[:1]], LOADS, r"pressure must have the shape of the first, \[2, 3\]"),
         ([LIGHT, -HEAVY], LOADS, "pressure must be >= 0"),
-        ([LIGHT, 0.0 * HEAVY], LOADS, "pressure must have a total > 0 at every load, got 0 at 6 N"),
+        ([LIGHT, 0.0 * HEAVY], LOADS, "pressure values must have a total > 0 at every load, got 0 at 6 N"),
         ({2.0: LIGHT}, LOADS, "loads must be left out"),
         ({"two": LIGHT}, None, "load of a pressure map must be"),
         ({-1.0: LIGHT}, None, "load of a pressure map must be > 0"),

@@ -223,7 +223,7 @@ def test_unusual_names_survive(tmp_path):
         ("t_end = 1.0", "t_end = 1.0\nforce = [1, 2]", "scene.toml: force must have 3 columns"),
         ("mu_s = 0.6", "mu_s = 0.4", "scene.toml: [contact.law]: mu_s must be >= mu_c, got mu_s=0.4, mu_c=0.5"),
         ("mu_s = 0.6", "mu_s = nan", "scene.toml: [contact.law]: mu_s must be finite, got nan"),
-        ("mu_s = 0.6", "elasto_plastic = 2", "scene.toml: [contact.law]: breakaway_ratio must be in"),
+        ("mu_s = 0.6", "elasto_plastic = 2", "scene.toml: [contact.law]: elasto_plastic must be in"),
         ("radius = 0.01", "radius = -1", "scene.toml: [contact.patch]: radius must be > 0, got -1.0"),
         ("radius = 0.01", "", "scene.toml: [contact.patch]: missing key 'radius'"),
         ("radius", "raduis", "scene.toml: [contact.patch]: unknown key 'raduis' (did you mean 'radius'?)"),

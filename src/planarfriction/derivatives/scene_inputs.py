@@ -215,4 +215,4 @@ def _knots_of(scene: Scene, parameters: Any, signals: Any) -> list[Knots]:
             if contact.model.patch.depends_on_load and name in ("load", f"{contact.name}.normal_force"):
                 rule = f"not contain {name}: the shape of the patch of contact {contact.name!r} changes with the load"
                 raise InvalidValueError("parameters" if name == "load" else "signals", rule, name)
-    return [Knots(scene, validation.choice("a signal", name, valid), times) for name, times in signals.items()]
+    return [Knots(scene, validation.choice("signals", name, valid), times) for name, times in signals.items()]

@@ -151,12 +151,12 @@ def design_experiment(
     validation.instance("law", law, LuGre, "a LuGre law")
     if "breakaway_ratio" in names and law.elasto_plastic is None:
         raise InvalidValueError("parameters", "contain breakaway_ratio only for elasto-plastic bristles", names)
-    before = () if isinstance(logs, (list, tuple)) and not logs else as_logs(logs)
+    before = () if isinstance(logs, (list, tuple)) and not logs else as_logs("logs", logs)
     chosen = names if wanted is None else known.check_names(wanted, names)
     if motions is None:
         loads = sorted({float(f"{np.median(log.normal_force):.3g}") for log in before}) or [1.0]
         motions = candidate_motions(patch, law, normal_force=loads)
-    candidates = as_logs(motions)
+    candidates = as_logs("motions", motions)
     for each in candidates:
         if not each.twist.any():
             raise InvalidValueError(f"twist of {each.name}", "move the contact", "0 throughout")

@@ -190,11 +190,11 @@ class Log(ByValue):
         return cls(time, twist, np.stack(wrench, -1)[:, index], load[:, index], name)
 
 
-def as_logs(log: Log | Sequence[Log]) -> tuple[Log, ...]:
+def as_logs(name: str, log: Log | Sequence[Log]) -> tuple[Log, ...]:
     """Return one log or several as a tuple, or raise InvalidValueError."""
     logs = (log,) if isinstance(log, Log) else tuple(log) if isinstance(log, Sequence) else ()
     if not logs or not all(isinstance(each, Log) for each in logs):
-        raise InvalidValueError("log", "be a Log or a list of them", log)
+        raise InvalidValueError(name, "be a Log or a list of them", log)
     return logs
 
 

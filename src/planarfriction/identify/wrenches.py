@@ -79,7 +79,7 @@ def identify_lugre(
     InvalidValueError
         A parameter breaks its rule.
     """
-    logs, names = as_logs(log), known.check_names(parameters)
+    logs, names = as_logs("log", log), known.check_names(parameters)
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
     refuse_anisotropy(patch, "identify_lugre")
     models = _models_to_fit(validation.choice("model", model, ("auto", *SIMULATORS)), patch, names)

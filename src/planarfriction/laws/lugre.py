@@ -42,10 +42,10 @@ def _elasto_plastic(name: str, value: Any) -> ElastoPlastic:
         return value
     if isinstance(value, Mapping):
         validation.keys(name, value, ["breakaway_ratio"])
-        value = value["breakaway_ratio"]
+        return ElastoPlastic(value["breakaway_ratio"])
     if validation.why_not_numeric(value) is not None:
         raise InvalidValueError(name, "be a breakaway ratio, an ElastoPlastic, or None", value)
-    return ElastoPlastic(value)
+    return ElastoPlastic(_below_one(name, value))
 
 
 @described

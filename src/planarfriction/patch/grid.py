@@ -20,10 +20,10 @@ LEAST_WIDTH, MOST_WIDTH = 1e-5, 1.0
 """Widths of a patch [m] outside of which its maker is asked whether they are in metres."""
 
 
-def check_cells(count: int) -> None:
+def check_cells(count: int, name: str = "cells") -> None:
     """Raise, before memory is asked for, where a patch would have more than `MOST_CELLS`."""
     if count > MOST_CELLS:
-        raise InvalidValueError("cells", f"be at most {MOST_CELLS} in all", count)
+        raise InvalidValueError(name, f"be at most {MOST_CELLS} in all", count)
 
 
 def warn_of_the_unit(name: str, positions: np.ndarray, cell_size: tuple[float, float] | None) -> None:
@@ -57,7 +57,7 @@ class Grid(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_cells(self.rows * self.columns)
+        check_cells(self.rows * self.columns, "cells (rows x columns)")
 
     @classmethod
     def around_origin(cls, width: float, height: float, columns: int, rows: int) -> Grid:
@@ -68,7 +68,7 @@ class Grid(Checked):
         width, height = validation.positive("width", width), validation.positive("height", height)
         columns = validation.count("columns", columns, at_most=MOST_CELLS)
         rows = validation.count("rows", rows, at_most=MOST_CELLS)
-        check_cells(columns * rows)  # before the cells are too small to be any
+        check_cells(columns * rows, "cells (rows x columns)")  # before the cells are too small to be any
         return cls(-width / 2, -height / 2, width / columns, height / rows, columns, rows)
 
     @classmethod

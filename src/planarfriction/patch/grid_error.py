@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planarfriction import geometry, validation
+from planarfriction import geometry
 from planarfriction.described import described
 from planarfriction.families import SURFACES
 from planarfriction.patch.pressure import Uniform
+from planarfriction.patch.refined import refined as finer
 
 if TYPE_CHECKING:
     from planarfriction.patch.contact_patch import ContactPatch
@@ -53,7 +54,7 @@ class GridError:
 def grid_error(patch: ContactPatch, normal_force: float | None, refined: int) -> GridError:
     """Implement `ContactPatch.grid_error`."""
     with warnings.catch_warnings(action="ignore"):  # of the patch's size, said when it was made
-        fine = patch.refined(validation.count("refined", refined))
+        fine = finer(patch, refined, "refined")
     if not patch.cell_extents().any():
         return GridError(0.0, 0.0, 0.0, fine.cells)
     exact, cells = _continuous(patch, normal_force), SURFACES["cells"](fine, normal_force=normal_force)

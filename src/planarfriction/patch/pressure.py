@@ -200,7 +200,7 @@ class PerCell(ByValue, Pressure):
     """Relative pressures, shape `[N]` [-]."""
 
     def __post_init__(self) -> None:
-        values = pressure_array("pressure", self.values, (None,))
+        values = pressure_array("pressure values", self.values, (None,))
         values.setflags(write=False)
         self._set(values=values)
 

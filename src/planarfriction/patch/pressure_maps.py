@@ -36,10 +36,13 @@ class PressureMaps(ByValue, Pressure):
         loads = validation.array("loads", self.loads, (None,))
         if len(loads) == 0 or not (loads[0] > 0.0 and (np.diff(loads) > 0.0).all()):
             raise InvalidValueError("loads", "be increasing and > 0", loads.tolist())
-        values = check_not_negative("pressure", pressure_array("pressure", self.values, (len(loads), None)))
+        values = pressure_array("pressure values", self.values, (len(loads), None))
+        values = check_not_negative("pressure values", values)
         peak = values.max(axis=1, initial=0.0)
         if not (peak > 0.0).all():
-            raise InvalidValueError("pressure", "have a total > 0 at every load", f"0 at {loads[peak.argmin()]:g} N")
+            raise InvalidValueError(
+                "pressure values", "have a total > 0 at every load", f"0 at {loads[peak.argmin()]:g} N"
+            )
         for array in (loads, values):
             array.setflags(write=False)
         self._set(loads=loads, values=values)

@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from planarfriction.patch.contact_patch import ContactPatch
 
 
-def refined(patch: ContactPatch, parts: int) -> ContactPatch:
+def refined(patch: ContactPatch, parts: int, name: str = "parts") -> ContactPatch:
     """Implement `ContactPatch.refined`."""
-    parts, extent = validation.count("parts", parts, at_most=MOST_CELLS), patch.cell_extents()
+    parts, extent = validation.count(name, parts, at_most=MOST_CELLS), patch.cell_extents()
     if parts == 1 or not extent.any():
         return patch
-    check_cells(patch.cells * parts ** int(extent.any(axis=0).sum()))
+    check_cells(patch.cells * parts ** int(extent.any(axis=0).sum()), f"cells (by {name})")
     fine = (np.arange(parts) - (parts - 1) / 2) / parts
     inside = np.stack(np.meshgrid(*(fine if side else [0.0] for side in extent.max(axis=0))), -1).reshape(-1, 2)
     times, (width, height) = len(inside), patch.cell_size or (0.0, 0.0)

@@ -12,7 +12,7 @@ from planarfriction import validation
 from planarfriction.errors import InvalidValueError, shown
 from planarfriction.scenes.files import rectangle_inertia, rectangle_outline
 from planarfriction.scenes.scene import Body, Contact, Scene, checked_model
-from planarfriction.scenes.signal import Signal, sample_times
+from planarfriction.scenes.signal import Signal, as_signal, sample_times
 
 GRAVITY = 9.81
 """Acceleration of gravity [m/s^2]."""
@@ -74,9 +74,8 @@ def in_hand(
 
     Source: Waltersson and Karayiannidis 2024, section VI.
     """
-    body = Body(
-        mass, rectangle_inertia(mass, size), centre_of_mass, gravity=(0.0, -GRAVITY), outline=rectangle_outline(size)
-    )
+    inertia, centre = rectangle_inertia(mass, size), validation.vector("centre_of_mass", centre_of_mass, 2)
+    body = Body(mass, inertia, centre, gravity=(0.0, -GRAVITY), outline=rectangle_outline(size))
     load = in_hand_load(1, t_end=t_end) if normal_force is None else normal_force
     return Scene(body, [Contact(model, load, count=fingers, name="fingers")], t_end, name="in-hand")
 
@@ -142,6 +141,7 @@ def free_slide(
     if inertia is None:
         mass, patch = validation.positive("mass", mass), checked_model("model", model).patch
         inertia = mass * float(patch.second_moment(GRAVITY * mass))
+    twist = validation.vector("twist", twist, 3)
     body = Body(mass, inertia, position, angle, twist, gravity=(0.0, 0.0), outline=outline)
     load: Any = GRAVITY * body.mass if normal_force is None else normal_force
     contact = Contact(model, load, mounted_on="body", name="table")
@@ -188,7 +188,7 @@ def driven(
         centre = np.asarray(model.patch.centre_of_pressure(float(contact.normal_force(0.0))))
         contact = dataclasses.replace(contact, position=-centre)
     body = Body(1.0, 1.0, gravity=(0.0, 0.0))  # moved as prescribed: mass and inertia play no part
-    velocity = published_velocity() if twist is None else twist
+    velocity = published_velocity() if twist is None else as_signal("twist", twist, 3)
     return Scene(body, [contact], t_end, velocity=velocity, **FINE, name="driven")
 
 

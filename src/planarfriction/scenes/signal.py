@@ -38,7 +38,7 @@ def sample_count(span: float, step: float, name: str) -> int:
     """Return the number of steps of `step` [s] in `span` [s]; raise if they would need too much memory."""
     count = span / step * (1.0 + 1e-12)  # so that the end itself is kept in spite of rounding
     if count > MOST_SAMPLES:
-        rule = f"be at least {span / MOST_SAMPLES:.3g} s for {span:g} s (at most {MOST_SAMPLES} samples)"
+        rule = f"be at least {span / MOST_SAMPLES:.3g} s (at most {MOST_SAMPLES} samples up to t_end, {span:g} s)"
         raise InvalidValueError(name, rule, step)
     return int(count)
 

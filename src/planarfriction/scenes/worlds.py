@@ -116,6 +116,7 @@ def curling(
     """
     if inertia is None:
         inertia = 0.5 * validation.positive("mass", mass) * STONE_RADIUS**2
+    twist = validation.vector("twist", twist, 3)
     body = Body(mass, inertia, velocity=twist, gravity=(0.0, 0.0), outline=_around(0.0, STONE_RADIUS))
     weight: Any = GRAVITY * body.mass
     ice = Contact(model, weight, mounted_on="body", name="ice")
