@@ -120,7 +120,10 @@ class CoupledPatches(ByValue):
         return (int(self._bounds[-1]),)
 
     def rest(self, batch: int | Sequence[int] = ()) -> np.ndarray:
-        """Return the state of all patches at rest, with relaxed bristles, or of a `batch`: `[*batch, states]`."""
+        """Return the state of all patches at rest, with relaxed bristles, or of a `batch`: `[*batch, states]`.
+
+        Raises InvalidValueError unless `batch` is a count or counts.
+        """
         return np.zeros(validation.batched(batch, self.state_shape))
 
     def states(self, state: np.ndarray) -> list[np.ndarray]:

@@ -76,7 +76,7 @@ def test_the_gripper_of_the_example_lets_the_plate_hang_where_theory_says():
 
 
 def test_the_gripper_holds_still_with_any_pads():
-    """Where MuJoCo finds one point between faces, these pads rock the plate from step to step, at 0.4 rad/s in yaw."""
+    """Hold a plate still that such pads rock, at 0.4 rad/s in yaw, if MuJoCo finds one point between faces."""
     example = script("examples/mujoco_gripper.py")
     rng = np.random.default_rng(1)
     places, weights = rng.uniform(-0.01, 0.01, (7, 2)), rng.uniform(0.2, 1.0, 7)

@@ -112,7 +112,7 @@ def test_the_frame_of_the_contact_does_not_matter():
 
 @pytest.mark.parametrize("height", [0.005, 0.05])
 def test_wrenches_are_those_of_the_model_under_the_moments(height):
-    """Where all cells press, and where some lift: bristles, twist and moments of the data give its wrench."""
+    """Bristles, twist and moments of the data give its wrench, with all cells pressing and with some lifted."""
     solution = pf.simulate(slide(MODELS["cells"], (0.4, 0.2, 3.0), 0.04, height=height), bristles="all")
     data, twist = solution.data.isel(time=-1), solution.contact_twist("contact")[-1]
     load, x, y = (float(data[name][0]) for name in ("normal_force", "pressure_x", "pressure_y"))
