@@ -17,7 +17,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction import warm
-from planarfriction.compiler import notice
+from planarfriction.compiler import notice, threads
 from planarfriction.scenes import simulation
 
 COUNTING = """
@@ -120,6 +120,22 @@ def test_the_first_simulation_says_that_it_compiles(compiled_anew, monkeypatch, 
         pf.simulate(scene, t_end=1e-3, **options)
     said = sys.stderr.getvalue().splitlines()
     assert len(said) == lines and all("compiles its solver, once after installation" in line for line in said)
+
+
+def test_roll_outs_say_that_they_compile(monkeypatch):
+    monkeypatch.setattr(notice._Said, "done", False)
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    model = pf.ReducedModelPublished(pf.ContactPatch.disc(radius=0.01, cells=5), pf.LuGre())
+    whole = threads.share
+
+    def share(*args):
+        numba.njit(lambda x: x + 1.0)(1.0)
+        return whole(*args)
+
+    monkeypatch.setattr(threads, "share", share)
+    for _ in range(2):
+        pf.rollout(model, None, [[1.0] * 3] * 2, 1.0, 1e-4)
+    assert sys.stderr.getvalue().count("compiles its solver, once after installation") == 1
 
 
 def test_warming_up_names_its_parts_to_somebody_who_waits(monkeypatch):

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import coupling, derivatives, limit_surface, models
-from planarfriction.compiler.notice import watched
+from planarfriction.compiler.notice import expect_compilation, watched
 from planarfriction.families import MODELS
 from planarfriction.laws import LuGre
 from planarfriction.patch import ContactPatch, friction_metric
@@ -44,6 +44,7 @@ def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float
     a warning says so.
     """
     times, shown = {}, progress is None and watched()
+    expect_compilation()
     progress = _show if shown else progress
     for part in _parts():
         if progress is not None:
@@ -68,6 +69,7 @@ def _parts() -> list[Part]:
     rolled = {name: kinds[name] for name in ("distributed", "reduced-published")} | {"reduced in one part": in_parts}
     sum_of_parts = models.ReducedModel(patch, law, parts=2)
     grooved = models.DistributedModel(patch.with_friction_metric(friction_metric(0.0, along=1.0, across=0.8)), law)
+    rolled["friction with a grain"] = grooved
     return [
         *(Part(f"scenes, {name}", functools.partial(_simulate, model)) for name, model in kinds.items()),
         Part("scenes, friction with a grain", functools.partial(_simulate, grooved)),
@@ -83,7 +85,7 @@ def _parts() -> list[Part]:
 
 
 def _simulate(model: Any) -> None:
-    simulate(in_hand(model), t_end=_INSTANT, progress=lambda time: None)  # whoever called knows that this compiles
+    simulate(in_hand(model), t_end=_INSTANT)
 
 
 def _derive(model: Any) -> None:

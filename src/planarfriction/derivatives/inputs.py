@@ -11,6 +11,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.compiled.shapes_by_load import ShapesByLoad
 from planarfriction.compiler import threads
+from planarfriction.compiler.notice import said_when_compiling
 from planarfriction.derivatives.parameters import Packed, pack
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.rollouts import Inputs
@@ -142,4 +143,5 @@ def sum_to(shape: tuple[int, ...], gradient: np.ndarray) -> np.ndarray:
 
 def share(inputs: Inputs, count: int, work: Callable[[int, int], None]) -> None:
     """Run `work(first, last)` over all contacts, on several threads where that pays."""
-    threads.share(count, count * len(inputs.dt) // _WORTH_A_THREAD, work)
+    with said_when_compiling():
+        threads.share(count, count * len(inputs.dt) // _WORTH_A_THREAD, work)
