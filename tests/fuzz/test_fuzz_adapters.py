@@ -1,9 +1,10 @@
-"""Plants that change behind the adapter's back: said in one line, and nothing is said of others."""
+"""Plants and models that change behind the adapter's back: said in one line, and nothing is said of others."""
 
 from __future__ import annotations
 
 import random
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,3 +35,48 @@ def test_drake_contexts_with_other_parameters(draw: random.Random) -> None:
         raise Broken(f"mass times {times:g}: said is {said}, {run.friction.GetReport(run.own)}")
     if not np.isfinite(run.plant.GetPositionsAndVelocities(run.context)).all():
         raise Broken("the state is not finite")
+
+
+def change(m: Any, kind: str, draw: random.Random) -> bool:
+    """Change the model at run time; return True if the new options fit."""
+    if kind == "integrator":
+        m.opt.integrator = draw.choice([0, 1, 2, 3])
+        return m.opt.integrator != 1
+    if kind == "noslip_iterations":
+        m.opt.noslip_iterations = draw.randint(0, 3)
+        return m.opt.noslip_iterations == 0
+    if kind == "timestep":
+        m.opt.timestep = draw.choice([draw.uniform(1e-4, 0.01), draw.uniform(0.0101, 0.05)])
+        return m.opt.timestep < 0.0101
+    m.pair_dim[draw.randrange(m.npair)] = dimensions = draw.choice([1, 3, 4, 6])
+    return dimensions == 1
+
+
+@attack("adapters", 2)
+def test_models_of_mujoco_that_change(draw: random.Random) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
+    from planarfriction_studies.bench import mujoco_scenes
+
+    scene, law = mujoco_scenes.grip(), pf.LuGre(mu_c=draw.uniform(0.2, 0.45), sigma_0=some.spread(draw, 4, 6))
+    pad = pf.ReducedModel(pf.ContactPatch.disc(draw.uniform(0.005, 0.02), 9), law, parts=1)
+    (m, d, friction), (another, there, own) = scene.ours(), scene.ours(model=pad)
+    d.ctrl[:] = there.ctrl[:] = scene.control(0.0)
+    CASES["models of MuJoCo that change"] += 1
+    with pytest.raises(pf.errors.InvalidValueError, match="data of the model of the patches"):
+        friction.step(there)
+    with friction.install():
+        for _ in range(5):
+            mujoco.mj_step(another, there)
+    if own.wrenches(there).any():
+        raise Broken("the friction of one model acts on another")
+    for _ in range(5):
+        friction.step(d)
+    time, fits = d.time, change(m, kind := draw.choice(["integrator", "noslip_iterations", "timestep", "condim"]), draw)
+    try:
+        friction.step(d)
+    except pf.errors.InvalidValueError as told:
+        if fits or d.time != time or friction.wrenches(d).any() or kind.replace("condim", "pair") not in str(told):
+            raise Broken(f"{kind}: {told}, which fits: {fits}, at {d.time} s after {time} s") from told
+    else:
+        if not fits or d.time == time or not np.isfinite(friction.wrenches(d)).all():
+            raise Broken(f"{kind}: a step with options that do not fit, or none with those that do, at {d.time} s")
