@@ -223,5 +223,5 @@ def test_missing_and_wrong_files_get_one_line(tmp_path):
 def test_what_moves_a_scene_is_no_larger_than_anything_that_exists():
     large = Signal.constant([0.01, 1e155, 1.0])  # a table of numbers may hold it
     model = pf.DistributedModel(pf.ContactPatch.disc(0.01, 5), pf.LuGre())
-    with pytest.raises(InvalidValueError, match=r"velocity must be at most 1e\+50 in size, got 1e\+155"):
+    with pytest.raises(InvalidValueError, match=r"twist must be at most 1e\+50 in size, got 1e\+155"):
         pf.scenes.driven(model, twist=large)

@@ -80,8 +80,10 @@ def library(name: str, precision: str = "double", *options: str) -> Library:
     folder = Path(_folder().name) / "-".join([name, precision, *options])
     pf.export_c(model, folder, precision=precision)
     (folder / "driver.c").write_text(DRIVER)
-    command = "gcc", *STRICT, *(options or ("-O1",)), "-fPIC", "-shared", "-o", "friction.so"
-    subprocess.run([*command, "friction.c", "driver.c", "-lm"], cwd=folder, check=True)
+    compiled = "gcc", *STRICT, *(options or ("-O1",)), "-fPIC", "-c", "friction.c", "driver.c"
+    # linked without the options: -ffast-math would have the whole process take subnormal numbers for zero
+    for command in (compiled, ("gcc", "-shared", "-o", "friction.so", "friction.o", "driver.o", "-lm")):
+        subprocess.run(command, cwd=folder, check=True)
     return Library(model, folder, KINDS[precision], ctypes.CDLL(folder / "friction.so"))
 
 

@@ -65,8 +65,10 @@ def library(model: Any, folder: Path, *options: str) -> ctypes.CDLL:
     """Compile the C library of a model with loops around its step, and load it."""
     export_c(model, folder)
     (folder / "loop.c").write_text(LOOP)
-    command = "gcc", "-std=c99", "-O3", "-march=native", *options, "-fPIC", "-shared", "-o", "friction.so"
-    subprocess.run([*command, "friction.c", "loop.c", "-lm"], cwd=folder, check=True)
+    compiled = "gcc", "-std=c99", "-O3", "-march=native", *options, "-fPIC", "-c", "friction.c", "loop.c"
+    linked = "gcc", "-shared", "-o", "friction.so", "friction.o", "loop.o", "-lm"
+    for command in (compiled, linked):
+        subprocess.run(command, cwd=folder, check=True)
     return ctypes.CDLL(str(folder / "friction.so"))
 
 

@@ -163,7 +163,7 @@ class Placed:
         self.on_box = int(m.geom_type[self.other]) == _BOX
         own = int(m.geom_type[self.own])
         self.has_faces = own != _PLANE and own not in _ROUND and not self._on_curved_side(m)
-        """True if the sides of the geom on the site's body can be told apart."""
+        """True if the geom on the site's body has different sides."""
         for pair in range(m.npair):
             if {int(m.pair_geom1[pair]), int(m.pair_geom2[pair])} == set(self.geoms.tolist()):
                 self.pair = pair
