@@ -23,9 +23,8 @@ demo: $(VENV)/.package
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 
-# What compiled loops and BLAS may round differently elsewhere: surfaces, models, steps, solver, derivatives, fits, plans.
-NUMERIC := compiler derivatives identify kernels limit_surface models patch planning solvers sweeps tensors \
-	test_coupling.py test_formulas.py
+# What compiled loops and BLAS may round differently elsewhere: surfaces, models, steps, solver, derivatives.
+NUMERIC := compiler derivatives kernels limit_surface models patch solvers test_coupling.py test_formulas.py
 
 test-generic: $(VENV)/.test
 	NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES= $(BIN)/python -m pytest -n 2 --dist loadfile $(NUMERIC:%=tests/%) $(ARGS)

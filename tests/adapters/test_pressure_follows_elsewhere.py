@@ -54,6 +54,7 @@ def test_in_drake_a_box_slides_as_a_plate():
     assert near(pose() - begin)
 
 
+@pytest.mark.slow
 @pytest.mark.mjx
 def test_in_mjx_a_box_slides_as_a_plate_with_derivatives():
     jax = pytest.importorskip("jax", reason="needs the extra [mjx]")

@@ -34,6 +34,7 @@ def visits(draw: random.Random, count: int) -> None:
         CASES["pages of the explorer, opened and closed"] += 1
 
 
+@pytest.mark.slow
 @attack("explorer", 1)
 def test_pages_give_their_memory_back(draw: random.Random) -> None:
     pytest.importorskip("panel", reason="the explorer is not installed")

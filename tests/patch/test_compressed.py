@@ -63,7 +63,7 @@ def test_surplus_cells_serve_the_limit_surface():
     assert surface_error(SQUARE, SQUARE) < 1e-14
 
 
-@pytest.mark.parametrize("wanted", [1e-2, 3e-3])
+@pytest.mark.parametrize("wanted", [1e-2, pytest.param(3e-3, marks=pytest.mark.slow)])
 def test_error_raises_the_degree_until_it_is_met(wanted):
     few = SQUARE.compressed(3, error=wanted)
     assert surface_error(SQUARE, few) <= wanted

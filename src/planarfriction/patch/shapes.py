@@ -28,8 +28,8 @@ def columns_and_rows(cells: int | Sequence[int], width: float, height: float) ->
         along = validation.count("cells", cells, at_most=MOST_CELLS)
         side = max(width, height) / along
         return max(1, round(width / side)), max(1, round(height / side))
-    columns, rows = validation.vector("cells", cells, 2)
-    return validation.count("columns", columns), validation.count("rows", rows)
+    columns, rows = validation.vector("cells", cells, 2).tolist()
+    return validation.count("cells[0]", columns), validation.count("cells[1]", rows)
 
 
 def circle(radius: float) -> np.ndarray:
