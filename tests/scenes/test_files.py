@@ -350,6 +350,14 @@ def test_a_key_of_many_names_is_refused_at_once(tmp_path, name):
         pf.Scene.from_file(path)
 
 
+@pytest.mark.parametrize("name", ["a" * 1_000_000, '"' * 1_000_001, " a" * 500_000, "a." * 99 + "b" * 1_000_000])
+def test_long_names_are_looked_at_once(tmp_path, name):
+    path = tmp_path / "scene.toml"
+    path.write_text(f"[{name} x")
+    with pytest.raises(pf.FrictionError, match=r"scene\.toml: not valid TOML"):
+        pf.Scene.from_file(path)
+
+
 @pytest.mark.parametrize("width", ['"0.02"', "[0.02]", "true"])
 def test_published_patches_check_their_width(tmp_path, width):
     path = tmp_path / "scene.toml"

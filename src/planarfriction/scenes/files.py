@@ -32,7 +32,8 @@ SCENE_KEYS = (
 _MOST_NAMES = 100
 """Names of a dotted key that are read: the time of the reader grows with their square."""
 
-_LONG_KEY = re.compile(rf"""(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{_MOST_NAMES}}}""")
+# names are taken whole, from their beginning: of a long one each letter would be tried as the first and the last
+_LONG_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{_MOST_NAMES}}}""")
 
 _OPTIONS = ("save_every", "stop_speed", "rtol", "atol", "name", "start")
 BODY_KEYS = ("mass", "inertia", "position", "angle", "velocity", "gravity", "outline", "size")
