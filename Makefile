@@ -24,7 +24,7 @@ test: $(VENV)/.test
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 
 # What compiled loops and BLAS may round differently elsewhere: surfaces, models, steps, solver, derivatives.
-NUMERIC := compiler derivatives kernels limit_surface models patch solvers test_coupling.py test_formulas.py
+NUMERIC := compiler derivatives kernels limit_surface models solvers test_coupling.py test_formulas.py
 
 test-generic: $(VENV)/.test
 	NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES= $(BIN)/python -m pytest -n 2 --dist loadfile $(NUMERIC:%=tests/%) $(ARGS)
