@@ -165,7 +165,8 @@ class Friction:
         if iterations == loops.UNFIT:
             self._check()
         mujoco.mj_step2(self.m, d)
-        if d.userdata[self._memory.misplaced] != 0.0 and (line := self.misplaced(d)) not in self._said:
+        line = self.misplaced(d) if d.userdata[self._memory.misplaced] != 0.0 else None
+        if line is not None and line not in self._said:
             self._said.add(line)
             warnings.warn(line, stacklevel=2)
         if iterations < 0.0:
