@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import inspect
 import types
@@ -66,6 +67,13 @@ class Target(NamedTuple):
     call: Callable[..., Any]
     arguments: dict[str, Any]
     """Legal ones, by name."""
+
+
+def _log_file(path: str) -> str:
+    """Write a log, and return its path."""
+    rows = np.column_stack([TIMES, TWISTS, -TWISTS, np.full(len(TIMES), 2.0)])
+    np.savetxt(path, rows, delimiter=",", header="t,vx,vy,omega,fx,fy,tau,normal_force", comments="")
+    return path
 
 
 @functools.cache
@@ -178,7 +186,10 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "Scene.from_file": {"path": EXAMPLES / "drift.toml"},
     "Scene.to_file": {"path": "scene.toml"},
     "Solution.save": {"path": "solution.nc"},
-    "Log.from_csv": {"path": EXAMPLES / "push.csv"},
+    "Log.from_csv": {"path": Fresh(lambda: _log_file("log.csv"))},
+    "Log.from_solution": {
+        "solution": Fresh(lambda: pf.simulate(dataclasses.replace(objects()["scene"], save_every=1e-3)))
+    },
     "patch.read_pressure_map": {"path": EXAMPLES / "pad_pressure.csv"},
     "Log": {"twist": TWISTS, "wrench": TWISTS},
     "Log.from_motion": {"wrench": TWISTS},
@@ -210,7 +221,10 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "scenes.pivot": {"normal_force": None, "mass": 0.02, "start": "equilibrium"},
     "scenes.curling": {"twist": (1.0, 0.0, 10.0), "start": "sliding"},
     "export_c": {"folder": "library", "precision": "double"},
+    "ReducedModel": {"cells": 12},
     "rollout": {"twist": TWISTS},
+    "derivatives.rollout": {"twist": TWISTS},
+    "derivatives.rollout_jvp": {"twist": TWISTS},
     "derivatives.rollout_states": {"twist": TWISTS},
     "derivatives.rollout_vjp": {"twist": TWISTS},
     "derivatives.rollout_jacobian": {"twist": TWISTS, "names": ("mu_c",)},

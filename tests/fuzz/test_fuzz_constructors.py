@@ -11,7 +11,7 @@ import nasty
 import numpy as np
 from attack import attack, folder
 from hypothesis import strategies as st
-from judge import Broken, judge
+from judge import CASES, Broken, judge
 from working import use
 
 from planarfriction import families
@@ -47,8 +47,11 @@ def called(target: legal.Target, **changed: Any) -> Any:
 @functools.cache
 def compiled(name: str) -> None:
     """Call the target once with legal arguments: compilation must not count against a wrong argument."""
+    before = CASES["constructors: legal, refused"]
     with folder():
         judge("constructors: legal", lambda: called(targets()[name]), compiles=True)
+    if CASES["constructors: legal, refused"] > before:
+        raise Broken("legal arguments are refused, so that wrong ones are refused for another reason")
 
 
 def numeric(value: Any) -> bool:

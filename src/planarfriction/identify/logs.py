@@ -155,10 +155,14 @@ class Log(ByValue):
         of that name; `window` is that of `from_motion`. If columns are named `contact.vx`, as in the files of
         `planarfriction run`, those of `contact` are read, or those of the only contact.
 
-        Raises FileError, in one line that names the line and the column of what is wrong.
+        Raises FileError, in one line that names the line and the column of what is wrong, and InvalidValueError for a
+        wrong argument, used or not.
         """
         path = validation.path("path", path)
         contact = None if contact is None else validation.text("contact", contact)
+        window = validation.count("window", window, at_least=3)
+        if normal_force is not None:
+            normal_force = validation.non_negative("normal_force", normal_force)
         table = Table(path)
         found = find_columns(path, table.names, contact=contact, with_load=normal_force is None)
         columns = dict(zip(found, table.numbers(list(found.values())).T, strict=True))
@@ -166,7 +170,7 @@ class Log(ByValue):
         moved, wrench = (np.stack([columns[name] for name in names], -1) for names in (motion, WRENCH))
         loads = columns.get("normal_force")
         if loads is None:
-            loads = np.array(validation.non_negative("normal_force", normal_force))
+            loads = np.array(normal_force)
         try:
             if motion is TWIST:
                 return cls(columns["t"], moved, wrench, loads, path.stem)
