@@ -10,6 +10,7 @@ except ImportError:
 
     raise MissingExtraError("warp-lang", "warp") from None
 
+from planarfriction.warp.coupled import CoupledPatches
 from planarfriction.warp.model import Model
 
-__all__ = ["Model"]
+__all__ = ["CoupledPatches", "Model"]

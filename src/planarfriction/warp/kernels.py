@@ -28,6 +28,34 @@ class Batch:
     status: wp.uint64
 
 
+@wp.struct
+class Problems:
+    """Addresses of the problems of all worlds, as `Batch`; those of `HostStep`, `CoupledStep` and their state."""
+
+    rows: wp.int32
+    iterations: wp.int32
+    again: wp.int32
+    dt: wp.float64
+    tolerance: wp.float64
+    parameters: wp.uint64
+    numbers: wp.uint64
+    places: wp.uint64
+    state: wp.uint64
+    twist: wp.uint64
+    normal_force: wp.uint64
+    wrench: wp.uint64
+    twist_response: wp.uint64
+    load_response: wp.uint64
+    new_state: wp.uint64
+    new_wrench: wp.uint64
+    new_twist: wp.uint64
+    new_load: wp.uint64
+    rounds: wp.uint64
+    residual: wp.uint64
+    converged: wp.uint64
+    status: wp.uint64
+
+
 @functools.lru_cache
 def kernel_of(source: str) -> Any:
     """Return the kernel of native source (see `source_of`)."""
@@ -40,3 +68,17 @@ def kernel_of(source: str) -> Any:
         advance(wp.tid(), batch)
 
     return friction_step
+
+
+@functools.lru_cache
+def coupled_kernel_of(source: str) -> Any:
+    """Return the kernel of native source that steps worlds (see `coupled_source_of`)."""
+
+    @wp.func_native(source)
+    def advance(world: wp.int32, batch: Problems): ...  # pyright: ignore[reportGeneralTypeIssues]
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def coupled_step(batch: Problems):  # pyright: ignore[reportGeneralTypeIssues]
+        advance(wp.tid(), batch)
+
+    return coupled_step

@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
 import warp as wp
 
 from planarfriction import validation
-from planarfriction.errors import InvalidValueError
 from planarfriction.export.pieces import pieces_of
+from planarfriction.warp import arrays
 from planarfriction.warp.kernels import Batch, kernel_of
 from planarfriction.warp.source import source_of
-
-PRECISIONS = {wp.float32: "float", wp.float64: "double"}
 
 WRONG = {1: "parameters", 2: "state, twist and normal_force"}
 """Bits of `Model.status`."""
@@ -53,16 +50,14 @@ class Model:
         device: Any = None,
         dtype: Any = wp.float32,
     ) -> None:
-        if dtype not in PRECISIONS:
-            raise InvalidValueError("dtype", "be wp.float32 or wp.float64", dtype)
         pieces = pieces_of(model)
-        source = source_of(pieces, PRECISIONS[dtype])
+        source = source_of(pieces, arrays.precision_of(dtype))
         self.contacts = validation.count("contacts", contacts, at_most=2**31 - 1)
         self.device, self.dtype = wp.get_device(device), dtype
         self.names = (*pieces.parameters, "scale")
         """Parameters in the order of the columns of `parameters`."""
         self.state_shape = (self.contacts, *model.state_shape)
-        rows = _rows({**pieces.parameters, "scale": 1.0}, parameters or {}, self.contacts)
+        rows = arrays.parameter_rows({**pieces.parameters, "scale": 1.0}, parameters or {}, self.contacts)
         self.parameters = wp.array(rows, dtype=dtype, device=self.device)
         """Parameters [contacts or 1, names]; a program may write new ones between steps."""
         self.status = wp.zeros(self.contacts, dtype=wp.int32, device=self.device)
@@ -119,12 +114,7 @@ class Model:
 
         Raises InvalidValueError if a contact had numbers that were not finite or out of range since the last check.
         """
-        status = self.status.numpy().copy()  # on the CPU, `numpy` gives the same memory
-        self.status.zero_()
-        wrong = np.flatnonzero(status)
-        if len(wrong):
-            names = " and ".join(text for bit, text in WRONG.items() if status[wrong[0]] & bit)
-            raise InvalidValueError(names, "be finite and in range", f"other numbers in contacts {wrong.tolist()}")
+        arrays.check(self.status, WRONG, "contacts")
 
     def _launch(
         self, steps: tuple[int, ...], state: Any, twist: Any, load: Any, dt: float, new: Any, wrench: Any
@@ -143,23 +133,4 @@ class Model:
         wp.launch(self.kernel, dim=self.contacts, inputs=[batch], device=self.device)
 
     def _address(self, name: str, given: Any, shape: tuple[int, ...]) -> int:
-        if not isinstance(given, wp.array):
-            raise InvalidValueError(name, "be an array of Warp", type(given).__name__)
-        found = given.shape, given.dtype, given.device
-        if found != (shape, self.dtype, self.device):
-            rule = f"have shape {shape}, {self.dtype.__name__}, on {self.device}"
-            raise InvalidValueError(name, rule, f"{found[0]}, {getattr(found[1], '__name__', found[1])}, {found[2]}")
-        if not given.is_contiguous:
-            raise InvalidValueError(name, "be contiguous", f"strides {given.strides}")
-        return given.ptr or 0
-
-
-def _rows(default: dict[str, float], given: Mapping[str, Any], contacts: int) -> np.ndarray:
-    """Return the parameters of each contact, in one row if all share them."""
-    validation.keys("parameters", dict(given), (), default)
-    values = {name: validation.finite_numbers(name, value) for name, value in given.items()}
-    for name, value in values.items():
-        if value.shape not in ((), (contacts,)):
-            raise InvalidValueError(name, f"be a number or have shape ({contacts},)", value.shape)
-    count = contacts if any(value.shape for value in values.values()) else 1
-    return np.stack([np.broadcast_to(values.get(name, own), count) for name, own in default.items()], axis=1)
+        return arrays.address(name, given, shape, self.dtype, self.device)

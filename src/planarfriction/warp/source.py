@@ -1,14 +1,22 @@
-"""Source of steps for Warp: the traced step of a model in a native function (see `export`)."""
+"""Source of steps for Warp: the traced steps of models in native functions (see `export`)."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction.export.c_source import Writer
 from planarfriction.export.library import PRECISIONS, RANGES
 from planarfriction.export.pieces import Pieces
+from planarfriction.export.trace import Block, Number, Trace, traced
+from planarfriction.export.twins import twin
+from planarfriction.kernels import coupling
+
+ROUNDING = {"double": (coupling.ROUNDING,) * 2, "float": (3e-7, 1e-5)}
+"""Errors of a twist, in the largest speed that goes into it, by precision: below the first no step gets, and below the
+second some do not get."""
 
 
 class Source(NamedTuple):
@@ -23,34 +31,91 @@ class Source(NamedTuple):
 
 def source_of(pieces: Pieces, precision: str) -> Source:
     """Return the source of a step in single or double precision ("float", "double")."""
+    (own,), numbers, places = _described([pieces], precision, slopes=False)
+    return Source(_rendered("step.cpp.j2", own=own), numbers, places)
+
+
+def coupled_source_of(models: Sequence[Pieces], which: Sequence[int], radii: Sequence[float], precision: str) -> Source:
+    """Return the source of a step in contact space of patches: ``which` model each has, and its lever arm [m]."""
+    kinds, numbers, places = _described(models, precision, slopes=True)
+    columns = [len(models[kind].parameters) + 1 for kind in which]
+    states = [models[kind].count * models[kind].states for kind in which]
+    starts = {name: np.cumsum([0, *each]).tolist() for name, each in (("columns", columns), ("states", states))}
+    writer = Writer(precision)
+    names = "SHORTENINGS", "JOINT", "ROUND", "STAGES", "SHORTER"
+    text = _rendered(
+        "coupled.cpp.j2",
+        kinds=kinds,
+        which=which,
+        precision=precision,
+        starts=starts,
+        radii=[writer.constant(each) for each in radii],
+        rounding=list(map(writer.constant, ROUNDING[precision])),
+        shortening="\n".join(writer.lines(traced(_shortening), ["too_far", "share"], indent=" " * 16)),
+        **{name.lower(): writer.constant(getattr(coupling, name)) for name in names},
+    )
+    return Source(text, numbers, places)
+
+
+def _shortening(trace: Trace) -> Any:
+    slopes = Number(trace, "first"), Number(trace, "here")
+    return twin(coupling.too_far)(*slopes), twin(coupling.shortening_of)(*slopes)
+
+
+def _described(
+    models: Sequence[Pieces], precision: str, slopes: bool
+) -> tuple[list[dict[str, Any]], np.ndarray, np.ndarray]:
+    """Return what a template needs of each model, and the tables of all of them."""
+    writer, described = Writer(precision), []
+    all_real: list[np.ndarray] = []
+    all_whole: list[np.ndarray] = []
+    for pieces in models:
+        outputs = [f"next[{i}]" for i in range(pieces.states)] + [f"w[{i}]" for i in range(12 if slopes else 3)]
+        block = _slopes_by_twist(pieces) if slopes else pieces.step
+        lines = list(writer.lines(block, outputs, indent=" " * 12))
+        read = {name: each for name, each in pieces.tables.items() if any(f"{name}[" in line for line in lines)}
+        whole = {name: each for name, each in read.items() if each.dtype.kind == "i"}
+        real = {"share": pieces.tables["share"]} | {name: each for name, each in read.items() if name not in whole}
+        described.append(
+            {
+                "precision": precision,
+                "pieces": pieces,
+                "slopes": slopes,
+                "ranges": [RANGES[each] for each in pieces.parameters],
+                "largest": writer.constant(PRECISIONS[precision]),
+                "numbers": _placed(real, all_real),
+                "places": _placed(whole, all_whole),
+                "step": "\n".join(lines),
+            }
+        )
+    return described, _joined(all_real, float), _joined(all_whole, np.int32)
+
+
+def _slopes_by_twist(pieces: Pieces) -> Block:
+    """Return the step with the slopes of the wrench by the twist, row by row, and no others."""
+    block, first = pieces.slopes(), pieces.states + 3
+    columns = pieces.states + 3 + len(pieces.parameters)
+    rows = [first + columns * row + pieces.states for row in range(3)]
+    return Block(block.operations, block.results[:first] + sum((block.results[at : at + 3] for at in rows), ()))
+
+
+def _rendered(name: str, **values: Any) -> str:
     import jinja2
 
-    writer = Writer(precision)
-    outputs = [f"next[{i}]" for i in range(pieces.states)]
-    lines = list(writer.lines(pieces.step, [*outputs, "w[0]", "w[1]", "w[2]"], indent=" " * 12))
-    read = {name: each for name, each in pieces.tables.items() if any(f"{name}[" in line for line in lines)}
-    whole = {name: each for name, each in read.items() if each.dtype.kind == "i"}
-    real = {"share": pieces.tables["share"]} | {name: each for name, each in read.items() if name not in whole}
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("planarfriction.warp", "."), undefined=jinja2.StrictUndefined
     )
-    text = environment.get_template("step.cpp.j2").render(
-        precision=precision,
-        pieces=pieces,
-        ranges=[RANGES[each] for each in pieces.parameters],
-        largest=writer.constant(PRECISIONS[precision]),
-        numbers=_places(real),
-        places=_places(whole),
-        step="\n".join(lines),
-    )
-    return Source(text, _joined(real, float), _joined(whole, np.int32))
+    return environment.get_template(name).render(values)
 
 
-def _places(tables: dict[str, np.ndarray]) -> dict[str, int]:
-    """Return the place of each table in their array."""
-    ends = np.cumsum([0, *(each.size for each in tables.values())])
-    return dict(zip(tables, map(int, ends), strict=False))
+def _placed(tables: dict[str, np.ndarray], joined: list[np.ndarray]) -> dict[str, int]:
+    """Append tables to their array; return the place of each."""
+    places = {}
+    for name, each in tables.items():
+        places[name] = sum(len(one) for one in joined)
+        joined.append(each.ravel())
+    return places
 
 
-def _joined(tables: dict[str, np.ndarray], kind: type) -> np.ndarray:
-    return np.concatenate([each.ravel() for each in tables.values()] or [np.zeros(0)]).astype(kind)
+def _joined(tables: list[np.ndarray], kind: type) -> np.ndarray:
+    return np.concatenate(tables or [np.zeros(0)]).astype(kind)

@@ -1,0 +1,169 @@
+"""Steps in contact space of the patches of many worlds, as a Warp kernel (see `planarfriction.coupling`)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from planarfriction import coupling, validation
+from planarfriction.coupling import CoupledStep, HostStep
+from planarfriction.errors import InvalidValueError
+from planarfriction.export.pieces import pieces_of
+from planarfriction.models import FrictionModel
+from planarfriction.warp import arrays
+from planarfriction.warp.kernels import Problems, coupled_kernel_of
+from planarfriction.warp.source import coupled_source_of
+
+WRONG = {1: "parameters", 2: "state and host"}
+"""Bits of `CoupledPatches.status`."""
+
+
+class CoupledPatches:
+    """Patches of `worlds` worlds, each coupled through the bodies of a host: a Warp kernel with one thread a world.
+
+    The step is that of `planarfriction.coupling.CoupledPatches`, solved for the twists, which keep their digits in
+    single precision where wrenches lose them.
+
+    Parameters
+    ----------
+    models
+        Friction models, one for each of the k patches of a world: `ReducedModel`, `DistributedModel` or
+        `ReducedModelPublished` with a law of LuGre bristles.
+    worlds
+        Number of worlds.
+    parameters
+        Numbers of the laws by name, and `scale`, the size of a patch as a multiple of its model's: a number, or arrays
+        [worlds] or [worlds, k]. What is not given is the models'.
+    device
+        Warp device, by default Warp's current one.
+    dtype
+        `wp.float32` or `wp.float64`, of all arrays.
+
+    Raises InvalidValueError for models without source (see `export_c`), and parameters without that name or shape.
+    """
+
+    def __init__(
+        self,
+        models: Sequence[FrictionModel],
+        *,
+        worlds: int,
+        parameters: Mapping[str, Any] | None = None,
+        device: Any = None,
+        dtype: Any = wp.float32,
+    ) -> None:
+        self.models = tuple(models)
+        if not self.models:
+            raise InvalidValueError("models", "hold at least one", "none")
+        precision = arrays.precision_of(dtype)
+        self.worlds = validation.count("worlds", worlds, at_most=2**31 - 1)
+        self.device, self.dtype = wp.get_device(device), dtype
+        known = list({id(model): model for model in self.models}.values())
+        which = [next(i for i, each in enumerate(known) if each is model) for model in self.models]
+        pieces = [pieces_of(model) for model in known]
+        radii = [float(np.sqrt((model.patch.positions**2).sum(1).mean())) or 1.0 for model in self.models]
+        source = coupled_source_of(pieces, which, radii, precision)
+        self.state_shape = (sum(math.prod(model.state_shape) for model in self.models),)
+        """Shape of the state of the patches of a world."""
+        self.names = tuple((*pieces[kind].parameters, "scale") for kind in which)
+        """Parameters of each patch, in the order of the columns of `parameters`, one patch after the other."""
+        defaults = [{**pieces[kind].parameters, "scale": 1.0} for kind in which]
+        self.parameters = wp.array(self._rows(defaults, parameters or {}), dtype=dtype, device=self.device)
+        """Parameters [worlds or 1, names]; a program may write new ones between steps."""
+        self.status = wp.zeros(self.worlds, dtype=wp.int32, device=self.device)
+        """Bits of what was wrong since the last `check` [worlds]: 1 in parameters, 2 in what a step was given."""
+        self._numbers = wp.array(source.numbers, dtype=dtype, device=self.device)
+        self._places = wp.array(source.places, dtype=wp.int32, device=self.device)
+        self.kernel = coupled_kernel_of(source.text)
+        """Kernel of `step`."""
+        wp.load_module(self.kernel.module, device=self.device)
+
+    def rest(self) -> wp.array[Any]:
+        """Return the state [worlds, states] of patches without memory."""
+        return self._zeros(*self.state_shape)
+
+    def results(self) -> CoupledStep:
+        """Return arrays that `step` can write."""
+        k = len(self.models)
+        state, wrench, twist, load = self.rest(), self._zeros(k, 3), self._zeros(k, 3), self._zeros(k)
+        rounds, converged = (wp.zeros(self.worlds, dtype=wp.int32, device=self.device) for _ in range(2))
+        return CoupledStep(state, wrench, twist, load, rounds, self._zeros(), converged)
+
+    def step(
+        self,
+        state: wp.array[Any],
+        host: HostStep,
+        dt: float,
+        results: CoupledStep,
+        *,
+        tolerance: float = coupling.TOLERANCE,
+        iterations: int | None = None,
+    ) -> None:
+        """Solve the steps of all worlds, in one kernel without allocation or synchronisation.
+
+        `state` is [worlds, states], the arrays of `host` have `worlds` as their leading axis, and `results` are written
+        (see `results`); its state is another array. Rounding stops a step in single precision at 1e-5 of the speed
+        that goes into its twists, if that is more than the `tolerance` [m/s]. A world with numbers that are not finite
+        or out of range keeps its state, has no wrenches and -1 `iterations` (see `check`).
+
+        Raises InvalidValueError for arrays of another shape, precision or device, moments, and a step or a tolerance
+        out of range.
+        """
+        if host.moments is not None:
+            raise InvalidValueError("moments", "be None: pressures do not follow them in Warp", "an array")
+        if results.state is state:
+            raise InvalidValueError("results.state", "be another array than state", "the same")
+        k, one = len(self.models), Problems()
+        one.rows, one.dt = self.parameters.shape[0], validation.non_negative("dt", dt)
+        one.tolerance = validation.positive("tolerance", tolerance)
+        one.iterations = coupling.ITERATIONS if iterations is None else validation.count("iterations", iterations, 0)
+        one.again = int(iterations is None)
+        one.state = self._address("state", state, *self.state_shape)
+        one.twist = self._address("twist", host.twist, k, 3)
+        one.normal_force = self._address("normal_force", host.normal_force, k)
+        one.wrench = self._address("wrench", host.wrench, k, 3)
+        one.twist_response = self._address("twist_response", host.twist_response, 3 * k, 3 * k)
+        if host.load_response is not None:
+            one.load_response = self._address("load_response", host.load_response, k, 3 * k)
+        one.new_state = self._address("results.state", results.state, *self.state_shape)
+        one.new_wrench = self._address("results.wrench", results.wrench, k, 3)
+        one.new_twist = self._address("results.twist", results.twist, k, 3)
+        one.new_load = self._address("results.normal_force", results.normal_force, k)
+        one.residual = self._address("results.residual", results.residual)
+        one.rounds = self._address("results.iterations", results.iterations, dtype=wp.int32)
+        one.converged = self._address("results.converged", results.converged, dtype=wp.int32)
+        one.parameters, one.status = self.parameters.ptr, self.status.ptr
+        one.numbers, one.places = self._numbers.ptr, self._places.ptr or 0
+        wp.launch(self.kernel, dim=self.worlds, inputs=[one], device=self.device)
+
+    def check(self) -> None:
+        """Wait for the device, and forget what was wrong.
+
+        Raises InvalidValueError if a world had numbers that were not finite or out of range since the last check.
+        """
+        arrays.check(self.status, WRONG, "worlds")
+
+    def _zeros(self, *shape: int) -> wp.array[Any]:
+        return wp.zeros((self.worlds, *shape), dtype=self.dtype, device=self.device)
+
+    def _address(self, name: str, given: Any, *shape: int, dtype: Any = None) -> int:
+        return arrays.address(name, given, (self.worlds, *shape), dtype or self.dtype, self.device)
+
+    def _rows(self, defaults: Sequence[Mapping[str, float]], given: Mapping[str, Any]) -> np.ndarray:
+        """Return the parameters of all patches, side by side."""
+        validation.keys("parameters", dict(given), (), set().union(*defaults))
+        values = {name: np.asarray(value) for name, value in given.items()}
+        each = [
+            {
+                name: value[:, p] if value.shape == (self.worlds, len(defaults)) else value
+                for name, value in values.items()
+                if name in own
+            }
+            for p, own in enumerate(defaults)
+        ]
+        rows = [arrays.parameter_rows(own, mine, self.worlds) for own, mine in zip(defaults, each, strict=True)]
+        count = max(map(len, rows))
+        return np.concatenate([np.broadcast_to(row, (count, row.shape[1])) for row in rows], axis=1)
