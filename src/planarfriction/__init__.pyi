@@ -18,6 +18,7 @@ from . import solvers as solvers
 from . import sweeps as sweeps
 from .coupling import HostStep as HostStep
 from .derivatives import rollout as rollout
+from .environments import randomise as randomise
 from .errors import FrictionError as FrictionError
 from .export import export_c as export_c
 from .identify import Log as Log

@@ -320,6 +320,8 @@ class _PackedPatches(NamedTuple):
     """Patches whose pieces follow their loads, and these pieces."""
     counts: np.ndarray
     """Points of each patch that share its load; 0 of one that cannot follow moments, `[k]`."""
+    sizes: np.ndarray
+    """Words of the pieces' records, int `[pieces]`; 0 of those that follow their loads."""
     kept: list[Any]
     """Objects behind the addresses, which have to be kept alive."""
 
@@ -328,7 +330,7 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
     counts = [model.compiled.parts for model in models]
     ends = np.cumsum([0, *counts]).tolist()
     pieces = [slice(*each) for each in itertools.pairwise(ends)]
-    functions, owners, firsts = np.zeros((3, ends[-1]), np.int64)
+    functions, owners, firsts, sizes = np.zeros((4, ends[-1]), np.int64)
     records, shares, known, following = np.zeros(ends[-1], np.int64), np.zeros(ends[-1]), {}, []
     for p, (model, own) in enumerate(zip(models, pieces, strict=True)):
         functions[own], owners[own] = address_of(model.compiled.functions.slopes, WORDS), p
@@ -339,6 +341,7 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
         steps = known.setdefault(id(model), None) or model.compiled.packed_parts([None])
         known[id(model)] = steps
         records[own], shares[own] = steps.addresses[0], steps.shares[0]
+        sizes[own] = [part.records.shape[1] for part in steps.parts]
     # all cells, whatever load they carry: a lever arm that does not follow the load
     radius = np.array([np.sqrt((model.patch.positions**2).sum(1).mean()) for model in models])
     followers = _followers(models, np.array(ends[:-1]))
@@ -356,7 +359,7 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
         row=rows.offsets,
     )
     kept, counts = [functions, owners, firsts, radius, *followers, *known.values()], np.diff(followers.firsts)
-    return _PackedPatches(row_of(patches), rows.slices, rows.size, records, shares, following, counts, kept)
+    return _PackedPatches(row_of(patches), rows.slices, rows.size, records, shares, following, counts, sizes, kept)
 
 
 def _followers(models: Sequence[FrictionModel], pieces: np.ndarray) -> Followers:

@@ -46,6 +46,13 @@ class LawNumbers(NamedTuple):
     """v_c [m/s]: plain bristles relax as if they slid faster by this speed; 0 keeps what sticks where it is."""
 
 
+PARAMETERS = (
+    *("sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "breakaway_ratio"),
+    *("scale", "centre_x", "centre_y"),
+)
+"""Numbers of a patch that may differ between environments: of its law, its size, and its displacement [m]."""
+
+
 def stribeck(xp, speed, law):
     """Friction coefficient in steady sliding, `g = mu_c + (mu_s - mu_c) exp(-|v/v_s|^gamma)` [-] ("Bristles")."""
     return law.mu_c + (law.mu_s - law.mu_c) * xp.exp(-xp.power(speed * (1.0 / law.v_s), law.gamma))

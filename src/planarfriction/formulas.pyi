@@ -3,6 +3,7 @@
 from typing import Any, NamedTuple
 
 LARGEST: float
+PARAMETERS: tuple[str, ...]
 
 class LawNumbers(NamedTuple):
     sigma_0: Any

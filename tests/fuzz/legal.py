@@ -211,6 +211,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "scenes.in_hand": {"normal_force": None},
     "scenes.free_slide": {"normal_force": None, "twist": (1.0, 0.0, 10.0), "inertia": None},
     "scenes.drift": {"load": "normal"},
+    "randomise": {"ranges": {"mu_c": (0.2, 0.4)}, "seed": 1},
     "sweep": {
         "make_scene": Fresh(lambda: lambda mass: pf.scenes.driven(objects()["model"], t_end=0.01, normal_force=mass)),
         "values": {"mass": [1.0, 2.0]},

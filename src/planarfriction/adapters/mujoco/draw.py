@@ -52,15 +52,18 @@ def draw_patch(
     wrench: np.ndarray,
     twist: np.ndarray,
     newton: float,
+    scale: float = 1.0,
 ) -> None:
-    """Add the patch with its origin [3] and axes [3, 3] as rows in the world; a newton is drawn as `newton` [m].
+    """Add the patch, `scale` times as large, with its origin [3] and axes [3, 3] as rows in the world.
+
+    A newton is drawn as `newton` [m].
 
     Raises `InvalidValueError` where the scene has no room for more geoms.
     """
     origin, axes = frame
-    size = _size(patch)
+    size = scale * _size(patch)
     for rim in outlines(patch):
-        corners = origin + rim @ axes[:2]
+        corners = origin + scale * rim @ axes[:2]
         for start, end in itertools.pairwise(corners):
             _connect(scene, mujoco.mjtGeom.mjGEOM_CAPSULE, 0.04 * size, start, end, OUTLINE)
     force = wrench[:2] @ axes[:2]

@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
+import copy
 import ctypes
 import functools
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
@@ -19,11 +20,21 @@ from planarfriction.adapters.mujoco.library import layout, same
 from planarfriction.adapters.mujoco.loops import step as loops
 from planarfriction.adapters.mujoco.loops.centres import FAULTS
 from planarfriction.adapters.mujoco.loops.records import Host, scratch_layout
-from planarfriction.adapters.mujoco.patches import PatchContact, Placed, check_once, memory
+from planarfriction.adapters.mujoco.patches import (
+    PatchContact,
+    Placed,
+    check_once,
+    memory,
+    parameters_in,
+    place_of_parameters,
+    write_parameters,
+)
 from planarfriction.compiler.memory import place_of, row_of
 from planarfriction.coupling import CoupledPatches
+from planarfriction.environments import check
 from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.kernels import coupling as kernels
+from planarfriction.laws.base import is_rate_law
 
 INTEGRATORS = {
     int(mujoco.mjtIntegrator.mjINT_EULER): "Euler",
@@ -64,13 +75,14 @@ class Friction:
             if patch.model.depends_on_load:
                 rule = "have a shape that does not change with the load: compiled steps need fixed numbers"
                 raise InvalidValueError("model", rule, type(patch.model).__name__)
-        self._check()
+        self._place = place_of_parameters(m)
+        self._check(m)
         self._said: set[str | None] = set()
         self._memory = memory(patches, m.nv, m.nuserdata)
 
-    def _check(self) -> None:
-        """Refuse options of the model that do not fit."""
-        m, options = self.m, self.m.opt
+    def _check(self, m: Any) -> None:
+        """Refuse options and parameters of a model that do not fit."""
+        options = m.opt
         if options.integrator not in INTEGRATORS:
             rule = f"be {', '.join(INTEGRATORS.values())}"
             raise InvalidValueError("integrator", rule, mujoco.mjtIntegrator(options.integrator).name[6:])
@@ -82,6 +94,35 @@ class Friction:
             raise InvalidValueError("sleep", "be disabled: sleeping bodies do not react to wrenches", "enabled")
         for placed in self.placed:
             placed.check(m)
+        check(self.parameters(m))
+
+    # ------------------------------------------------------------------ friction of each environment
+
+    def parameters(self, m: Any = None) -> dict[str, np.ndarray]:
+        """Return the parameters of the patches in a copy of the model, or in the model, by name: views `[k]`.
+
+        Write new numbers into them at any time; the next step takes them. Names are those of `pf.randomise`. Laws with
+        a rate of their own (`RateLaw`) keep their numbers.
+        """
+        return parameters_in(self.m if m is None else m, self._place, len(self.patches))
+
+    def copies(self, parameters: Mapping[str, Any]) -> list[Any]:
+        """Return copies of the model, one for each of E environments, with these parameters, as `pf.randomise` draws.
+
+        Each is `[E]` or, for patches that differ, `[E, k]`, or a number for all.
+
+        Raises `InvalidValueError` for unknown names, other shapes, numbers that break the rule of a parameter, and
+        without an array.
+        """
+        values = check(parameters)
+        counts = [len(value) for value in values.values() if value.ndim]
+        if not counts:
+            raise InvalidValueError("parameters", "hold an array, with a number for each environment", "none")
+        models = [copy.copy(self.m) for _ in range(counts[0])]
+        write_parameters(models, self._place, len(self.patches), values)
+        for m in models:
+            check(self.parameters(m))
+        return models
 
     # ------------------------------------------------------------------ what the data hold
 
@@ -111,8 +152,9 @@ class Friction:
 
         It is that of the last step; without contact it is the site, and its axes are not numbers.
         """
-        placed, at = self.placed[p], self._memory.centre + 3 * p
-        return placed.frame(d, *placed.contacts(d), d.userdata[at : at + 3])
+        placed, at, own = self.placed[p], self._memory.centre + 3 * p, self.parameters(d.model)
+        origin, axes = placed.frame(d, *placed.contacts(d), d.userdata[at : at + 3])
+        return origin + own["centre_x"][p] * axes[0] + own["centre_y"][p] * axes[1], axes
 
     def misplaced(self, d: Any) -> str | None:
         """Return a line about a patch that did not lie in its contact in the last step, None if all did.
@@ -147,7 +189,8 @@ class Friction:
                 origin, axes = self.frame(d, p)
                 # between the two surfaces, which overlap by what the contact gives
                 middle = origin + axes[2] * (axes[2] @ (d.contact.pos[chosen].mean(axis=0) - origin))
-                draw_patch(scene, placed.patch.model.patch, (middle, axes), wrench, twist, newton)
+                scale = float(self.parameters(d.model)["scale"][p])
+                draw_patch(scene, placed.patch.model.patch, (middle, axes), wrench, twist, newton, scale)
 
     # ------------------------------------------------------------------ steps
 
@@ -159,12 +202,12 @@ class Friction:
         """
         if d.model is not self.m and not loops.is_served(self._row, d.model._address):
             raise InvalidValueError("d", "be data of the model of the patches, or of a copy", "data of another model")
-        mujoco.mj_step1(self.m, d)
-        loops.plan_step(self._row, self.m._address, d._address)
+        mujoco.mj_step1(d.model, d)
+        loops.plan_step(self._row, d.model._address, d._address)
         iterations = d.userdata[self._memory.iterations]
         if iterations == loops.UNFIT:
-            self._check()
-        mujoco.mj_step2(self.m, d)
+            self._check(d.model)
+        mujoco.mj_step2(d.model, d)
         line = self.misplaced(d) if d.userdata[self._memory.misplaced] != 0.0 else None
         if line is not None and line not in self._said:
             self._said.add(line)
@@ -183,7 +226,7 @@ class Friction:
         Raises `FrictionError` if another control callback is installed, and at the end of the block `InvalidValueError`
         if options of this model do not fit any more.
         """
-        self._check()
+        self._check(self.m)
         if mujoco.get_mjcb_control() is not None or loops.INSTALLED[0] != 0:
             raise FrictionError("a control callback is installed already: remove it with mujoco.set_mjcb_control(None)")
         loops.INSTALLED[0] = place_of(self._row)
@@ -193,7 +236,7 @@ class Friction:
         finally:
             mujoco.set_mjcb_control(None)
             loops.INSTALLED[0] = 0
-        self._check()
+        self._check(self.m)
 
     @functools.cached_property
     def _row(self) -> np.ndarray:
@@ -201,7 +244,7 @@ class Friction:
         packed, k = self.coupled._packed, len(self.patches)
         problem, scratch = (
             self.coupled._blank_problem([each.follows for each in self.placed]),
-            scratch_layout(packed.words, k, self.m.nv),
+            scratch_layout(packed.words, int(packed.sizes.sum()), k, self.m.nv),
         )
         chosen = [
             (
@@ -221,13 +264,15 @@ class Friction:
         joints = np.flatnonzero(self.m.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE))
         free = np.array([joints, self.m.jnt_dofadr[joints]], np.int64)
         extents = np.array([each.extent() for each in self.placed])
-        self._kept = problem, columns, free, packed, extents
+        laws = np.array([not is_rate_law(patch.model.law) for patch in self.patches], np.int64)
+        self._kept = problem, columns, free, packed, extents, laws
         places = dict(zip(names, (place_of(columns) + 8 * k * np.arange(len(names))).tolist(), strict=True))
         host = Host(
             m=self.m._address, same_count=len(same()), same=place_of(same()),
             nv=self.m.nv, nuserdata=self.m.nuserdata, count=k, states=self.coupled.state_shape[0], words=packed.words,
             scratch_words=scratch.size, problem=place_of(problem), patches=place_of(packed.row),
             solve=kernels.solve_address(), plan=loops.plan_address(), free_count=len(joints),
+            parameters=self._place, laws=place_of(laws), record_words=place_of(packed.sizes),
             free_joints=place_of(free), free_dofs=place_of(free) + 8 * len(joints),
             extents=place_of(extents), memory=self._memory, scratch=scratch.offsets, **places, **layout(),
         )  # fmt: skip

@@ -91,7 +91,7 @@ _SHARED = {
     "geom_bodyid": ("ngeom", 4),
     "site_bodyid": ("nsite", 4),
     "pair_geom1": ("npair", 4),
-    "numeric_data": ("nnumericdata", 8),
+    "numeric_adr": ("nnumeric", 4),
 }
 """Arrays of a model that its copies share, whatever is set at run time, with their counts and the bytes of a number."""
 

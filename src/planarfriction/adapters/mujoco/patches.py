@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,11 +17,13 @@ from planarfriction import validation
 from planarfriction.adapters.mujoco.loops.centres import ALONG as ALONG_X
 from planarfriction.adapters.mujoco.loops.centres import BEHIND, BEYOND
 from planarfriction.adapters.mujoco.loops.geometry import ALONG
-from planarfriction.adapters.mujoco.loops.models import LONGEST
+from planarfriction.adapters.mujoco.loops.models import DIGEST, LONGEST
 from planarfriction.adapters.mujoco.loops.records import Memory, memory_layout
 from planarfriction.compiler.memory import Layout
+from planarfriction.environments import check, defaults
 from planarfriction.equality import Checked
 from planarfriction.errors import InvalidValueError
+from planarfriction.formulas import PARAMETERS
 from planarfriction.models import FrictionModel
 
 RECORD = "planarfriction"
@@ -95,8 +97,8 @@ def prepare(spec: Any, patches: Sequence[PatchContact]) -> None:
     """Prepare an `MjSpec` for the patches: add a contact pair without friction for each, and room in the user data.
 
     An existing pair keeps its settings except for friction; a new pair takes those of its geoms. A second call replaces
-    the room that the first one took. A custom numeric "planarfriction" holds the room taken and a digest of the
-    patches, by which copies of the model are told from other models.
+    the room that the first one took. A custom numeric "planarfriction" holds the room taken, a digest of the patches,
+    by which copies of the model are told from other models, and the parameters of the patches, which copies may change.
 
     Raises `InvalidValueError` for a geom or a site that does not exist, and for the same pair twice.
     """
@@ -116,8 +118,32 @@ def prepare(spec: Any, patches: Sequence[PatchContact]) -> None:
     record = next((each for each in spec.numerics if each.name == RECORD), None)
     taken = 0 if record is None else int(record.data[0])
     record = spec.add_numeric(name=RECORD) if record is None else record
-    record.data = [room, *_digest(patches)]
+    numbers = [number for patch in patches for number in defaults(patch.model.law)]
+    record.data = [room, *_digest(patches), *numbers]
+    record.size = len(record.data)
     spec.nuserdata = max(spec.nuserdata, 0) - taken + room
+
+
+def place_of_parameters(m: Any) -> int:
+    """Return the place of the parameters of the patches in the numerics of a prepared model, or raise."""
+    return int(m.numeric_adr[_named(m, "numeric", RECORD, mujoco.mjtObj.mjOBJ_NUMERIC)]) + DIGEST
+
+
+def parameters_in(m: Any, place: int, k: int) -> dict[str, np.ndarray]:
+    """Return views `[k]` of the parameters of k patches in a model."""
+    rows = m.numeric_data[place : place + k * len(PARAMETERS)].reshape(k, len(PARAMETERS))
+    return dict(zip(PARAMETERS, rows.T, strict=True))
+
+
+def write_parameters(models: Sequence[Any], place: int, k: int, parameters: Mapping[str, Any]) -> None:
+    """Write parameters of k patches into models of E environments: by name a number, `[E]`, or `[E, k]`."""
+    shapes = (), (len(models),), (len(models), k)
+    for name, values in check(parameters).items():
+        if values.shape not in shapes:
+            raise InvalidValueError(name, f"have shape {' or '.join(str(list(each)) for each in shapes)}", values.shape)
+        values = np.broadcast_to(values.reshape(*values.shape, *[1] * (2 - values.ndim)), shapes[2])
+        for m, row in zip(models, values, strict=True):
+            parameters_in(m, place, k)[name][:] = row
 
 
 def _digest(patches: Sequence[PatchContact]) -> list[int]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from planarfriction.adapters.mujoco.loops.geometry import axes, owners_of, places_of
+from planarfriction.adapters.mujoco.loops.parameters import displacement_of, scale_of
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import at, doubles, integers
@@ -42,7 +43,7 @@ def _centre(d, own, s, nefc, p):
 
 @kernel
 def _share(own, d, s, p, radius, dt):
-    """Return the share of the displacement to the centre that patch p takes in this step."""
+    """Return the share of the displacement to the centre that patch p, of a lever arm `radius`, takes in this step."""
     velocity, rows, vx, vy = doubles(integers(d + own.data.qvel)[0]), at(s.jacobian, 3 * own.nv * p), 0.0, 0.0
     for i in range(own.nv):
         vx, vy = vx + rows[i] * velocity[i], vy + rows[own.nv + i] * velocity[i]
@@ -67,18 +68,22 @@ def _move(own, d, s, nefc, p, guess, dx, dy):
 
 
 @kernel
-def _fault(own, d, s, p, x, y):
+def _fault(own, m, d, s, p, x, y):
     """Return the fault of patch p, with the centre of its contact forces at x, y in its frame."""
+    scale, (dx, dy) = scale_of(own, m, p), displacement_of(own, m, p)
     frame, site, extent = at(s.frames, 6 * p), integers(own.sites)[p], at(doubles(own.extents), 6 * p)
     normal, faces = axes(own, d, frame, site)[2], integers(own.faces)[p] != 0
     if integers(own.at_contact)[p] == 0:
-        slack = MARGIN * extent[4] + s.depths[2 * p + 1]
-        if x < extent[0] - slack or x > extent[1] + slack or y < extent[2] - slack or y > extent[3] + slack:
+        size = scale * extent[4]
+        slack = MARGIN * size + s.depths[2 * p + 1]
+        if x - dx < scale * extent[0] - slack or x - dx > scale * extent[1] + slack:
+            return BEYOND
+        if y - dy < scale * extent[2] - slack or y - dy > scale * extent[3] + slack:
             return BEYOND
         geom = three(at(doubles(integers(d + own.data.geom_xpos)[0]), 3 * integers(own.own)[p]))
-        if faces and dot(normal, plus(three(at(frame, 3)), -1.0, geom)) > MARGIN * extent[4]:
+        if faces and dot(normal, plus(three(at(frame, 3)), -1.0, geom)) > MARGIN * size:
             return BEHIND
-        if abs(s.depths[2 * p]) > extent[4] + slack:
+        if abs(s.depths[2 * p]) > size + slack:
             return BEYOND
     turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
     along = (turned[0], turned[3], turned[6])
@@ -87,8 +92,11 @@ def _fault(own, d, s, p, x, y):
 
 @kernel
 def _support(own, m, d, s, p, support):
-    """Write the face of the other geom, if it is a box, into the frame of patch p; none if they meet at an edge."""
-    frame, other = at(s.frames, 6 * p), integers(own.other)[p]
+    """Write the face of the other geom, if it is a box, into the frame of patch p; none if they meet at an edge.
+
+    Lengths are those of the patch in the size of its friction model.
+    """
+    frame, other, shrunk = at(s.frames, 6 * p), integers(own.other)[p], 1.0 / scale_of(own, m, p)
     support[4] = 0.0
     if integers(own.boxes)[p] == 0:
         return
@@ -102,15 +110,30 @@ def _support(own, m, d, s, p, support):
         if dot(normal, (turned[k], turned[3 + k], turned[6 + k])) ** 2 > 1.0 - MARGIN**2:
             i, j = (k + 1) % 3, (k + 2) % 3
             first = turned[i], turned[3 + i], turned[6 + i]
-            support[0], support[1], support[2], support[3] = dot(x, away), dot(y, away), dot(x, first), dot(y, first)
-            support[4], support[5], support[6] = half[i], half[j], doubles(own.extents)[6 * p + 5]
+            support[0], support[1] = shrunk * dot(x, away), shrunk * dot(y, away)
+            support[2], support[3], support[6] = dot(x, first), dot(y, first), doubles(own.extents)[6 * p + 5]
+            support[4], support[5] = shrunk * half[i], shrunk * half[j]
+
+
+@kernel
+def _resize(own, m, d, s, nefc, p, guess):
+    """Displace patch p from its origin, and go over to twists, torques and places in the size of its friction model."""
+    scale, (dx, dy) = scale_of(own, m, p), displacement_of(own, m, p)
+    _move(own, d, s, nefc, p, guess, dx, dy)
+    rows, owners, places = at(s.jacobian, 3 * own.nv * p), owners_of(s, nefc), places_of(s, nefc)
+    for i in range(own.nv):
+        rows[2 * own.nv + i] *= scale
+    guess[2] /= scale
+    for r in range(nefc):
+        if owners[r] == p:
+            places[r], places[nefc + r] = places[r] / scale, places[nefc + r] / scale
 
 
 @kernel
 def follow_centres(own, m, d, s, nefc, radius, problem, kept):
     """Move origins towards the centres of the contact forces, remember them, and note a patch that is misplaced.
 
-    Write the faces that bear the patches.
+    Displace the patches from there, and write the faces that bear them (see `parameters`).
     """
     kept.misplaced[0], dt = 0.0, doubles(m + own.model.timestep)[0]
     for p in range(own.count):
@@ -120,17 +143,18 @@ def follow_centres(own, m, d, s, nefc, radius, problem, kept):
             continue
         force, x, y = _centre(d, own, s, nefc, p)
         if force > 0.0:
-            fault = _fault(own, d, s, p, x, y)
+            fault = _fault(own, m, d, s, p, x, y)
             if fault != 0:
                 kept.misplaced[0] = FAULTS * p + fault
-        if integers(own.at_contact)[p] == 0:
-            _support(own, m, d, s, p, at(problem.support, 7 * p))
-            continue
-        share = 1.0 if square(three(held)) == 0.0 else _share(own, d, s, p, radius[p], dt)
-        _move(own, d, s, nefc, p, at(problem.guess, 3 * p), share * x, share * y)
+        guess = at(problem.guess, 3 * p)
+        if integers(own.at_contact)[p] != 0:
+            lever = scale_of(own, m, p) * radius[p]
+            share = 1.0 if square(three(held)) == 0.0 else _share(own, d, s, p, lever, dt)
+            _move(own, d, s, nefc, p, guess, share * x, share * y)
+            turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
+            place = three(at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site))
+            away = plus(three(at(s.frames, 6 * p + 3)), -1.0, place)
+            for i in range(3):
+                centre[i] = dot((turned[i], turned[3 + i], turned[6 + i]), away)
+        _resize(own, m, d, s, nefc, p, guess)
         _support(own, m, d, s, p, at(problem.support, 7 * p))
-        turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
-        place = three(at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site))
-        away = plus(three(at(s.frames, 6 * p + 3)), -1.0, place)
-        for i in range(3):
-            centre[i] = dot((turned[i], turned[3 + i], turned[6 + i]), away)

@@ -7,14 +7,14 @@ import math
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call_c
-from planarfriction.compiler.memory import arrays_at, at, doubles, integers, integers32
+from planarfriction.compiler.memory import at, doubles, integers, integers32
 from planarfriction.kernels.vectors import dot, norm, plus, square, three, times
 
 
 @kernel
 def take(host, d, nefc):
-    """Take scratch from the data's own stack, until it is freed."""
-    return arrays_at(host.scratch, call_c(host.functions.mj_stackAllocNum, (d, host.scratch_words + 4 * nefc)))
+    """Take scratch from the data's own stack, until it is freed; return its address."""
+    return call_c(host.functions.mj_stackAllocNum, (d, host.scratch_words + 4 * nefc))
 
 
 @kernel

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from planarfriction.adapters.mujoco.loops.parameters import are_in_range
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import doubles, integers, integers32
 
 LONGEST = 0.01
 """Longest time step [s] where MuJoCo makes contacts softer for it, and the integrator is implicit."""
+
+DIGEST = 5
+"""Numbers of the record of a prepared model in front of the parameters of its patches."""
 
 
 @kernel
@@ -32,6 +36,10 @@ def serves(own, m):
     alike = True
     for i in range(own.same_count):
         alike = alike and _alike(own, m, i)
+    if alike:
+        one, other = integers(m + own.model.numeric_data)[0], integers(own.m + own.model.numeric_data)[0]
+        for i in range(own.parameters - DIGEST, own.parameters):
+            alike = alike and doubles(one)[i] == doubles(other)[i]
     return alike
 
 
@@ -49,4 +57,4 @@ def fits(own, m):
         constant = doubles(integers(m + at.pair_solref)[0])[2 * pair]
         fit = fit and integers32(integers(m + at.pair_dim)[0])[pair] == 1
         fit = fit and (softened or constant <= 0.0 or dt <= 0.5 * constant)
-    return fit
+    return fit and are_in_range(own, m)

@@ -18,7 +18,7 @@ def _integers(name: str, fields: str) -> Any:
 ModelOffsets = _integers(
     "ModelOffsets",
     "nv nuserdata timestep integrator disableflags enableflags noslip_iterations dof_damping pair_dim pair_solref "
-    "geom_size",
+    "geom_size numeric_data",
 )
 """Offsets of `mjModel`."""
 
@@ -105,6 +105,8 @@ class Scratch(NamedTuple):
 
     problem: Doubles
     """Words of a `coupling_rows.Problem`."""
+    records: Integers
+    """Records of the pieces with the laws of the model (see `parameters.write_laws`)."""
     jacobian: Doubles
     """Jacobian of the twists, [3k, nv]."""
     inertia: Doubles
@@ -146,10 +148,22 @@ Places = offsets_of(Scratch)
 """Places of scratch in a block of words."""
 
 
-def scratch_layout(words: int, k: int, nv: int) -> Layout:
-    """Return the layout of `Scratch` without its rows for constraints, for k patches and problems of so many words."""
+def scratch_layout(words: int, records: int, k: int, nv: int) -> Layout:
+    """Return the layout of `Scratch` without its rows for constraints, for k patches.
+
+    `words` are those of a problem, `records` those of the records of all pieces.
+    """
     n = 3 * k
-    shapes = {"problem": words, "jacobian": n * nv, "more": nv, "block": 36, "counts": k, "frames": 6 * k, "misses": 0}
+    shapes = {
+        "problem": words,
+        "records": records,
+        "jacobian": n * nv,
+        "more": nv,
+        "block": 36,
+        "counts": k,
+        "frames": 6 * k,
+        "misses": 0,
+    }
     shapes |= {"tilts": k, "depths": 2 * k}
     shapes |= dict.fromkeys(("inertia", "stiff"), nv * nv) | dict.fromkeys(("answers", "held"), nv * (n + 1))
     return Layout(
@@ -200,6 +214,12 @@ class Host(NamedTuple):
     extents: int
     """Address of least and largest x and y of each patch, its largest distance from the origin, and the width of
     the edge beyond which cells carry nothing, [k, 6] [m]."""
+    parameters: int
+    """Place of the parameters of the patches in the numerics of a model, behind the digest of the patches."""
+    laws: int
+    """Address of flags: 1 where the law of a patch has the numbers of `LawNumbers`, int [k]."""
+    record_words: int
+    """Address of the words of the record of each piece, int [pieces]."""
     free_count: int
     """Number of free joints."""
     free_joints: int

@@ -14,11 +14,12 @@ from numba import types
 from planarfriction.adapters.mujoco.loops.centres import follow_centres
 from planarfriction.adapters.mujoco.loops.geometry import place, take
 from planarfriction.adapters.mujoco.loops.models import fits, serves
+from planarfriction.adapters.mujoco.loops.parameters import displacement_of, scale_of, write_laws
 from planarfriction.adapters.mujoco.loops.records import Host, Remembered, Scratch, read
 from planarfriction.adapters.mujoco.loops.responses import is_sparse, leaves_range, respond
 from planarfriction.compiler import callback, entry, jit, kernel
 from planarfriction.compiler.calls import address_of, c_address_of, call, call_c, pointer, shared_word
-from planarfriction.compiler.memory import arrays_at, doubles, integers, integers32
+from planarfriction.compiler.memory import arrays_at, at, doubles, integers, integers32
 from planarfriction.kernels.coupling import shortening_of, step_all, too_far
 from planarfriction.kernels.coupling_rows import Problem
 from planarfriction.kernels.coupling_rows import read as read_patches
@@ -204,18 +205,31 @@ def _forget(host, kept, d):
 
 
 @kernel
-def _remember(own, iterations, passes):
+def _remember(own, m, iterations, passes):
     """Store the result of the step in the user data."""
     host, kept, problem, valid = own.host, own.kept, own.problem, iterations >= 0.0
     _copy(problem.wrench, kept.wrench, 3 * host.count)
+    for p in range(host.count):
+        kept.wrench[3 * p + 2] *= scale_of(host, m, p)
     if valid:
         _copy(problem.new, kept.new, host.states)
         _copy(problem.twist, kept.twist, 3 * host.count)
         _copy(problem.load, kept.load, host.count)
+        for p in range(host.count):
+            kept.twist[3 * p + 2] /= scale_of(host, m, p)
     else:
         _clear(kept.new, host.states)
     kept.iterations[0], kept.passes[0] = iterations, passes
     kept.residual[0], kept.converged[0] = problem.residual[0], problem.converged[0] if valid else 0.0
+
+
+@kernel
+def _put_guess(host, m, p, s, kept, guess):
+    """Write the last wrench of patch p about its origin before it is displaced; zero without contact."""
+    dx, dy = displacement_of(host, m, p)
+    for i in range(3):
+        guess[i] = kept[i] if s.counts[p] > 0 else 0.0
+    guess[2] += dx * guess[1] - dy * guess[0]
 
 
 @entry
@@ -227,7 +241,8 @@ def plan(place_of_host, m, d):
     _take_off(host, kept, d, _recall(host, kept, d))
     kept.next[0] = doubles(d + host.data.time)[0] + dt
     call_c(host.functions.mj_markStack, (d,))
-    s = take(host, d, nefc)
+    taken = take(host, d, nefc)
+    s = arrays_at(host.scratch, taken)
     if not fits(host, m):
         _forget(host, kept, d)
         kept.iterations[0], kept.converged[0] = UNFIT, 0.0
@@ -239,8 +254,9 @@ def plan(place_of_host, m, d):
         _copy(doubles(host.problem), s.problem, host.words)
         problem.dt[0] = dt
         _copy(kept.state, problem.state, host.states)
-        for i in range(3 * host.count):
-            problem.guess[i] = kept.guess[i] if s.counts[i // 3] > 0 else 0.0
+        write_laws(host, m, patches, problem, at(taken, host.scratch.records))
+        for p in range(host.count):
+            _put_guess(host, m, p, s, at(kept.guess, 3 * p), at(problem.guess, 3 * p))
         _copy(problem.guess, problem.wrench, 3 * host.count)
         _apply(own, d, problem.guess)
         call_c(host.functions.mj_fwdActuation, (m, d))
@@ -248,7 +264,7 @@ def plan(place_of_host, m, d):
         follow_centres(host, m, d, s, nefc, patches.radius, problem, kept)
         _copy(problem.guess, problem.wrench, 3 * host.count)
         iterations, passes = _solve(own, patches, m, d, nefc)
-        _remember(own, iterations, passes)
+        _remember(own, m, iterations, passes)
     call_c(host.functions.mj_freeStack, (d,))
 
 
