@@ -30,9 +30,27 @@ def following(
     held, tried = (row_of(compiled.record(numbers, each)[0]) for each in (pressed, trial))
     calls = calls_of(packed.functions, change=True)
     record = FollowingContact(
-        count, x, y, weights, middle, *slopes, calls, place_of(held), place_of(tried), pressed, trial, scratch, zero,
-        rows, radius, *centre, height, LAG,
-    )  # fmt: skip
+        count=count,
+        x=x,
+        y=y,
+        weights=weights,
+        middle=middle,
+        slope_x=slopes[0],
+        slope_y=slopes[1],
+        calls=calls,
+        held=place_of(held),
+        tried=place_of(tried),
+        pressed=pressed,
+        trial=trial,
+        scratch=scratch,
+        zero=zero,
+        rows=rows,
+        radius=radius,
+        centre_x=centre[0],
+        centre_y=centre[1],
+        height=height,
+        lag=LAG,
+    )
     columns = {"weights": weights, "middle": middle, "slope_x": slopes[0], "slope_y": slopes[1]}
     return packed._replace(
         functions=FUNCTIONS,

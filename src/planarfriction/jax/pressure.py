@@ -83,5 +83,5 @@ def pressing(u, v, share, x, y, narrow) -> jax.Array:
     def found(corners, share, asked, narrow):
         return _Tilt(corners, share, asked).pressing(narrow)
 
-    flat = (corners.reshape(-1, *corners.shape[-2:]), *(each.reshape(-1, each.shape[-1]) for each in (share, asked)))
-    return jax.vmap(found)(*flat, narrow.reshape(-1)).reshape(u.shape)
+    cells, shares, places = (each.reshape(-1, *each.shape[asked.ndim - 1 :]) for each in (corners, share, asked))
+    return jax.vmap(found)(cells, shares, places, narrow.reshape(-1)).reshape(u.shape)

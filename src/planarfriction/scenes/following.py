@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from planarfriction.compiled.following import STATES, following
@@ -15,7 +17,7 @@ ROOM = 1_000_000
 
 
 def packed_contact(
-    contact: Contact, loads: list[float | None], between: tuple[float, float] | None = None
+    contact: Contact, loads: Sequence[float | None] | np.ndarray, between: tuple[float, float] | None = None
 ) -> PackedModel:
     """Pack the model of a contact (see `FrictionModel.packed`), with a pressure that follows the load if it does."""
     packed = contact.model.packed(loads, between)

@@ -141,8 +141,8 @@ def free_slide(
     if inertia is None:
         mass, patch = validation.positive("mass", mass), checked_model("model", model).patch
         inertia = mass * float(patch.second_moment(GRAVITY * mass))
-    twist = validation.vector("twist", twist, 3)
-    body = Body(mass, inertia, position, angle, twist, gravity=(0.0, 0.0), outline=outline)
+    velocity = validation.vector("twist", twist, 3)
+    body = Body(mass, inertia, position, angle, velocity, gravity=(0.0, 0.0), outline=outline)
     load: Any = GRAVITY * body.mass if normal_force is None else normal_force
     contact = Contact(model, load, mounted_on="body", name="table")
     return Scene(body, [contact], t_end, stop_speed=STOP_SPEED, save_every=save_every, name="free slide")

@@ -124,8 +124,8 @@ def _output(scene: Scene, times: np.ndarray, batches: SegmentBatches, bristles: 
         raise InvalidValueError("bristles", f"be 'none' above {MOST_NUMBERS} numbers (raise save_every)", shown)
     recorded = np.empty((count, states) if bristles == "all" else (0, 0))
     follows = sum(contact.pressure == "follows" for contact in scene.contacts)
-    shapes = (count, 6), (count, contacts, 3), (count, contacts)
-    return Output(times, *map(np.empty, shapes), recorded, np.empty((follows * count, 2)))
+    body, wrench, load = map(np.empty, ((count, 6), (count, contacts, 3), (count, contacts)))
+    return Output(times, body, wrench, load, recorded, np.empty((follows * count, 2)))
 
 
 def _histories(scene: Scene, batches: SegmentBatches, output: Output) -> dict[str, History]:

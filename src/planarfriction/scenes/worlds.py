@@ -116,8 +116,8 @@ def curling(
     """
     if inertia is None:
         inertia = 0.5 * validation.positive("mass", mass) * STONE_RADIUS**2
-    twist = validation.vector("twist", twist, 3)
-    body = Body(mass, inertia, velocity=twist, gravity=(0.0, 0.0), outline=_around(0.0, STONE_RADIUS))
+    velocity = validation.vector("twist", twist, 3)
+    body = Body(mass, inertia, velocity=velocity, gravity=(0.0, 0.0), outline=_around(0.0, STONE_RADIUS))
     weight: Any = GRAVITY * body.mass
     ice = Contact(model, weight, mounted_on="body", name="ice")
     return Scene(body, [ice], t_end, None, None, STOP_SPEED, save_every, start=start, name="curling")

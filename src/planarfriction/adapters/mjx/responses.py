@@ -145,7 +145,7 @@ class PatchPlaces(NamedTuple):
 def places(placed: Sequence[Placed], radius: np.ndarray) -> PatchPlaces:
     """Return the places of patches found in a model."""
     numbers = [(p.site, p.own, p.other, p.bodies[1], p.bodies[0], p.at_contact) for p in placed]
-    return PatchPlaces(*map(np.array, zip(*numbers, strict=True)), radius)
+    return PatchPlaces(*map(np.array, zip(*numbers, strict=True)), radius=radius)
 
 
 class Geometry(NamedTuple):
