@@ -19,7 +19,11 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 demo: $(VENV)/.package
 	$(BIN)/planarfriction run in-hand --model both --out out/ --plot
 
-# Two processes, each test file in one of them: results that the tests of a file share are computed once.
+# Two processes, each test file in one of them: results that the tests of a file share are computed once. Linear algebra
+# keeps to the processor of its process.
+export OPENBLAS_NUM_THREADS := 1
+export OMP_NUM_THREADS := 1
+
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 

@@ -48,6 +48,7 @@ def made(scene, model=None, dt=DT, **options):
     return m, mujoco.MjData(m), patches
 
 
+@pytest.mark.slow
 def test_patches_that_follow_their_contact_do_so_as_in_mujoco():
     """A box whose weight is beside its middle slides and turns: its patch lies at the centre of the forces."""
     spec = mujoco.MjSpec.from_string(f"""<mujoco><option timestep="{DT}" tolerance="1e-12"/>
@@ -220,6 +221,7 @@ def test_gradients_are_differences_by_velocity_and_friction():
 # ---------------------------------------------------------------------- grips
 
 
+@pytest.mark.slow
 def test_a_grip_beside_the_centre_of_mass_holds_as_in_mujoco():
     scene = grip("sphere")
     model = pf.DistributedModel(pf.ContactPatch.disc(radius=0.01, cells=5), scene.model.law)

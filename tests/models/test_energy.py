@@ -14,7 +14,7 @@ SOFT = {"mu_s": 1.6, "sigma_0": 1e4, "elasto_plastic": 0.9}
 
 
 def _excess(law: pf.LuGre) -> np.ndarray:
-    """Work beyond the fall of the stored energy, as a share of both, in steps of 0.1 to 10 ms that start and reverse."""
+    """Work beyond the fall of the stored energy, as a share of both, in steps of 0.1 to 10 ms."""
     generator, count = np.random.default_rng(14), 4000
     model, excess, twist = pf.DistributedModel(PATCH, law), [], np.zeros((count, 3))
     state, dt = model.rest(count), 10.0 ** generator.uniform(-4.0, -2.0, count)

@@ -123,6 +123,7 @@ def test_it_equals_the_compiled_model(law):
             close(got, wanted)
 
 
+@pytest.mark.slow
 def test_a_patch_whose_shape_follows_the_load_keeps_that_of_one_load():
     patch = pf.ContactPatch.disc(0.01, cells=9, pressure=pf.SoftFinger(c=0.005, n=1 / 3, k=2.0))
     state, twist = [1e-7, 1e-7, 2e-7], [1e-3, 2e-4, 0.1]
@@ -223,6 +224,7 @@ def square(method: str | None, steps: int = 20):
     return loss, (law_of(), jnp.asarray(sway(steps)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [None, "adjoint"])
 def test_forward_mode_is_reverse_mode(method):
     loss, at = square(method)

@@ -25,6 +25,9 @@ KINDS = {
     "published": (PATCH, "ReducedModelPublished", {}),
 }
 
+QUICK = "few cells with a metric", "one part"
+EACH = [pytest.param(kind, marks=() if kind in QUICK else pytest.mark.slow) for kind in KINDS]
+
 
 @pytest.fixture(autouse=True, scope="module")
 def double_precision():
@@ -34,7 +37,7 @@ def double_precision():
     jax.config.update("jax_enable_x64", before)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EACH)
 def test_steps_and_derivatives_are_those_of_numpy(kind):
     """Derivatives by the moments are those of central differences, as far as the rule is exact: 1e-7 of the patch."""
     patch, name, options = KINDS[kind]
