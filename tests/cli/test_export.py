@@ -24,6 +24,9 @@ def files(tmp_path, monkeypatch):
         pf.Scene(pf.Body(1.0, 1.0), contacts, 1.0).to_file(f"{name}.toml")
 
 
+FILES = "pad.h", "pad.c", "pad_test.c", "pad.cmake"
+
+
 @pytest.mark.parametrize(
     ("arguments", "mu_c"),
     [
@@ -35,8 +38,8 @@ def files(tmp_path, monkeypatch):
 def test_files(capsys, tmp_path, arguments, mu_c):
     assert main(["export", *arguments, "--out", "made/here", "--name", "pad", "--precision", "float"]) == 0
     folder = tmp_path / "made" / "here"
-    assert capsys.readouterr().out.split() == ["made/here/pad.h", "made/here/pad.c"]
-    assert sorted(each.name for each in folder.iterdir()) == ["pad.c", "pad.h"]
+    assert capsys.readouterr().out.split() == [f"made/here/{each}" for each in FILES]
+    assert sorted(each.name for each in folder.iterdir()) == sorted(FILES)
     assert f" {mu_c}f, {mu_c}f," in (folder / "pad.c").read_text()
     assert "typedef float pad_real;" in (folder / "pad.h").read_text()
 

@@ -20,3 +20,20 @@ def test_lists_are_written_once():
     assert row[0].name == doubled.name == total.name
     assert isinstance(branch, Branch) and branch.outcomes == ((row[1].name, "real"),)
     assert (branch.yes.results, branch.no.results) == ((total.name,), (1.0,))
+
+
+def test_calls_are_traced_once():
+    """A function that asks what another function's branch gave goes on with the names that it has."""
+
+    def inner(x):
+        return x * 2.0 if x > 0.0 else 3.0
+
+    def outer(x):
+        return 1.0 if trace.call(inner, (x,)) > 5.0 else 0.0
+
+    trace = Trace()
+    x = Number(trace, "x")
+    result = trace.call(outer, (x,))
+    _, first, _, second = trace.operations
+    assert first.outcomes[0][0] in trace.operations[2].arguments
+    assert second.outcomes == ((result.name, "real"),)

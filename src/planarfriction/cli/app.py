@@ -143,6 +143,8 @@ def limit_surface(patch: str | None, pressure: Path | None, cell_size: float | N
     short_help="Write the friction model of a file as C source.",
     help="""Write the friction model of a file as C source for a controller: NAME.h and NAME.c, C99 and C++17.
 
+    NAME_test.c compares the library with numbers of the model; NAME.cmake has targets for both.
+
     FILE (.toml, .json) is a scene, or a model alone: the tables patch and law, and model, as of a contact of a scene.
 
     \b
@@ -152,7 +154,7 @@ def limit_surface(patch: str | None, pressure: Path | None, cell_size: float | N
     """,
 )
 @click.argument("file", type=FILE, shell_complete=complete_scene)
-@click.option("--out", type=FILE, required=True, help="Folder for the two files.")
+@click.option("--out", type=FILE, required=True, help="Folder for the files.")
 @click.option(
     "--name", default="friction", show_default=True, help="Name of the files, and what names in them begin with."
 )

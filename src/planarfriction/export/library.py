@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,10 @@ from planarfriction import validation, writing
 from planarfriction.errors import InvalidValueError
 from planarfriction.export.c_source import Writer
 from planarfriction.export.pieces import Pieces, pieces_of
+from planarfriction.export.samples import samples_of
+from planarfriction.export.slip import Slip, slip_of
 from planarfriction.formulas import LARGEST
+from planarfriction.limit_surface.loops.twists import MOST_TRIALS
 
 PRECISIONS = {"double": LARGEST, "float": 1e9}
 """Largest number that a step takes, by precision."""
@@ -43,11 +47,16 @@ RANGES = {
 """Conditions on parameters."""
 
 
-def export_c(model: Any, folder: Any, *, name: str = "friction", precision: str = "double") -> tuple[Path, Path]:
-    """Write a model as C source, `<name>.h` and `<name>.c`, into a folder; return the two files.
+FILES = {"h": ".h", "c": ".c", "test.c": "_test.c", "cmake": ".cmake"}
+"""Ends of the names of files by their templates."""
+
+
+def export_c(model: Any, folder: Any, *, name: str = "friction", precision: str = "double") -> tuple[Path, ...]:
+    """Write a model as C source into a folder; return the files `<name>.h`, `.c`, `_test.c` and `.cmake`.
 
     The source is C99 and C++17, calls nothing but `math.h`, allocates nothing and keeps no state of its own. Its step
-    is the model's own (see `FrictionModel.step`), traced from the same formulas.
+    is the model's own (see `FrictionModel.step`), traced from the same formulas. The test is a program that compares
+    the library with numbers of the model; the CMake file has a target for each.
 
     Raises InvalidValueError for a name that is no C identifier, an unknown precision, and models without source (see
     `pieces_of`); FileError if the folder cannot be written.
@@ -56,69 +65,99 @@ def export_c(model: Any, folder: Any, *, name: str = "friction", precision: str 
         raise InvalidValueError("name", f"be a C identifier of at most {LONGEST_NAME} characters", name)
     validation.choice("precision", precision, PRECISIONS)
     folder = validation.path("folder", folder)
-    header, source = _texts(model, pieces_of(model), name, precision)
+    texts = _texts(model, pieces_of(model), name, precision)
     writing.make_folder(folder)
-    files = folder / f"{name}.h", folder / f"{name}.c"
-    with writing.replacing(files[0]) as first, writing.replacing(files[1]) as second:  # both can be written, or none is
-        first.write(header.encode())
-        second.write(source.encode())
+    files = tuple(folder / f"{name}{end}" for end in FILES.values())
+    with contextlib.ExitStack() as stack:  # all can be written, or none is
+        for file, text in zip(files, texts, strict=True):
+            stack.enter_context(writing.replacing(file)).write(text.encode())
     return files
 
 
 def _texts(model: Any, pieces: Pieces, name: str, precision: str) -> list[str]:
-    """Return header and source."""
+    """Return the text of each file."""
     import jinja2
 
     import planarfriction
 
-    writer = Writer(precision)
-    states = pieces.count * pieces.states
+    writer, slip = Writer(precision), slip_of(model.patch, precision)
     first = f"{pieces.spacing} * k" if pieces.spacing > 1 else "k"
-    places = [f"next[{first} + {i * pieces.stride}]" for i in range(pieces.states)]
-    results = [*places, "w[0]", "w[1]", "w[2]"]
-    columns = pieces.states + 3 + len(pieces.parameters)
-    cells = [f"rows[{row}][{column}]" for row in range(3 + pieces.states) for column in range(columns)]
-    lines = list(writer.lines(pieces.step, results))
-    steady = list(writer.lines(pieces.steady, results[-3:]))
-    slopes = list(writer.lines(pieces.slopes(), [*results, *cells]))
-    tables = {
-        table: ("int", numbers.tolist()) if numbers.dtype.kind == "i" else _table(writer, numbers)
-        for table, numbers in pieces.tables.items()
-        if table == "share" or any(f"{table}[" in line for line in [*lines, *slopes])
-    }
-    for each in (lines, steady, slopes):
-        if not any("[k]" in line or "* k" in line for line in each):
-            each.insert(0, "    (void)k;")
-    values = {
+    functions = _functions(writer, pieces, first)
+    tables = _tables(writer, pieces.tables, functions) | ({} if slip is None else _tables(writer, slip.tables))
+    step = functions["step"].splitlines()
+    values = functions | {
         "name": name,
         "version": planarfriction.__version__,
         "model": f"{type(model).__name__} of {model.patch.name or 'a patch'}, {type(model.law).__name__}",
-        "digest": hashlib.sha256("\n".join([*lines, repr(tables)]).encode()).hexdigest()[:16],
+        "digest": hashlib.sha256("\n".join([functions["step"], repr(tables)]).encode()).hexdigest()[:16],
         "pieces": pieces,
-        "states": states,
+        "states": pieces.count * pieces.states,
         "precision": precision,
         "parameters": {each: (writer.constant(value), MEANINGS[each]) for each, value in pieces.parameters.items()},
         "ranges": " && ".join(RANGES[each] for each in pieces.parameters),
         "tables": tables,
-        "step": "\n".join(lines),
-        "steady": "\n".join(steady),
-        "slopes": "\n".join(slopes),
-        "columns": columns,
+        "columns": _columns(pieces),
         "stride": pieces.stride,
         "first": first,
         "suffix": writer.suffix,
         "largest": writer.constant(PRECISIONS[precision]),
         "zero": writer.constant(0.0),
         "one": writer.constant(1.0),
-        "operations": pieces.count * sum("=" in line for line in lines),
-        "functions": pieces.count * sum(any(f"{each}{writer.suffix}(" in line for each in _SLOW) for line in lines),
+        "slip": None if slip is None else _search(writer, slip),
+        "samples": samples_of(model, slip, writer),
+        "operations": pieces.count * sum("=" in line for line in step),
+        "functions": pieces.count * sum(any(f"{each}{writer.suffix}(" in line for each in _SLOW) for line in step),
     }
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("planarfriction.export", "."),
         undefined=jinja2.StrictUndefined,
         keep_trailing_newline=True,
     )
-    return [environment.get_template(f"library.{kind}.j2").render(values) for kind in "hc"]
+    return [environment.get_template(f"library.{kind}.j2").render(values) for kind in FILES]
+
+
+def _columns(pieces: Pieces) -> int:
+    """Return the number of derivatives of a number of a cell or part."""
+    return pieces.states + 3 + len(pieces.parameters)
+
+
+def _functions(writer: Writer, pieces: Pieces, first: str) -> dict[str, str]:
+    """Return the lines of the functions of cell or part k."""
+    wrench = ["w[0]", "w[1]", "w[2]"]
+    results = [*(f"next[{first} + {i * pieces.stride}]" for i in range(pieces.states)), *wrench]
+    rows = [f"rows[{row}][{column}]" for row in range(3 + pieces.states) for column in range(_columns(pieces))]
+    traces = {
+        "step": (pieces.step, results),
+        "steady": (pieces.steady, wrench),
+        "slopes": (pieces.slopes(), [*results, *rows]),
+    }
+    texts = {name: "\n".join(writer.lines(*each)) for name, each in traces.items()}
+    unused = {name: "" if "[k]" in text or "* k" in text else "    (void)k;\n" for name, text in texts.items()}
+    return {name: unused[name] + text for name, text in texts.items()}
+
+
+def _tables(
+    writer: Writer, tables: dict[str, np.ndarray], functions: dict[str, str] | None = None
+) -> dict[str, tuple[str, list[str]]]:
+    """Return type and constants of the tables that functions read."""
+    return {
+        table: ("int", list(map(str, numbers))) if numbers.dtype.kind == "i" else _table(writer, numbers)
+        for table, numbers in tables.items()
+        if functions is None or table == "share" or any(f"{table}[" in each for each in functions.values())
+    }
+
+
+def _search(writer: Writer, slip: Slip) -> dict[str, Any]:
+    """Return the lines of the functions of a search, and the numbers that end it."""
+    axes, state = [f"c[{i}]" for i in range(9)], [f"s[{i}]" for i in range(14)]
+    outputs = {
+        "target": ["t[0]", "t[1]", "t[2]"],
+        "begin": [*axes, *state],
+        "attempt": state,
+        "end": ["twist[0]", "twist[1]", "twist[2]", "*angle"],
+    }
+    lines = {part: "\n".join(writer.lines(getattr(slip, part), names)) for part, names in outputs.items()}
+    return lines | {"trials": MOST_TRIALS, "duals": len(slip.tables["duals"]), "angle": writer.constant(slip.angle)}
 
 
 _SLOW = "sqrt", "exp", "sin", "cos", "pow", "atan2"

@@ -69,8 +69,8 @@ def pieces_of(model: Any) -> Pieces:
 
 
 def _law(trace: Trace, numbers: LawNumbers) -> LawNumbers:
-    given = numbers._asdict()
-    return LawNumbers(*(value if name in FIXED else Number(trace, f"p->{name}") for name, value in given.items()))
+    symbols: dict[str, Any] = {name: Number(trace, f"p->{name}") for name in LawNumbers._fields if name not in FIXED}
+    return numbers._replace(**symbols)
 
 
 def _parameters(numbers: LawNumbers) -> dict[str, float]:
@@ -80,7 +80,7 @@ def _parameters(numbers: LawNumbers) -> dict[str, float]:
     return {name: float(getattr(numbers, name)) for name in names}
 
 
-def _vector(trace: Trace, *names: str) -> tuple[Number, ...]:
+def _vector(trace: Trace, *names: str) -> tuple[Any, ...]:
     return tuple(Number(trace, name) for name in names)
 
 
@@ -176,7 +176,7 @@ def _published(model: ReducedModelPublished) -> Pieces:
     root = Root(float(root[0, 0]), float(root[0, 1]), float(root[1, 1]))
 
     def contact(trace: Trace) -> PublishedContact:
-        data = Table(trace, "surface", surface.data)
+        data: Any = Table(trace, "surface", surface.data)
         return PublishedContact(_law(trace, law), shape, root, surface.kind, surface.size, data)
 
     tables = {"share": np.ones(1)} | ({"surface": surface.data} if len(surface.data) else {})
@@ -195,6 +195,8 @@ def _moments(model: MomentModel) -> Pieces:
     upper = np.array([shape.factor for shape in shapes])[:, *np.triu_indices(3)]
 
     def contact(trace: Trace) -> ReducedContact:
+        data: Any
+        factor: list[Any]
         if len(maps) == 1:
             data, factor = Table(trace, "map", maps[0]), [float(each) for each in upper[0]]
         else:

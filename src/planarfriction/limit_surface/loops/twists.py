@@ -24,22 +24,30 @@ from planarfriction.limit_surface.loops import closed_forms
 BAD_WRENCH = -1.0
 """Value in place of an angle: a wrench that is zero or not finite."""
 
-_BALANCED = 1e-12
-"""Angle [rad] at which a twist is found: what rounding leaves of the exact surfaces."""
 
-_ROUGH = 1e-6
-"""Angle at which a first guess is good enough [rad]."""
+class Limits(NamedTuple):
+    """Numbers that end a search."""
 
-_GOOD = 1e-10
-"""Angle [rad] below which a step that does not help ends the search: rounding has the rest."""
+    balanced: float
+    """Angle [rad] at which a twist is found."""
+    good: float
+    """Angle [rad] below which a step that does not help ends the search: rounding has the rest."""
+    level: float
+    """Share of the dissipation by which it may rise where the balance gets better: near the minimum that says more."""
+    shortest: float
+    """Length at which a step that does not help ends the search, over that of Newton's [-]."""
+
+
+FINE = Limits(1e-12, 1e-10, 1e-9, 1e-14)
+"""Limits where the angle at the end is what rounding leaves of the exact surfaces."""
+
+_ROUGH = FINE._replace(balanced=1e-6)
+"""Limits of a first guess."""
 
 _FLATTEST = 1e-12
 """Least curvature that a step of Newton's method trusts, relative to the largest [-]: cells in a line have none."""
 
-_LEVEL = 1e-9
-"""Share of the dissipation by which it may rise where the balance gets better: near the minimum that says more."""
-
-_MOST_TRIALS = 400
+MOST_TRIALS = 400
 """Evaluations at which the search gives up; a handful are usual."""
 
 
@@ -54,6 +62,36 @@ class StoredPotential(NamedTuple):
     """Directions over their dissipation, `[3, rows, columns]`: the largest `target . dual` is nearest to the answer."""
     mirror: float
     """-1 if the opposite of a dual is one too, else 1."""
+
+
+class Search(NamedTuple):
+    """A search for the least dissipation in a plane."""
+
+    a: float
+    b: float
+    """Best place so far."""
+    ta: float
+    tb: float
+    """Place to try next."""
+    da: float
+    db: float
+    """Step from the best place, as Newton's method has it or shorter."""
+    downhill: float
+    """Fall of the dissipation that the slope promises for the step."""
+    length: float
+    """Share of the step that is tried next."""
+    most: float
+    """Longest step that is trusted."""
+    power: float
+    """Dissipation at the best place."""
+    slope: float
+    """Slope of the dissipation there."""
+    angle: float
+    """Angle [rad] by which the wrench there misses the wanted one."""
+    last: float
+    """Length of the step in the plane."""
+    going: bool
+    """True until the search has ended."""
 
 
 class _Exact(NamedTuple):
@@ -123,7 +161,7 @@ def newton_move(ga, gb, aa, ab, bb):
 
 
 @kernel
-def _table_at(table, lean, v, scratch):
+def table_at(table, lean, v, scratch):
     """Return `h` and the second derivatives (xx, xy, xs, yy, ys, ss) of the dissipation of a stored potential."""
     size = norm(v)
     per = 1.0 / size
@@ -166,45 +204,72 @@ def _across(a, second, b):
 
 
 @kernel
-def _least(evaluate, surface, lean, target, guess, balanced, scratch):
-    """Return the scaled twist of least dissipation in the plane of `target`, its dissipation, and the angle left.
-
-    A step is taken if the dissipation falls as it should; near the minimum, where rounding rules, a better balance.
-    """
+def begin_search(target, guess):
+    """Return the axes of the plane in which twists are searched, and a search that tries the guess first."""
     first, second = plane(target)
     per = 1.0 / dot(target, guess)
     a, b = per * dot(first, guess), per * dot(second, guess)
-    ta, tb, da, db, downhill, length, most = a, b, 0.0, 0.0, 0.0, 1.0, math.inf
-    power, slope, angle, last = math.inf, math.inf, math.inf, 0.0
-    for _ in range(_MOST_TRIALS):
-        v = plus(plus(target, ta, first), tb, second)
-        h, slopes = evaluate(surface, lean, v, scratch)
-        trial, ga, gb = dot(h, v), dot(h, first), dot(h, second)
-        size = math.sqrt(ga * ga + gb * gb)
-        gain = power - trial
-        level = abs(gain) < _LEVEL * trial and size < 0.9 * slope
-        if level or gain > 1e-4 * length * downhill:
-            a, b, power, slope = ta, tb, trial, size
-            angle = math.atan2(size, dot(h, target))
-            if angle <= balanced:
-                break
-            da, db = newton_move(
-                ga, gb, _across(first, slopes, first), _across(first, slopes, second), _across(second, slopes, second)
-            )
-            move = math.sqrt(da * da + db * db)
-            if not move > 0.0:
-                break
-            # where the last step had to be shortened, the next one begins as short: the curvature there says little
-            most = 2.0 * length * last if length < 1.0 else 4.0 * most
-            length = xp.minimum(xp.minimum(most, norm(v)) / move, 1.0)
-            da, db, last, length = da * length, db * length, move * length, 1.0
-            downhill = abs(da * ga + db * gb)
-        else:
-            length *= 0.5
-            if angle < _GOOD or length < 1e-14:
-                break
-        ta, tb = a + length * da, b + length * db
-    return plus(plus(target, a, first), b, second), power, angle
+    most = math.inf
+    return (target, first, second), Search(a, b, a, b, 0.0, 0.0, 0.0, 1.0, most, most, most, most, 0.0, True)
+
+
+@kernel
+def place_of(axes, a, b):
+    """Return the scaled twist at a place in the plane."""
+    return plus(plus(axes[0], a, axes[1]), b, axes[2])
+
+
+@kernel
+def _accepted(axes, v, h, slopes, trial, slope, limits, s):
+    """Return a search that has gone where it tried, with Newton's step from there."""
+    target, first, second = axes
+    ga, gb = dot(h, first), dot(h, second)
+    angle = math.atan2(slope, dot(h, target))
+    da, db = newton_move(
+        ga, gb, _across(first, slopes, first), _across(first, slopes, second), _across(second, slopes, second)
+    )
+    move = math.sqrt(da * da + db * db)
+    going = (angle > limits.balanced) & (move > 0.0)
+    # where the last step had to be shortened, the next one begins as short: the curvature there says little
+    most = xp.where(s.length < 1.0, 2.0 * s.length * s.last, 4.0 * s.most)
+    length = xp.minimum(xp.minimum(most, norm(v)) / xp.where(move > 0.0, move, 1.0), 1.0)
+    da, db = da * length, db * length
+    downhill = abs(da * ga + db * gb)
+    ta, tb = s.ta + da, s.tb + db
+    return Search(s.ta, s.tb, ta, tb, da, db, downhill, 1.0, most, trial, slope, angle, move * length, going)
+
+
+@kernel
+def try_place(evaluate, surface, lean, axes, limits, s, scratch):
+    """Evaluate the place that a search tries next, and return the search after that.
+
+    A step is taken if the dissipation falls as it should; near the minimum, where rounding rules, a better balance.
+    """
+    v = place_of(axes, s.ta, s.tb)
+    h, slopes = evaluate(surface, lean, v, scratch)
+    trial, ga, gb = dot(h, v), dot(h, axes[1]), dot(h, axes[2])
+    slope = math.sqrt(ga * ga + gb * gb)
+    gain = s.power - trial
+    level = (abs(gain) < limits.level * trial) & (slope < 0.9 * s.slope)
+    if level | (gain > 1e-4 * s.length * s.downhill):
+        return _accepted(axes, v, h, slopes, trial, slope, limits, s)
+    length = 0.5 * s.length
+    going = (s.angle >= limits.good) & (length >= limits.shortest)
+    ta, tb = s.a + length * s.da, s.b + length * s.db
+    return Search(
+        s.a, s.b, ta, tb, s.da, s.db, s.downhill, length, s.most, s.power, s.slope, s.angle, s.last, going
+    )  # fmt: skip
+
+
+@kernel
+def _least(evaluate, surface, lean, target, guess, limits, scratch):
+    """Return the scaled twist of least dissipation in the plane of `target`, its dissipation, and the angle left."""
+    axes, search = begin_search(target, guess)
+    for _ in range(MOST_TRIALS):
+        if not search.going:
+            break
+        search = try_place(evaluate, surface, lean, axes, limits, search, scratch)
+    return place_of(axes, search.a, search.b), search.power, search.angle
 
 
 @kernel
@@ -264,7 +329,7 @@ def lean_of(frame):
 @kernel
 def _in_table(surface, target):
     table, lean, scratch = surface
-    return _least(_table_at, table, lean, target, _nearest(table, target), _BALANCED, scratch)
+    return _least(table_at, table, lean, target, _nearest(table, target), FINE, scratch)
 
 
 @jit
@@ -276,8 +341,8 @@ def table_twists(table, frame, wrenches, twists):
 @kernel
 def _in_exact(surface, target):
     exact, table, lean, scratch = surface
-    guess, _, _ = _least(_table_at, table, lean, target, _nearest(table, target), _ROUGH, scratch)
-    return _least(_exact_at, exact, lean, target, guess, _BALANCED, scratch)
+    guess, _, _ = _least(table_at, table, lean, target, _nearest(table, target), _ROUGH, scratch)
+    return _least(_exact_at, exact, lean, target, guess, FINE, scratch)
 
 
 @jit
