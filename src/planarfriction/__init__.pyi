@@ -10,6 +10,7 @@ from . import identify as identify
 from . import laws as laws
 from . import limit_surface as limit_surface
 from . import models as models
+from . import online as online
 from . import patch as patch
 from . import planning as planning
 from . import plots as plots
