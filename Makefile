@@ -1,6 +1,6 @@
 # make demo: the main job, with everything it needs.   make test: the tests.   The rest is for development.
 # make test-generic: the tests of numbers once more, compiled for any x86-64 or ARM processor instead of this one.
-# make test-bounds: the quick tests of numbers once more, with every index of compiled loops checked.
+# make test-bounds: tests of compiled loops once more, with every index checked; BOUNDED=tests/limit_surface: other ones.
 # make test-lowest: the tests with the lowest versions of everything.
 # make fuzz MINUTES=60: attacks with random examples, an hour long; ATTACKS=coupling: those alone whose name begins so.
 # make docs: the site, in build/docs; scripts of its gallery run once, and again when they have changed.
@@ -35,10 +35,10 @@ test-generic: $(VENV)/.test
 
 # Loops whose indices are checked compile into their own machine code, of which the whole half takes an hour; pointers
 # have no bounds to check.
-BOUNDED := kernels derivatives limit_surface tensors test_coupling.py
+BOUNDED := $(wildcard tests/kernels tests/test_coupling*.py)
 
 test-bounds: $(VENV)/.test
-	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -n 2 --dist loadfile $(BOUNDED:%=tests/%) $(ARGS)
+	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -n 2 --dist loadfile $(BOUNDED) $(ARGS)
 
 # The lowest versions that pyproject.toml promises, without the optional front ends.
 test-lowest: $(LOWEST)/.test

@@ -45,7 +45,7 @@ def test_what_does_not_converge_is_tried_again():
 def test_what_does_not_converge_does_no_work_that_bristles_do_not_give():
     """Loads that grow faster with friction than friction with loads: some steps have no solution."""
     lost, wrong = 0, 0
-    for state, host, dt, step in _runs(0.3, 12):
+    for state, host, dt, step in _runs(3.0, 6):
         first = PATCHES.step(state, host, dt, iterations=50)
         lost += (~step.converged).sum()
         wrong += (_excess_work(state, host, first, dt)[~first.converged] > 1e-9).sum()
