@@ -22,6 +22,9 @@ import numpy as np
 from planarfriction.errors import InvalidValueError, shown
 from planarfriction.formulas import LARGEST
 
+LONGEST = 1e24
+"""Largest length of a patch [m]: its area is a number in range."""
+
 SMALLEST = 1e-50
 """Smallest of the numbers that must be > 0: products of six stay above zero."""
 
@@ -173,6 +176,14 @@ def positive(name: str, value: Any) -> float:
     result = number(name, value)
     if result < SMALLEST:
         raise InvalidValueError(name, "be > 0" if result <= 0.0 else f"be at least {SMALLEST:g}", result)
+    return result
+
+
+def length(name: str, value: Any) -> float:
+    """Return `value` [m] as a float > 0 whose square is a number in range, or raise."""
+    result = positive(name, value)
+    if result > LONGEST:
+        raise InvalidValueError(name, f"be at most {LONGEST:g}", result)
     return result
 
 

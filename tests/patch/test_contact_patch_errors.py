@@ -21,6 +21,8 @@ GOOD = SQUARE.to_dict()
     [
         (lambda: pf.ContactPatch.disc(0.0), "radius must be > 0, got 0.0"),
         (lambda: pf.ContactPatch.disc(math.nan), "radius must be finite, got nan"),
+        (lambda: pf.ContactPatch.ring(0.1, 2e27), r"outer_radius must be at most 1e\+24, got 2e\+27"),
+        (lambda: pf.ContactPatch.polygon([(0, 0), (1e25, 0), (0, 1)]), r"vertices must be at most 1e\+24 in size"),
         (lambda: pf.ContactPatch.disc(0.01, cells=0), "cells must be an integer >= 1, got 0"),
         (lambda: pf.ContactPatch.disc_published(0.01, 20), "cells must be odd"),
         (lambda: pf.ContactPatch.rectangle(0.02, cells=(3, 2.5)), r"cells\[1\] must be an integer >= 1"),

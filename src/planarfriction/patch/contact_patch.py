@@ -125,7 +125,7 @@ class ContactPatch(Moments):
         A cut cell has the area of its part inside the disc, and its position is the centroid of that part. Raises
         InvalidValueError for a parameter that breaks its rule.
         """
-        radius = validation.positive("radius", radius)
+        radius = validation.length("radius", radius)
         return outlines.clipped(cls, outlines.RoundOutline(0.0, radius), Grid.square(2 * radius, cells), pressure, name)
 
     @classmethod
@@ -138,7 +138,7 @@ class ContactPatch(Moments):
         cells have the area of a disc with a radius of 10.05 cells, not 10.5. Use it for reproduction; `disc` is the
         true disc. Raises InvalidValueError for an even number of cells.
         """
-        grid = Grid.square(2 * validation.positive("radius", radius), cells)
+        grid = Grid.square(2 * validation.length("radius", radius), cells)
         if grid.columns % 2 == 0:
             raise InvalidValueError("cells", "be odd (the published mask is centred on a cell)", cells)
         reach = grid.columns // 2
@@ -162,8 +162,8 @@ class ContactPatch(Moments):
         `cells` counts along the longer side (cells as square as possible), or is `(columns, rows)`. Raises
         InvalidValueError for a parameter that breaks its rule.
         """
-        width = validation.positive("width", width)
-        height = width if height is None else validation.positive("height", height)
+        width = validation.length("width", width)
+        height = width if height is None else validation.length("height", height)
         grid = Grid.around_origin(width, height, *shapes.columns_and_rows(cells, width, height))
         positions, corners = grid.centres(), _UNIT_BOX * (width, height)
         areas = np.full(len(positions), grid.cell_area)
@@ -179,8 +179,8 @@ class ContactPatch(Moments):
 
         Raises InvalidValueError unless 0 < inner_radius < outer_radius.
         """
-        inner = validation.positive("inner_radius", inner_radius)
-        outer = validation.positive("outer_radius", outer_radius)
+        inner = validation.length("inner_radius", inner_radius)
+        outer = validation.length("outer_radius", outer_radius)
         if inner >= outer:
             raise InvalidValueError("inner_radius", "be < outer_radius", f"{inner} and {outer}")
         return outlines.clipped(cls, outlines.RoundOutline(inner, outer), Grid.square(2 * outer, cells), pressure, name)
@@ -196,7 +196,7 @@ class ContactPatch(Moments):
         column or row (across the line it has one cell more than along it where `cells` is even). Raises
         InvalidValueError for a parameter that breaks its rule.
         """
-        length, cells = validation.positive("length", length), validation.count("cells", cells, at_most=MOST_CELLS)
+        length, cells = validation.length("length", length), validation.count("cells", cells, at_most=MOST_CELLS)
         along = ["x", "y"].index(validation.choice("direction", direction, ("x", "y")))
         side, across = length / cells, cells + 1 - cells % 2
         columns, rows = (cells, across) if along == 0 else (across, cells)
@@ -257,7 +257,7 @@ class ContactPatch(Moments):
         law, (rows, columns), file = read_maps(pressure, loads)
         size = validation.numbers("cell_size", cell_size)
         size = validation.array("cell_size", size, (2,) if size.ndim else ())
-        width, height = np.broadcast_to([validation.positive("cell_size", side) for side in size.flat], 2)
+        width, height = np.broadcast_to([validation.length("cell_size", side) for side in size.flat], 2)
         grid = Grid.around_origin(columns * width, rows * height, columns, rows)
         name = (file or "pressure map") if name is None else name
         return cls(grid.centres(), np.full(rows * columns, grid.cell_area), law, grid, name)

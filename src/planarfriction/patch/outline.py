@@ -77,7 +77,7 @@ def outline_from_dict(data: Any) -> Outline | None:
 
 def polygon_outline(vertices: Any) -> PolygonOutline:
     """Return the outline with those `vertices` `[M, 2]` [m]."""
-    vertices = validation.array("vertices", vertices, (None, 2))
+    vertices = validation.array("vertices", vertices, (None, 2), largest=validation.LONGEST)
     if len(vertices) < 3:
         raise InvalidValueError("vertices", "hold at least 3 points", f"{len(vertices)}")
     vertices.setflags(write=False)
