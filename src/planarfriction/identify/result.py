@@ -13,11 +13,16 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.equality import ByValue
-from planarfriction.identify.parameters import ALL
+from planarfriction.formulas import PARAMETERS
+from planarfriction.identify.parameters import ALL, LAW
 from planarfriction.identify.rig import Nuisance
+from planarfriction.identify.uncertainty import draws
 from planarfriction.identify.verdicts import ModelScore, Verdict, interval
 from planarfriction.laws import LuGre
 from planarfriction.pictures import picture
+
+NUMBERS = tuple(name for name in PARAMETERS if name in LAW)
+"""Numbers of the law that may differ between environments."""
 
 WIDTH = 80
 """Columns of a table."""
@@ -77,6 +82,33 @@ class Identification(ByValue):
         """Compute the 95 % intervals [SI]: symmetric as factors for parameters that are > 0, else as differences."""
         both = zip(self.names, self.values, self.standard_errors, strict=True)
         return {name: interval(name, value, error) for name, value, error in both}
+
+    def sample(self, count: int, *, seed: int = 0) -> dict[str, np.ndarray]:
+        """Draw parameters of `count` environments from the estimates and their covariance, by name, `[count]` each.
+
+        Names and meaning are those of `pf.randomise`, for patches with the fitted `model`: size and place become
+        `scale`, `centre_x` and `centre_y` relative to it. Draws of values > 0 are symmetric as factors, within the
+        bounds of the fit; one that the data leave open varies by a factor of 20 (one standard deviation). `gamma` and
+        the constants of soft fingers, on which stored maps depend, stay as estimated.
+
+        Raises InvalidValueError unless `count` is a count.
+        """
+        generator = np.random.default_rng(validation.count("seed", seed, 0))
+        normal = generator.standard_normal((validation.count("count", count), len(self.names)))
+        drawn = draws(self.names, self.values, self.standard_errors, self.correlations, normal)
+        found = dict(zip(self.names, drawn.T.copy(), strict=True))
+        result = {name: values for name, values in found.items() if name in NUMBERS}
+        if "mu_c" in found or "mu_s" in found:
+            result["mu_s"] = np.maximum(found.get("mu_s", self.law.mu_s), found.get("mu_c", self.law.mu_c))
+        if not {"contact_radius", "centre_x", "centre_y"}.isdisjoint(found) and not self.model.depends_on_load:
+            result |= self._places(found, count)
+        return result
+
+    def _places(self, found: Mapping[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
+        """Return size and displacement of the fitted patch for draws of its radius and its centre of pressure."""
+        scale = found.get("contact_radius", np.ones(count)) / self.estimates.get("contact_radius", 1.0)
+        middle = zip(("centre_x", "centre_y"), self.model.patch.centre_of_pressure(), strict=True)
+        return {"scale": scale} | {name: found.get(name, own) - scale * own for name, own in middle}
 
     def identifiable(self, name: str) -> bool:
         """Return True if the data determine this parameter."""

@@ -7,10 +7,13 @@ slides, each counts as one observation.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from planarfriction.identify.parameters import ALL, PRIOR
 
 if TYPE_CHECKING:
     from planarfriction.identify.search import Fit
@@ -213,6 +216,28 @@ def covariance(jacobian: np.ndarray, free: np.ndarray) -> np.ndarray:
         strengths = np.maximum(strengths, 1e-12 * strengths[0])
         inner = (axes.T / strengths**2) @ axes
         result[np.ix_(seen, seen)] = inner / np.outer(size[seen], size[seen])
+    return result
+
+
+def draws(
+    names: Sequence[str], values: np.ndarray, errors: np.ndarray, correlations: np.ndarray, normal: np.ndarray
+) -> np.ndarray:
+    """Return values `[n, F]` of parameters with these errors and correlations, from `normal` numbers `[n, F]`.
+
+    As in intervals, errors of values > 0 are factors: at most that of the prior (`parameters.PRIOR`). Others stay
+    within the bounds of a fit, and where no error is known at the estimate.
+    """
+    strengths, axes = np.linalg.eigh(correlations)
+    errors = np.where(np.isfinite(errors), errors, np.inf)
+    unit = normal @ (axes * np.sqrt(np.maximum(strengths, 0.0))) @ axes.T
+    result = np.empty_like(unit)
+    for i, (name, value, error) in enumerate(zip(names, values, errors, strict=True)):
+        own = ALL[name]
+        if own.logarithmic and value > 0.0:
+            result[:, i] = value * np.exp(min(error / value, PRIOR) * unit[:, i])
+        else:
+            result[:, i] = value + (error if np.isfinite(error) else 0.0) * unit[:, i]
+        result[:, i] = np.clip(result[:, i], own.low, own.high)
     return result
 
 

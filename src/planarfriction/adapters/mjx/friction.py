@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
@@ -14,14 +14,23 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from planarfriction import models
+from planarfriction import models, validation
 from planarfriction.adapters.mjx import newton, responses
 from planarfriction.adapters.mujoco.friction import Report
-from planarfriction.adapters.mujoco.patches import PatchContact, Placed, check_once, memory
+from planarfriction.adapters.mujoco.patches import (
+    PatchContact,
+    Placed,
+    check_once,
+    memory,
+    parameters_in,
+    place_of_parameters,
+)
 from planarfriction.coupling import ITERATIONS, TOLERANCE
+from planarfriction.environments import SHAPE, check, defaults
 from planarfriction.errors import InvalidValueError
 from planarfriction.jax import DistributedModel, MomentModel, ReducedModelPublished
 from planarfriction.jax.base import FrictionPytree
+from planarfriction.tensors.steps import LAW
 
 INTEGRATORS = {
     int(mujoco.mjtIntegrator.mjINT_EULER): "Euler",
@@ -52,6 +61,17 @@ class _Search(NamedTuple):
     slack: jax.Array
 
 
+class _Own(NamedTuple):
+    """Friction of one environment."""
+
+    models: list[FrictionPytree]
+    """Model of each group of patches, with their parameters."""
+    scale: jax.Array
+    """Sizes of the patches as multiples of their models', `[k]`."""
+    displaced: jax.Array
+    """Displacements of the patches in their frames `[k, 2]` [m]."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Fixed:
     """Parts that do not change with parameters: compared by identity, as one function is compiled for them."""
@@ -67,6 +87,8 @@ class _Fixed:
     memory: Any
     """Places of the memory of the patches in `userdata`."""
     nuserdata: int
+    numbers: dict[str, np.ndarray]
+    """Parameters in the model of MuJoCo, `[k]` each."""
 
 
 @jax.tree_util.register_pytree_node_class
@@ -75,7 +97,8 @@ class Friction:
 
     States are stored in the data, in the last numbers of `userdata`, in the same way as by
     `planarfriction.adapters.mujoco`, so that data can be moved from one to the other. This is a pytree whose leaves are
-    those of its `models` (`planarfriction.jax`), one for each different model among the patches.
+    those of its `models` (`planarfriction.jax`), one for each different model among the patches, and its `parameters`,
+    by name, which replace numbers of these models.
 
     Raises `InvalidValueError` without double precision, for an unsuitable integrator or cone, noslip iterations, too
     little user data, names that are not in the model, pairs with friction of their own, models that JAX does not have,
@@ -93,7 +116,12 @@ class Friction:
         radius = np.array([np.sqrt((patch.model.patch.positions**2).sum(1).mean()) for patch in patches])
         shapes = tuple(self.models[i].state_shape for i in which)
         follows = tuple(each.follows for each in placed)
-        self._fixed = _Fixed(responses.places(placed, radius), which, follows, shapes, radius, at, m.nuserdata)
+        numbers = {name: view.copy() for name, view in parameters_in(m, place_of_parameters(m), len(patches)).items()}
+        made = zip(numbers, np.array([defaults(patch.model.law) for patch in patches]).T, strict=True)
+        changed = {name: jnp.asarray(numbers[name]) for name, own in made if (numbers[name] != own).any()}
+        self.parameters: dict[str, jax.Array] = changed
+        fixed = responses.places(placed, radius), which, follows, shapes, radius, at, m.nuserdata
+        self._fixed = _Fixed(*fixed, numbers=check(numbers))
 
     def replace(self, models: Sequence[FrictionPytree]) -> Self:
         """Return the same patches with other models, which must be of the same kinds in the same order.
@@ -104,17 +132,36 @@ class Friction:
         if given != kinds or not all(isinstance(model, FrictionPytree) for model in models):
             rule = f"be models of planarfriction.jax: {', '.join(kinds)}"
             raise InvalidValueError("models", rule, ", ".join(given))
-        return self.tree_unflatten(self._fixed, (tuple(models),))
+        return self.tree_unflatten(self._fixed, (tuple(models), self.parameters))
+
+    def with_parameters(self, parameters: Mapping[str, Any]) -> Self:
+        """Return the same patches with other parameters, by the names of `pf.randomise`: numbers, or `[k]`.
+
+        With an array for each environment, call this in a function for one, under `jax.vmap`. Names that are not given
+        stay as they are.
+
+        Raises InvalidValueError for unknown names, other shapes, and, where values can be read, those that break the
+        rule of a parameter.
+        """
+        k = len(self._fixed.which)
+        validation.keys("parameters", parameters, (), self._fixed.numbers)
+        given = {name: jnp.asarray(value) for name, value in parameters.items()}
+        for name, value in given.items():
+            if value.shape not in ((), (k,)):
+                raise InvalidValueError(name, f"be a number or have shape [{k}]: see jax.vmap", list(value.shape))
+        held = {**self._fixed.numbers, **self.parameters, **given}
+        check({name: np.asarray(value) for name, value in held.items() if not isinstance(value, jax.core.Tracer)})
+        return self.tree_unflatten(self._fixed, (self.models, {**self.parameters, **given}))
 
     def tree_flatten(self) -> tuple[Any, _Fixed]:
         """Take the pytree apart (called by JAX)."""
-        return (self.models,), self._fixed
+        return (self.models, self.parameters), self._fixed
 
     @classmethod
     def tree_unflatten(cls, fixed: _Fixed, leaves) -> Self:
         """Rebuild the pytree (called by JAX)."""
         friction = object.__new__(cls)
-        friction._fixed, (friction.models,) = fixed, leaves
+        friction._fixed, (friction.models, friction.parameters) = fixed, leaves
         return friction
 
     # ------------------------------------------------------------------ what the data hold
@@ -179,22 +226,25 @@ class Friction:
         given, dt, at = d, m.opt.timestep, self._fixed.memory
         states, guess = self.states(d), self._now(d, at.wrench, at.guess, 3 * len(self._fixed.which))
         held = self._now(d, at.centre, at.held, 3 * len(self._fixed.which)).reshape(-1, 3)
+        own = self._own()
+        guess = responses.back(guess.reshape(-1, 3), own.displaced).ravel()
         d = _moved(m, d)
         where = responses.geometry(m, d, self._fixed.places, held)
         guess = jnp.where(jnp.repeat(where.touching, 3), guess, 0.0)
-        found = self._search(*jax.lax.stop_gradient((self.models, m, d, where, states, guess)))
+        found = self._search(*jax.lax.stop_gradient((own, m, d, where, states, guess)))
         answer = responses.answer(m, d, where.jacobian, where.rows, found.active)
         centre = where.centres(answer.forces(d, guess))  # that of the search, with its derivatives
-        shift, pressed = self._pressed(self.models, where, found.centre + centre - jax.lax.stop_gradient(centre))
+        shift, pressed = self._pressed(own, where, found.centre + centre - jax.lax.stop_gradient(centre))
 
         def unit(twist):
-            return self._evaluate(self.models, pressed, shift, states, twist, jnp.ones(len(where.rows)), dt)[1]
+            return self._evaluate(own, pressed, shift, states, twist, jnp.ones(len(where.rows)), dt)[1]
 
         wrench = newton.fitting(unit, answer.host, found.wrench)
         twist, load = answer.host.twists(wrench), answer.host.loads(wrench)
-        new, _ = self._evaluate(self.models, pressed, shift, states, twist, load, dt)
+        new, _ = self._evaluate(own, pressed, shift, states, twist, load, dt)
         d = self._integrated(m, d, where.jacobian, wrench, answer)
         kept = {"state": states, "new": new, "guess": guess, "load": load, "held": held, "centre": where.moved(shift)}
+        shift = shift + own.displaced
         kept |= {"wrench": responses.back(wrench.reshape(-1, 3), -shift), "twist": responses.about(twist, shift)}
         kept |= {"time": given.time, "next": d.time, "iterations": found.iterations, "passes": found.passes}
         kept |= {"residual": found.residual, "converged": found.converged & (found.slack <= SLACK)}
@@ -202,19 +252,30 @@ class Friction:
         # in double precision MJX makes long integers of some that came in short, at which `lax.scan` would stop
         return jax.tree.map(lambda after, before: after.astype(before.dtype), d, given)
 
-    def _search(self, models, m, d, where: responses.Geometry, states, guess) -> _Search:
+    def _own(self) -> _Own:
+        """Return the friction of the environment."""
+        k, models = len(self._fixed.which), []
+        values = {name: jnp.broadcast_to(value, (k,)) for name, value in self.parameters.items()}
+        for number, _, own in self._groups():
+            model, law = self.models[number], self.models[number].parameters
+            changed = {name: values[name][np.array(own)] for name in LAW if name in values and name in law._fields}
+            models.append(model.replace(parameters=law._replace(**changed)) if changed else model)
+        scale, *centre = (values.get(name, jnp.full(k, own)) for name, own in SHAPE.items())
+        return _Own(models, scale, jnp.stack(centre, axis=1))
+
+    def _search(self, own: _Own, m, d, where: responses.Geometry, states, guess) -> _Search:
         """Find the constraints that are active in the end, and the wrenches, without derivatives."""
-        applied, dt, radius = d.qfrc_applied, m.opt.timestep, jnp.asarray(self._fixed.radius)
+        applied, dt, radius = d.qfrc_applied, m.opt.timestep, own.scale * self._fixed.radius
 
         def body(last: _Search) -> _Search:
             pushed = mjx.fwd_acceleration(m, d.replace(qfrc_applied=applied + last.wrench @ where.jacobian))
             active = responses.active_rows(mjx.solve(m, pushed.replace(qacc_warmstart=last.acceleration)))
             answer = responses.answer(m, d, where.jacobian, where.rows, active)
             centre = jnp.where(last.passes == 0, where.centres(answer.forces(d, last.wrench)), last.centre)
-            shift, pressed = self._pressed(models, where, centre)
+            shift, pressed = self._pressed(own, where, centre)
 
             def unit(twist):
-                return self._evaluate(models, pressed, shift, states, twist, jnp.ones(len(where.rows)), dt)[1]
+                return self._evaluate(own, pressed, shift, states, twist, jnp.ones(len(where.rows)), dt)[1]
 
             solved = newton.solve(unit, answer.host, last.wrench, radius, TOLERANCE, ITERATIONS)
             acceleration = answer.acceleration(solved.wrench)
@@ -238,26 +299,28 @@ class Friction:
         for kind in dict.fromkeys(kinds):
             yield *kind, [p for p, each in enumerate(kinds) if each == kind]
 
-    def _pressed(self, models, where: responses.Geometry, centre: jax.Array) -> tuple[jax.Array, list[Any]]:
+    def _pressed(self, own: _Own, where: responses.Geometry, centre: jax.Array) -> tuple[jax.Array, list[Any]]:
         """Return displacements of origins towards the centres `[k, 2]`, and the models of each group that press there.
 
         Models are None if their pressure is fixed.
         """
         shift = where.share[:, None] * centre
-        rest = centre - shift
-        return shift, [models[i].pressed(rest[np.array(own)]) if follow else None for i, follow, own in self._groups()]
+        rest = (centre - shift - own.displaced) / own.scale[:, None]
+        groups = zip(self._groups(), own.models, strict=True)
+        return shift, [model.pressed(rest[np.array(at)]) if follow else None for (_, follow, at), model in groups]
 
-    def _evaluate(self, models, pressed, shift, states, twist, load, dt) -> tuple[list[jax.Array], jax.Array]:
+    def _evaluate(self, own: _Own, pressed, shift, states, twist, load, dt) -> tuple[list[jax.Array], jax.Array]:
         """Return the new states and wrenches of steps; patches of the same model side by side."""
-        twist = responses.about(twist, shift)
+        shift, resize = shift + own.displaced, jnp.ones((len(states), 3)).at[:, 2].set(own.scale)
+        twist = resize * responses.about(twist, shift)
         new, wrenches = [jnp.empty(0)] * len(states), [jnp.empty(0)] * len(states)
-        for (number, _, own), followed in zip(self._groups(), pressed, strict=True):
-            model, index = models[number], np.array(own)
-            given = jnp.stack([states[p] for p in own]), twist[index], load[index], dt
+        for (_, _, at), model, followed in zip(self._groups(), own.models, pressed, strict=True):
+            index = np.array(at)
+            given = jnp.stack([states[p] for p in at]), twist[index], load[index], dt
             after, wrench = model.step(*given) if followed is None else model.step_pressed(followed, *given)
-            for i, p in enumerate(own):
+            for i, p in enumerate(at):
                 new[p], wrenches[p] = after[i], wrench[i]
-        return new, responses.back(jnp.stack(wrenches), shift)
+        return new, responses.back(resize * jnp.stack(wrenches), shift)
 
     def _integrated(self, m, d, jacobian, wrench, answer: responses.WrenchResponse) -> Any:
         """Return the data after the step, with the forces of the user as they were."""
