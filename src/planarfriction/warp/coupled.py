@@ -85,8 +85,8 @@ class CoupledPatches:
         """Return the state [worlds, states] of patches without memory."""
         return self._zeros(*self.state_shape)
 
-    def results(self) -> CoupledStep:
-        """Return arrays that `step` can write."""
+    def results(self) -> Any:
+        """Return a `CoupledStep` of Warp's arrays, which `step` can write."""
         k = len(self.models)
         state, wrench, twist, load = self.rest(), self._zeros(k, 3), self._zeros(k, 3), self._zeros(k)
         rounds, converged = (wp.zeros(self.worlds, dtype=wp.int32, device=self.device) for _ in range(2))
