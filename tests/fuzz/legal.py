@@ -140,6 +140,9 @@ def objects() -> dict[str, Any]:
         "Slide": pf.identify.Slide(time, pose), "Log": log, "Uniform": pf.Uniform(),
         "LinearGradient": pf.LinearGradient((5.0, 2.0)), "PressureMaps": pf.PressureMaps([1.0, 2.0], np.ones((2, 3))),
         "PerCell": pf.patch.PerCell([1.0, 2.0, 3.0]),
+        "FrictionObserver": pf.online.FrictionObserver(
+            pf.ReducedModel(PATCH, LAW, cells=9), surface=pf.LimitSurfaceEllipsoid(PATCH)
+        ),
         "Parts": held, "Sensors": pf.online.Sensors(), "Gripper": pf.online.Gripper(held, 5.0, cells=3),
         "Slider": pf.planning.Slider(pf.LimitSurfaceEllipsoid(PATCH), SQUARE),
         **{name: getattr(pf, name)(PATCH) for name in pf.__all__ if name.startswith("LimitSurface")},
@@ -173,6 +176,16 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "tilt_time": 0.1,
     },
     "online.Gripper": {"parts": Fresh(lambda: objects()["Parts"]), "grip": 5.0, "sensors": pf.online.Sensors()},
+    "online.FrictionObserver": {
+        "model": pf.ReducedModel(PATCH, LAW, cells=9),
+        "batch": (),
+        "surface": pf.LimitSurfaceEllipsoid(PATCH),
+        "sensors": pf.online.Sensors(),
+        "bias": (0.03, 0.03, 3e-4),
+    },
+    "online.FrictionObserver.update": {
+        "measurement": pf.online.Measurement(0.1, (0.0, 1.0, 0.0), 4.0, (0.0, 0.01, 0.0)),
+    },
     "PressureMaps": {"values": np.ones((2, 3))},
     "patch.PerCell": {"values": [1.0, 2.0, 3.0]},
     "ContactPatch.from_pressure": {"pressure": np.ones((3, 3)), "loads": None},

@@ -1,8 +1,9 @@
-"""Friction while a gripper holds: a rig with sensors and delays, and published rules to compare with."""
+"""Friction while a gripper holds: an observer, a rig with sensors and delays, and published rules to compare with."""
 
 from planarfriction.online.gripper import Gripper, Measurement, Parts, Sensors
+from planarfriction.online.observer import Estimate, FrictionObserver
 
-__all__ = ["Gripper", "Measurement", "Parts", "Sensors"]
+__all__ = ["Estimate", "FrictionObserver", "Gripper", "Measurement", "Parts", "Sensors"]
 
 
 def __dir__() -> list[str]:

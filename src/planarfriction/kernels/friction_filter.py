@@ -1,0 +1,365 @@
+"""Square-root Kalman filter for friction from samples of wrench, load and slip velocity (docs/online.md).
+
+The unknowns x are the slip twist `V_S = F V` (3), `log mu_c`, `log mu_s/mu_c`, the log of a scale of the radius, and
+the bias of the scaled wrench (3); their covariance is `S S'`. Sliding is steady: `w = N g(|u|) D h(u) + b` with
+`u = D V_S`, `D = diag(1, 1, scale)`; Jacobians are those of the limit surface and of the Stribeck curve. The
+probability of slip follows a hidden Markov chain: sliding has the velocity of x, sticking none and a wrench within the
+surface.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from planarfriction.compiler import jit, kernel
+from planarfriction.formulas import LARGEST
+from planarfriction.kernels.surfaces import sliding, sliding_jacobian
+
+N = 9
+"""Unknowns."""
+
+MU, RATIO, SCALE, BIAS = 3, 4, 5, 6
+"""Places of the unknowns after the twist."""
+
+ROOT, SLIP, TIME, BOUND, PEAK, GAUGE, SEEN, PLACE, REST = N, 90, 91, 92, 93, 94, 95, 98, 101
+"""Places in the state after x: covariance root, probability of slip, time, logs of the largest gauge of the wrench
+while it stuck, of a recent one, and of that now, filtered wrench over load (3), recent displacement (3), time since
+the last velocity."""
+
+SUM, LOADS, COUNT, OLD, CHAIN, BACK = 102, 105, 106, 107, 115, 116
+"""Places of the sums of the wrench over load (3) and of the load since the last velocity, and their number; the same
+of the samples before it, with their velocity (8); velocities in a row that were those of sliding; samples in a row that
+were not later than one before."""
+
+RESTART = 10.0
+"""Samples in a row whose time went back after which the clock counts as set anew."""
+
+STATE = 117
+"""Length of the state."""
+
+PEAK_TIME, SEEN_TIME, PLACE_TIME = 0.1, 0.004, 0.06
+"""Times in which the peak of the wrench, its filter and the recent displacement fade [s]."""
+
+LEAVES, CREEPS = 2.0, 0.2
+"""Rates at which a slip ends, and at which one begins within the surface [1/s]."""
+
+BREAKS = 100.0
+"""Rate at which one begins at the surface [1/s]."""
+
+FRESH = 0.03
+"""Standard deviation of the slip velocity at its beginning [m/s]."""
+
+SLOW = 1.5
+"""Sliding speed, in quanta, from which on the direction of the twist is known well enough to learn friction."""
+
+MEMORY = 0.01
+"""Time [s] within which samples inside the surface are one, not many, in the probability of slip."""
+
+ESTIMATE = 19
+"""Numbers of an estimate: twist, mu_c, mu_s, radius, covariance of their logs (9), probability of slip and of being
+about to, margin, log of the gauge of the wrench per load."""
+
+NEAR = 0.1
+"""Share of more load at which a part that is about to slip does [-]."""
+
+SEEN_ERROR = 0.02
+"""Relative error of the filtered wrench over load [-]."""
+
+PEAK_ERROR = 0.1
+"""Relative error of the peak of the wrench as `mu_s` [-]."""
+
+
+class Filter(NamedTuple):
+    """Settings that do not change."""
+
+    kind: int
+    """Kind of the surface (see `surfaces`)."""
+    size: int
+    data: np.ndarray
+    duals: np.ndarray
+    """Directions over their dissipation `[M, 3]`, of one half of all."""
+    frame: np.ndarray
+    """`F` of `V_S = F V` `[3, 3]`."""
+    back: np.ndarray
+    """Its inverse `[3, 3]`."""
+    conjugate: np.ndarray
+    """`-F^-T`, which makes scaled wrenches `[3, 3]`."""
+    radius: float
+    """Contact radius of the surface at the reference load [m]."""
+    reference: float
+    """The reference load [N]."""
+    growth: float
+    """Growth of the radius: it goes as this power of the load [-]."""
+    v_s: float
+    gamma: float
+    sigma_2: float
+    noise: np.ndarray
+    """Variances of the scaled wrench `[3]`."""
+    quantum: float
+    """Smallest slip velocity [m/s]."""
+    place: float
+    """Place that one count is [m]."""
+    model_error: float
+    """Relative error of a wrench of the model [-], anew between velocities; half of it stays in every estimate."""
+    drift: float
+    """Random walk of `log mu_c` [1 per square root of s]."""
+    saturation: float
+    """Force at which the sensor saturates [N]."""
+    least_load: float
+    """Load [N] below which a contact says nothing of friction."""
+
+
+@kernel
+def _finite(x):
+    """Return True for a finite number; reordered sums may not use x - x."""
+    return abs(x) < LARGEST
+
+
+@kernel
+def _measure(s, h, innovation, variance, column):
+    """Update with a scalar `innovation` of slope `h [9]` and variance: rotate `[[sqrt(variance), h'S], [0, S]]`."""
+    corner = math.sqrt(variance)
+    for i in range(N):
+        column[i] = 0.0
+    for j in range(N - 1, -1, -1):
+        v = 0.0
+        for i in range(j, N):
+            v += s[ROOT + N * i + j] * h[i]
+        size = math.sqrt(corner * corner + v * v)
+        cosine, sine, corner = corner / size, v / size, size
+        for i in range(j, N):
+            a, b = column[i], s[ROOT + N * i + j]
+            column[i], s[ROOT + N * i + j] = cosine * a + sine * b, cosine * b - sine * a
+    for i in range(N):
+        s[i] += column[i] * innovation / corner
+
+
+@kernel
+def _spread(s, i, variance, column):
+    """Add a variance to unknown i."""
+    for k in range(N):
+        column[k] = 0.0
+    column[i] = math.sqrt(variance)
+    for j in range(i, N):
+        a, b = s[ROOT + N * j + j], column[j]
+        size = math.sqrt(a * a + b * b)
+        if size > 0.0:
+            cosine, sine = a / size, b / size
+            for k in range(j, N):
+                a, b = s[ROOT + N * k + j], column[k]
+                s[ROOT + N * k + j], column[k] = cosine * a + sine * b, cosine * b - sine * a
+
+
+@kernel
+def _reset(s, i, value, deviation, column):
+    """Forget unknown i: a value with a standard deviation, independent of all others."""
+    for k in range(N):
+        column[k] = s[ROOT + N * k + i] if k > i else 0.0
+    for j in range(i + 1):
+        s[ROOT + N * i + j] = 0.0
+    for k in range(i + 1, N):
+        s[ROOT + N * k + i] = 0.0
+    s[i], s[ROOT + N * i + i] = value, deviation
+    for j in range(i + 1, N):  # what the others had in that column goes on
+        a, b = s[ROOT + N * j + j], column[j]
+        size = math.sqrt(a * a + b * b)
+        if size > 0.0:
+            cosine, sine = a / size, b / size
+            for k in range(j, N):
+                a, b = s[ROOT + N * k + j], column[k]
+                s[ROOT + N * k + j], column[k] = cosine * a + sine * b, cosine * b - sine * a
+
+
+@kernel
+def _variance(s, i, k):
+    """Return the variance of the sum of unknowns i and k, or of i alone if they are one."""
+    total = 0.0
+    for j in range(N):
+        each = s[ROOT + N * i + j] + (s[ROOT + N * k + j] if k != i else 0.0)
+        total += each * each
+    return total
+
+
+@kernel
+def _normal(x):
+    """Return the distribution function of the normal distribution."""
+    return 0.5 * math.erfc(-x * math.sqrt(0.5))
+
+
+@kernel
+def _scale(own, s, load):
+    """Return the radius at a load over that of the surface."""
+    return math.exp(s[SCALE] + own.growth * math.log(load / own.reference))
+
+
+@kernel
+def _gauge(own, s, scale, best):
+    """Return the gauge of the filtered wrench, the largest `w . dual`; the dual, a twist, goes to `best`."""
+    x, y, z, most = s[SEEN], s[SEEN + 1], s[SEEN + 2] / scale, 0.0
+    for m in range(own.duals.shape[0]):
+        each = x * own.duals[m, 0] + y * own.duals[m, 1] + z * own.duals[m, 2]
+        if abs(each) > most:
+            most = abs(each)
+            sign = 1.0 if each > 0.0 else -1.0
+            for i in range(3):
+                best[i] = sign * own.duals[m, i]
+    return most
+
+
+@kernel
+def _learn(own, s, h, column, jacobian):
+    """Update with the mean wrench and the velocity of the samples before the last velocity, which were sliding."""
+    count = s[OLD + 4]
+    load = s[OLD + 3] / count
+    for i in range(3):
+        _reset(s, i, s[OLD + 5 + i], own.quantum / math.sqrt(6.0), column)
+    for row in range(3):
+        mu, ratio, scale = math.exp(s[MU]), math.exp(s[RATIO]), _scale(own, s, load)
+        x, y, z = s[0], s[1], scale * s[2]
+        speed = math.sqrt(x * x + y * y + z * z)
+        u = sliding(own.kind, own.data, 0, own.size, x, y, z, speed)
+        sliding_jacobian(own.kind, own.data, 0, own.size, x, y, z, speed, jacobian)
+        power = math.pow(speed / own.v_s, own.gamma)
+        fade = math.exp(-power)
+        steady = mu * (1.0 + (ratio - 1.0) * fade)
+        g = steady + own.sigma_2 * speed  # viscous friction along h: it is small
+        by_speed = own.sigma_2 - mu * (ratio - 1.0) * fade * own.gamma * power / speed
+        along = (u[0] if row == 0 else (u[1] if row == 1 else u[2])) / speed
+        factor = load * (scale if row == 2 else 1.0)
+        for i in range(N):
+            h[i] = 0.0
+        for j in range(3):
+            unit = (x if j == 0 else (y if j == 1 else z)) / speed
+            slope = g * (jacobian[3 * row + j] - along * unit) / speed + by_speed * along * unit
+            h[j] = factor * slope * (scale if j == 2 else 1.0)
+        h[MU] = factor * steady * along
+        h[RATIO] = factor * along * mu * ratio * fade
+        h[SCALE] = h[2] * s[2] + (factor * g * along if row == 2 else 0.0)
+        h[BIAS + row] = 1.0
+        error = own.model_error * factor * g
+        variance = own.noise[row] / count + error * error
+        _measure(s, h, load * s[OLD + row] / count - factor * g * along - s[BIAS + row], variance, column)
+
+
+@kernel
+def _see(own, s, v, h, column, jacobian):
+    """Take a slip velocity, the mean since the last; return the log of the odds that it is a slip."""
+    span = min(s[REST], PLACE_TIME)
+    odds, rest, sd2, speed2, far2 = 0.0, 0.7 * own.quantum, FRESH * FRESH, 0.0, 0.0
+    for i in range(3):
+        s[PLACE + i] = s[PLACE + i] * math.exp(-span / PLACE_TIME) + v[i] * span
+        far2 += s[PLACE + i] * s[PLACE + i]
+        speed2 += v[i] * v[i]
+        miss = v[i] - (s[i] if s[SLIP] > 0.5 else 0.0)
+        odds += 0.5 * (v[i] * v[i] / (rest * rest) - miss * miss / sd2) - 0.5 * math.log(sd2 / (rest * rest))
+    moves = speed2 > SLOW * SLOW * own.quantum * own.quantum
+    if moves and s[CHAIN] >= 2.0 and s[OLD + 4] > 0.0:
+        _learn(own, s, h, column, jacobian)
+    s[CHAIN] = s[CHAIN] + 1.0 if moves else 0.0
+    for i in range(3):
+        s[OLD + i], s[OLD + 5 + i] = s[SUM + i], v[i]
+        s[SUM + i] = 0.0
+        _reset(s, i, v[i], own.quantum, column)
+    s[OLD + 3], s[OLD + 4], s[LOADS], s[COUNT], s[REST] = s[LOADS], s[COUNT], 0.0, 0.0, 0.0
+    return min(max(odds, -8.0), 8.0) + (8.0 if far2 > 16.0 * own.place * own.place else 0.0)
+
+
+@kernel
+def _judge(own, s, load, dt, best):
+    """Update the probability of slip with the filtered wrench over load."""
+    sd_s, sd_c = (
+        math.sqrt(_variance(s, MU, RATIO) + SEEN_ERROR * SEEN_ERROR),
+        math.sqrt(_variance(s, MU, MU) + SEEN_ERROR * SEEN_ERROR),
+    )
+    level = math.log(max(_gauge(own, s, _scale(own, s, load), best), 1e-9))
+    inside = max(0.0, (s[MU] - level) / sd_c - 2.0)
+    begins = CREEPS + BREAKS * _normal((level - s[MU] - s[RATIO]) / sd_s - 1.0)
+    p = s[SLIP]
+    p = p + (1.0 - p) * min(begins * dt, 0.5) - p * min(LEAVES * dt, 0.5)
+    against = math.exp(-0.5 * min(inside * inside, 50.0) * dt / MEMORY)
+    s[SLIP] = p * against / (p * against + 1.0 - p)
+    s[GAUGE] = level
+
+
+@kernel
+def _estimate(own, s, out):
+    """Write what is known after a sample to `out [ESTIMATE]`."""
+    for i in range(3):
+        out[i] = 0.0
+        for j in range(3):
+            out[i] += own.back[i, j] * s[j] if s[SLIP] > 0.5 else 0.0
+    log_s = max(s[MU] + max(s[RATIO], 0.0), s[BOUND])
+    out[3], out[4], out[5] = math.exp(s[MU]), math.exp(log_s), own.radius * math.exp(s[SCALE])
+    for i in range(3):
+        for k in range(3):
+            total = 0.0
+            for j in range(N):
+                a = s[ROOT + N * (MU if i < 2 else SCALE) + j] + (s[ROOT + N * RATIO + j] if i == 1 else 0.0)
+                b = s[ROOT + N * (MU if k < 2 else SCALE) + j] + (s[ROOT + N * RATIO + j] if k == 1 else 0.0)
+                total += a * b
+            floor = 0.25 * own.model_error * own.model_error
+            out[6 + 3 * i + k] = total + (floor if (i < 2) == (k < 2) else 0.0)
+    out[15] = s[SLIP]
+    out[16] = (1.0 - s[SLIP]) * _normal((s[GAUGE] + NEAR - log_s) / math.sqrt(out[10] + SEEN_ERROR * SEEN_ERROR))
+    out[17] = 1.0 - math.exp(min(s[GAUGE] - log_s, 50.0))
+    out[18] = s[GAUGE]
+
+
+@jit
+def update(own, states, times, wrenches, loads, velocities, flags, out):
+    """Update states `[P, STATE]` with a sample each; NaN is no sample. `out [P, ESTIMATE]` gets what is known.
+
+    Flags `[P]` get the sum of what was odd: 1 no or bad wrench or load, 2 time that does not go on, 4 saturated sensor.
+    """
+    h, column, jacobian, best, v = np.empty(N), np.empty(N), np.empty(9), np.empty(3), np.empty(3)
+    for p in range(states.shape[0]):
+        s, flags[p] = states[p], 0
+        now, dt = times[p], times[p] - s[TIME]
+        if not _finite(now) or dt <= 0.0:
+            s[BACK] += 1.0 if _finite(now) else 0.0
+            flags[p], dt = 2, 0.0
+            s[TIME] = now if s[BACK] >= RESTART else s[TIME]
+        else:
+            s[TIME], s[BACK], dt = now, 0.0, dt if dt <= 1.0 else 1e-3  # the first sample, or a long pause
+        load = loads[p]
+        force = math.hypot(wrenches[p, 0], wrenches[p, 1])
+        good = _finite(load) and _finite(force) and _finite(wrenches[p, 2])
+        flags[p] += 0 if good else 1
+        if good and force >= own.saturation:
+            flags[p], good = flags[p] + 4, False
+        if dt > 0.0:
+            if own.drift > 0.0:
+                _spread(s, MU, own.drift * own.drift * dt, column)
+            s[PEAK] -= dt / PEAK_TIME
+            s[BOUND] -= own.drift * math.sqrt(dt)
+            s[REST] += dt
+        before = s[SLIP]
+        if good and load > own.least_load and dt > 0.0:
+            share = 1.0 - math.exp(-dt / SEEN_TIME)
+            for i in range(3):
+                w = 0.0
+                for j in range(3):
+                    w += own.conjugate[i, j] * wrenches[p, j]
+                s[SEEN + i] += share * (w / load - s[SEEN + i])
+                s[SUM + i] += w / load
+            s[LOADS], s[COUNT] = s[LOADS] + load, s[COUNT] + 1.0
+            _judge(own, s, load, dt, best)
+            s[PEAK] = max(s[PEAK], s[GAUGE])
+            if s[SLIP] < 0.1:
+                s[BOUND] = max(s[BOUND], s[GAUGE])
+        if _finite(velocities[p, 0]) and _finite(velocities[p, 1]) and _finite(velocities[p, 2]) and dt > 0.0:
+            for i in range(3):
+                v[i] = 0.0
+                for j in range(3):
+                    v[i] += own.frame[i, j] * velocities[p, j]
+            odds = math.exp(_see(own, s, v, h, column, jacobian))
+            s[SLIP] = s[SLIP] * odds / (s[SLIP] * odds + 1.0 - s[SLIP])
+        s[SLIP] = min(max(s[SLIP], 1e-9), 1.0 - 1e-9)
+        if before <= 0.5 < s[SLIP] and s[PEAK] > -9.0:
+            for i in range(N):
+                h[i] = 1.0 if i in (MU, RATIO) else 0.0
+            _measure(s, h, s[PEAK] - s[MU] - s[RATIO], PEAK_ERROR * PEAK_ERROR, column)
+        _estimate(own, s, out[p])

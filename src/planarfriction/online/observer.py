@@ -1,0 +1,229 @@
+"""Estimate the friction of a grip while it holds and slips."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.equality import by_parts
+from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import friction_filter as kernels
+from planarfriction.limit_surface import LimitSurface
+from planarfriction.models import FrictionModel
+from planarfriction.online.gripper import Measurement, Sensors
+
+PARAMETERS = ("mu_c", "mu_s", "radius")
+"""Names of what is estimated beside the twist, in the order of `Estimate.determined` and `covariance`."""
+
+FLAGS = {1: "no wrench or load", 2: "time does not go on", 4: "sensor is saturated"}
+"""Meaning of the bits of `Estimate.flags`."""
+
+_SEGMENTS = 20
+"""Planes around the limit surface along a quadrant: they miss the gauge of a wrench by 0.2 % at most [-]."""
+
+_LEAST_NOISE = 1e-6
+"""Least standard deviation of a scaled wrench [N]."""
+
+_TWO_SIDED = 1.959964
+"""Standard deviations on either side of 95 % of a normal distribution."""
+
+
+@by_parts
+class Estimate(NamedTuple):
+    """State of a grip after a sample; leading axes are parts."""
+
+    twist: np.ndarray
+    """Velocity of the part at the grip, `[..., 3]` [m/s, m/s, rad/s]; zero while it sticks."""
+    mu_c: np.ndarray
+    """Coulomb coefficient `[...]` [-]."""
+    mu_s: np.ndarray
+    """Static coefficient `[...]`, not below the largest friction seen while the part stuck [-]."""
+    radius: np.ndarray
+    """Contact radius `[...]` [m]."""
+    covariance: np.ndarray
+    """Covariance of the logs of mu_c, mu_s and the radius, `[..., 3, 3]`."""
+    determined: np.ndarray
+    """True where the 95 % interval of mu_c, mu_s or the radius is within `tolerance`, bool `[..., 3]`."""
+    slip: np.ndarray
+    """Probability that the part slips `[...]`."""
+    about_to_slip: np.ndarray
+    """Probability that it sticks, but slips at a tenth more load `[...]`; the rest is that it sticks safely."""
+    margin: np.ndarray
+    """`1 - |W|/|W_s|`: distance of the wrench from the limit surface at mu_s, of the way there `[...]`."""
+    gauge: np.ndarray
+    """Friction coefficient that holds the present wrench, `holding_load(W, mu=1)/f_N` `[...]` [-]."""
+    flags: np.ndarray
+    """Sum of what was odd about the sample, int `[...]`: see `planarfriction.online.observer.FLAGS`."""
+
+    def interval(self, probability: float = 0.95) -> np.ndarray:
+        """Return the bounds `[..., 3, 2]` of mu_c, mu_s and the radius.
+
+        Raises InvalidValueError unless the probability is between 0 and 1.
+        """
+        from scipy.special import ndtri
+
+        if not 0.0 < validation.number("probability", probability) < 1.0:
+            raise InvalidValueError("probability", "be between 0 and 1", probability)
+        mean = np.stack([self.mu_c, self.mu_s, self.radius], axis=-1)
+        sd = np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
+        reach = np.exp(float(ndtri(0.5 + 0.5 * probability)) * sd)
+        return np.stack([mean / reach, mean * reach], axis=-1)
+
+
+class FrictionObserver:
+    """Kalman filter for friction and slip from wrench, load and slip velocity, one call per sample.
+
+    While a part slips, its wrench is that of steady sliding, `W = (g(|V|) + sigma_2 |V|) f_N h(V)`, of the limit
+    surface and the law, with unknown `mu_c`, `mu_s/mu_c` and a scale of the radius; a square-root filter updates their
+    logs, the twist and the bias of the sensor with the Jacobians of the surface. It learns from the mean wrench between
+    two slip velocities once the next one shows that the part slipped throughout. While the part sticks, the wrench only
+    bounds mu_s from below. Peaks of the wrench at the beginning of a slip are mu_s. The probability of slip follows a
+    hidden Markov chain. Without slip velocities nothing but that bound is learnt.
+
+    `information()` is that of the motion so far. `state` `[..., 117]` is all that changes: a copy of it is a
+    checkpoint. With `batch`, the observer watches so many parts at once; measurements have that leading shape.
+
+    Raises InvalidValueError for what is neither a model nor a limit surface, asymmetric friction, and values out of
+    range.
+    """
+
+    def __init__(
+        self,
+        model: FrictionModel,
+        *,
+        batch: Any = (),
+        surface: LimitSurface | None = None,
+        normal_force: float = 5.0,
+        mu_spread: float = 0.32,
+        ratio_spread: float = 0.1,
+        radius_spread: float = 0.2,
+        bias: Any = (0.03, 0.03, 3e-4),
+        sensors: Sensors | None = None,
+        model_error: float = 0.03,
+        drift: float = 0.0,
+        tolerance: float = 0.05,
+        saturation: float = 1e3,
+        least_load: float = 0.1,
+    ) -> None:
+        validation.instance("model", model, FrictionModel, "a friction model, such as ReducedModel")
+        load = validation.positive("normal_force", normal_force)
+        if surface is None:
+            from planarfriction.limit_surface import LimitSurfaceTable
+
+            surface = LimitSurfaceTable(model.patch, normal_force=load if model.depends_on_load else None)
+        self.model = model
+        self.surface = validation.instance("surface", surface, LimitSurface, "a limit surface")
+        if surface.patch.asymmetric:
+            raise InvalidValueError("model", "have symmetric friction", "a patch with an asymmetry")
+        sensors = Sensors() if sensors is None else validation.instance("sensors", sensors, Sensors, "Sensors")
+        self.tolerance = validation.positive("tolerance", tolerance)
+        self._filter = _settings(
+            model,
+            surface,
+            load,
+            sensors,
+            validation.positive("model_error", model_error),
+            validation.non_negative("drift", drift),
+            validation.positive("saturation", saturation),
+            validation.positive("least_load", least_load),
+        )
+        spreads = {"mu_spread": mu_spread, "ratio_spread": ratio_spread, "radius_spread": radius_spread}
+        self._prior = np.array([validation.positive(name, value) for name, value in spreads.items()])
+        unsure = np.abs(self._filter.conjugate) @ validation.non_negative_array("bias", bias, (3,))
+        root = np.diag([kernels.FRESH] * 3 + self._prior.tolist() + np.maximum(unsure, 1e-9).tolist())
+        n, numbers = kernels.N, model.law.numbers
+        self.state = state = np.zeros(validation.batched(batch, (kernels.STATE,)))
+        state[..., kernels.MU] = math.log(numbers.mu_c)
+        state[..., kernels.RATIO] = math.log(numbers.mu_s / numbers.mu_c)
+        state[..., kernels.ROOT : kernels.ROOT + n * n] = root.ravel()
+        state[..., kernels.SLIP], state[..., kernels.TIME] = 1e-3, -math.inf
+        state[..., [kernels.BOUND, kernels.PEAK, kernels.GAUGE]] = -10.0
+
+    def update(self, measurement: Measurement) -> Estimate:
+        """Take a sample of every part, with NaN or None for what is missing; return what is known now.
+
+        Raises InvalidValueError for a measurement whose arrays do not have the shape of the batch.
+        """
+        validation.instance("measurement", measurement, Measurement, "a Measurement")
+        batch, state = self.state.shape[:-1], self.state.reshape(-1, kernels.STATE)
+        time, wrench, load, velocity = measurement
+        try:
+            samples = (
+                _rows(time, batch),
+                _rows(wrench, (*batch, 3)).reshape(-1, 3),
+                _rows(load, batch),
+                _rows(math.nan if velocity is None else velocity, (*batch, 3)).reshape(-1, 3),
+            )
+        except (TypeError, ValueError):
+            raise InvalidValueError("measurement", f"hold numbers of the batch {list(batch)}", measurement) from None
+        flags, out = np.zeros(len(state), np.int64), np.empty((len(state), kernels.ESTIMATE))
+        kernels.update(self._filter, state, *samples, flags, out)
+        out = out.reshape(*batch, kernels.ESTIMATE)
+        covariance = out[..., 6:15].reshape(*batch, 3, 3)
+        within = out[..., 6:15:4] <= (math.log1p(self.tolerance) / _TWO_SIDED) ** 2
+        numbers = (out[..., i] for i in (3, 4, 5))
+        odds = (out[..., i] for i in (15, 16, 17))
+        return Estimate(out[..., :3], *numbers, covariance, within, *odds, np.exp(out[..., 18]), flags.reshape(batch))
+
+    def information(self) -> np.ndarray:
+        """Return the information of the samples so far on the logs of mu_c, mu_s/mu_c and the radius, `[..., 3, 3]`.
+
+        The inverse covariance less that of the prior; a direction without information is not determined by the motion.
+        """
+        n = kernels.N
+        root = self.state[..., kernels.ROOT : kernels.ROOT + n * n].reshape(*self.state.shape[:-1], n, n)[..., 3:6, :]
+        return np.linalg.inv(root @ np.swapaxes(root, -1, -2)) - np.diag(1.0 / self._prior**2)
+
+
+def _settings(model: FrictionModel, surface: LimitSurface, load: float, sensors: Sensors, *rest: float) -> Any:
+    """Return what the filter reads and never changes; `rest` are its last fields."""
+    kind, size, data = surface.numbers
+    frame, numbers = surface._frame(), model.law.numbers
+    back = np.linalg.inv(frame)
+    noise = np.abs(back.T) @ (sensors.force_noise, sensors.force_noise, sensors.torque_noise)
+    return kernels.Filter(
+        kind,
+        size,
+        data,
+        _planes(surface),
+        frame,
+        back,
+        -back.T.copy(),
+        surface.contact_radius,
+        load,
+        _growth(model.patch, load),
+        numbers.v_s,
+        numbers.gamma,
+        numbers.sigma_2,
+        np.maximum(noise, _LEAST_NOISE) ** 2,
+        sensors.quantum,
+        sensors.quantum / max(sensors.slip_rate, 1.0),
+        *rest,
+    )
+
+
+def _planes(surface: LimitSurface) -> np.ndarray:
+    """Return directions of half a sphere over their dissipation `[M, 3]`, scaled: planes around the surface."""
+    angle = 0.5 * np.pi / _SEGMENTS * np.arange(4 * _SEGMENTS)
+    polar, azimuth = np.meshgrid(angle[: _SEGMENTS + 1], angle, indexing="ij")
+    across = np.sin(polar)
+    units = np.stack([across * np.cos(azimuth), across * np.sin(azimuth), np.cos(polar)], axis=-1).reshape(-1, 3)
+    return units / np.einsum("mi,mi->m", surface.direction(units), units)[:, None]
+
+
+def _growth(patch: Any, load: float) -> float:
+    """Return `d log r/d log f_N` of the contact radius at a load [N]."""
+    if not patch.depends_on_load:
+        return 0.0
+    small, large = (float(patch.contact_radius(share * load)) for share in (0.5, 2.0))
+    return math.log(large / small) / math.log(4.0)
+
+
+def _rows(value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """Return numbers of a shape, in one piece."""
+    array = np.asarray(value, float)
+    array = array if array.shape == shape else np.broadcast_to(array, shape)
+    return np.ascontiguousarray(array).reshape(-1)

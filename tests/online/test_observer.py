@@ -1,0 +1,210 @@
+"""The observer: what it learns of a slip, what it does not of a part that sticks, and what bad samples do to it."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import planarfriction as pf
+from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import friction_filter as kernels
+from planarfriction.online import FrictionObserver, Gripper, Measurement, Parts, Sensors
+
+LAW = pf.LuGre(mu_c=0.5, mu_s=0.55, v_s=2e-3, sigma_2=0.1)
+PATCH = pf.ContactPatch.disc(6e-3, 21)
+SURFACE = pf.LimitSurfaceTable(PATCH)
+MODEL = pf.ReducedModel(PATCH, LAW)
+
+
+def observer(**options) -> FrictionObserver:
+    return FrictionObserver(MODEL, surface=SURFACE, **options)
+
+
+def sliding(mu=0.7, scale=1.1, load=4.0, count=1200, turning=True):
+    """Samples of a slip without noise whose direction changes, of a patch `scale` times as large; begins at rest."""
+    time = 1e-3 * np.arange(count)
+    phase = 3.0 * time
+    twist = np.stack([0.03 * np.cos(phase), 0.02 + 0 * time, (4.0 if turning else 0.0) * np.sin(phase)], axis=-1)
+    wrench = mu * load * SURFACE.wrench(twist * (1.0, 1.0, scale)) * (1.0, 1.0, scale)
+    for k in range(count):
+        rests = k < 20
+        velocity = (0.0 if rests else 1.0) * twist[k - 4 if k > 4 else 0] if k % 8 == 0 else None
+        fast = 1.0 + LAW.numbers.sigma_2 / mu * np.linalg.norm(twist[k] * (1.0, 1.0, scale * SURFACE.contact_radius))
+        yield Measurement(time[k], (0.5 if rests else fast) * wrench[k], load, velocity)
+
+
+def taken(own: FrictionObserver, samples):
+    for sample in samples:
+        estimate = own.update(sample)
+    return estimate
+
+
+def test_a_slip_in_many_directions_determines_friction_and_radius():
+    found = taken(observer(), sliding())
+    assert found.mu_c == pytest.approx(0.7, rel=0.01)
+    assert found.radius == pytest.approx(1.1 * SURFACE.contact_radius, rel=0.02)
+    assert found.determined.tolist() == [True, False, True]  # mu_s shows at the beginning of a slip alone
+    assert found.slip > 0.95
+    low, high = found.interval()[0]
+    assert low < 0.7 < high < 0.75
+
+
+def test_a_slide_without_a_turn_does_not_determine_the_radius():
+    own = observer()
+    found = taken(own, sliding(turning=False))
+    assert found.determined.tolist() == [True, False, False]
+    assert found.radius == pytest.approx(SURFACE.contact_radius, rel=0.02)  # as assumed
+    information = np.diag(own.information())
+    assert information[0] > 1e3 > 30.0 * information[2]
+
+
+def test_a_part_that_sticks_says_only_what_it_holds():
+    own = observer()
+    for k in range(500):
+        found = own.update(Measurement(1e-3 * k, (0.0, 0.002 * k, 0.0), 2.0, np.zeros(3) if k % 8 == 0 else None))
+    assert found.slip < 0.05
+    assert (found.mu_c, found.radius) == pytest.approx((0.5, SURFACE.contact_radius))
+    assert found.gauge == pytest.approx(0.5, rel=0.02)  # |f|/f_N at the end: filtered
+    assert not found.determined.any()
+    assert np.abs(own.information()).max() < 1e-6
+    stronger = taken(own, [Measurement(0.5 + 1e-3 * k, (0.0, 1.6, 0.0), 2.0, np.zeros(3)) for k in range(50)])
+    assert stronger.mu_s == pytest.approx(0.8, rel=0.02)  # more than was assumed
+    assert stronger.slip < 0.2
+
+
+def test_gauge_is_what_the_holding_load_says():
+    for wrench in ((0.3, 0.4, 0.0), (0.0, 0.0, 2e-3), (0.2, 0.5, 1.5e-3)):
+        found = taken(observer(), [Measurement(1e-3 * k, wrench, 5.0) for k in range(60)])
+        expected = pf.planning.holding_load(wrench, PATCH, mu=1.0) / 5.0
+        assert found.gauge == pytest.approx(expected, rel=3e-3)  # planes around the surface
+
+
+def bad_samples():
+    nan = np.nan
+    return {
+        "no wrench": (Measurement(0.1, (nan, 0.0, 0.0), 4.0), 1),
+        "no load": (Measurement(0.1, (0.0, 1.0, 0.0), nan), 1),
+        "infinite": (Measurement(0.1, (0.0, np.inf, 0.0), 4.0), 1),
+        "time back": (Measurement(-5.0, (0.0, 1.0, 0.0), 4.0, (0.02, 0.0, 0.0)), 2),
+        "no time": (Measurement(nan, (0.0, 1.0, 0.0), 4.0), 2),
+        "saturated": (Measurement(0.1, (0.0, 60.0, 0.0), 4.0), 4),
+    }
+
+
+@pytest.mark.parametrize("what", bad_samples())
+def test_bad_samples_are_said_and_lose_nothing(what):
+    sample, flag = bad_samples()[what]
+    samples = list(sliding(count=600))
+    clean, own = taken(observer(saturation=50.0), samples), observer(saturation=50.0)
+    for k, each in enumerate(samples):
+        found = own.update(each)
+        if k % 50 == 25:
+            time = sample.time if flag == 2 else each.time + 5e-4
+            odd = own.update(sample._replace(time=time))
+            assert odd.flags & flag
+            assert np.isfinite(own.state[: kernels.TIME]).all()
+    assert found.flags == 0
+    assert found.mu_c == pytest.approx(float(clean.mu_c), rel=1e-3)
+    assert found.radius == pytest.approx(float(clean.radius), rel=1e-2)
+
+
+NUMBERS = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-10.0, 10.0)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            NUMBERS, st.tuples(NUMBERS, NUMBERS, NUMBERS), NUMBERS, st.none() | st.tuples(NUMBERS, NUMBERS, NUMBERS)
+        ),
+        max_size=20,
+    )
+)
+def test_whatever_comes_the_estimate_stays_finite(samples):
+    own = observer()
+    for k, sample in enumerate(samples):
+        found = own.update(Measurement(*sample))
+        found = own.update(Measurement(1e-3 * k, (0.0, 1.0, 0.0), 4.0, (0.0, 0.03, 0.0)))
+        assert all(np.isfinite(value).all() for value in found)
+        assert (found.interval() > 0.0).all()
+
+
+def test_a_copy_of_the_state_is_a_checkpoint():
+    samples = list(sliding(count=400))
+    own = observer()
+    taken(own, samples[:200])
+    kept, other, pickled = own.state.copy(), copy.deepcopy(own), pickle.loads(pickle.dumps(own))
+    end = taken(own, samples[200:])
+    assert taken(other, samples[200:]) == end
+    assert taken(pickled, samples[200:]) == end
+    own.state[:] = kept
+    assert taken(own, samples[200:]) == end
+
+
+def test_a_batch_is_many_observers():
+    several = [list(sliding(mu=mu, count=300)) for mu in (0.4, 0.6, 0.8)]
+    own = observer(batch=3)
+    for samples in zip(*several, strict=True):
+        velocity = None if samples[0].slip_velocity is None else np.array([s.slip_velocity for s in samples])
+        together = own.update(Measurement(samples[0].time, np.array([s.wrench for s in samples]), 4.0, velocity))
+    alone = [taken(observer(), samples) for samples in several]
+    assert together.mu_c == pytest.approx([float(each.mu_c) for each in alone], rel=1e-12)
+    assert together.slip.shape == (3,)
+
+
+def test_measurements_and_spreads_are_those_of_a_kalman_filter():
+    rng = np.random.default_rng(0)
+    n = kernels.N
+    state, column = np.zeros(kernels.STATE), np.zeros(n)
+    root = np.tril(rng.normal(size=(n, n)))
+    state[kernels.ROOT : kernels.ROOT + n * n] = root.ravel()
+    state[:n] = mean = rng.normal(size=n)
+    covariance, h = root @ root.T, rng.normal(size=n)
+    kernels._measure.py_func(state, h, 0.7, 0.04, column)
+    gain = covariance @ h / (h @ covariance @ h + 0.04)
+    covariance = covariance - np.outer(gain, h @ covariance)
+    kernels._spread.py_func(state, 3, 0.25, column)
+    covariance[3, 3] += 0.25
+    kernels._reset.py_func(state, 1, 5.0, 0.5, column)
+    covariance[1], covariance[:, 1] = 0.0, 0.0
+    covariance[1, 1] = 0.25
+    found = state[kernels.ROOT : kernels.ROOT + n * n].reshape(n, n)
+    assert found @ found.T == pytest.approx(covariance, abs=1e-12)
+    assert state[:n] == pytest.approx(np.where(np.arange(n) == 1, 5.0, mean + 0.7 * gain))
+
+
+def test_a_slip_in_the_gripper_is_seen_and_its_friction_found():
+    count = 40
+    mu = np.linspace(0.35, 0.8, count)
+    parts = Parts([0.2] * count, [3e-4] * count, [(0.004, 0.0)] * count, mu, radius=9e-3, growth=0.0, delay=0.01)
+    patch = pf.ContactPatch.disc(9e-3, 21, pressure=pf.SoftFinger(c=9e-3, k=4.0))
+    own, gripper = FrictionObserver(pf.ReducedModel(patch, LAW), batch=count), Gripper(parts, 5.0, seed=1)
+    seen, began = np.full(count, np.nan), np.full(count, np.nan)
+    for k in range(700):
+        found = own.update(gripper.step(5.0 - 6e-3 * k))
+        moved = np.hypot(*gripper.slip[:, :2].T) + 4e-3 * np.abs(gripper.slip[:, 2]) > 1e-4
+        began = np.where(np.isnan(began) & moved, gripper.time, began)
+        seen = np.where(np.isnan(seen) & (found.slip > 0.5), gripper.time, seen)
+    late = seen - began - 0.01
+    assert np.nanmax(late) < 0.02
+    assert np.nanmin(late) > -0.05  # no alarm long before
+    assert np.isfinite(late).all()
+    assert np.median(np.abs(found.mu_c / mu - 1.0)) < 0.02
+
+
+def test_bad_settings_are_refused():
+    with pytest.raises(InvalidValueError, match="model must be a friction model"):
+        FrictionObserver(PATCH)
+    with pytest.raises(InvalidValueError, match="tolerance must be"):
+        observer(tolerance=0.0)
+    with pytest.raises(InvalidValueError, match=r"measurement must hold numbers of the batch \[2\]"):
+        observer(batch=2).update(Measurement(0.0, np.zeros((3, 3)), 1.0))
+    with pytest.raises(InvalidValueError, match="sensors must be"):
+        observer(sensors=Sensors)
+    with pytest.raises(InvalidValueError, match="probability must be"):
+        taken(observer(), sliding(count=2)).interval(1.0)
