@@ -7,9 +7,10 @@ from collections.abc import Iterator, Sequence
 from itertools import compress
 from typing import Any
 
-from planarfriction.export.trace import Block, Branch, Operation
+from planarfriction.export.trace import Block, Branch, Number, Operation, traced
+from planarfriction.export.twins import twin
 
-TYPES = {"real": "real", "index": "int", "bool": "int"}
+TYPES = {"real": "real", "index": "int", "wide": "long long", "bool": "int"}
 """C types by the kind of a number; `real` is a typedef."""
 
 
@@ -20,8 +21,10 @@ LEAST = 1.2e-38
 class Writer:
     """Differences between precisions: constants and the names of mathematical functions."""
 
-    def __init__(self, precision: str = "double") -> None:
+    def __init__(self, precision: str = "double", own: bool = False) -> None:
         self.suffix = "f" if precision == "float" else ""
+        self.own = own
+        """True to call the library's own `exp_of` and `sin_of`, which compilers put into vector code."""
 
     def constant(self, value: Any) -> str:
         """Return the text of a constant."""
@@ -47,6 +50,8 @@ class Writer:
                 for each, text in zip(operation.arguments, arguments, strict=True)
             ]
         text = operation.text.format(*arguments)
+        if "@" in text:
+            text = text.replace("@", "" if self.own else "$").replace("(", "_of(" if self.own else "(", 1)
         head, sign, rest = text.partition("$")
         if not sign:
             return text
@@ -57,14 +62,18 @@ class Writer:
 
     def lines(self, block: Block, outputs: Sequence[str], indent: str = "    ") -> Iterator[str]:
         """Yield the lines that compute a block and assign its results to `outputs`."""
-        used = _used(block)
+        used = used_by(block)
         for each in block.operations:
             if isinstance(each, Branch):
                 yield from self._branch(each, used, indent)
             elif each.name in used:
-                yield f"{indent}const {TYPES[each.kind]} {each.name} = {self.expression(each)};"
+                yield self.line(each, indent)
         for output, result in zip(outputs, block.results, strict=True):
             yield f"{indent}{output} = {self.atom(result)};"
+
+    def line(self, operation: Operation, indent: str = "    ") -> str:
+        """Return the line of an operation."""
+        return f"{indent}const {TYPES[operation.kind]} {operation.name} = {self.expression(operation)};"
 
     def _branch(self, branch: Branch, used: set[str], indent: str) -> Iterator[str]:
         wanted = [name in used for name, _ in branch.outcomes]
@@ -81,19 +90,26 @@ class Writer:
         yield f"{indent}}}"
 
 
+def of_compiled(function: Any) -> list[str]:
+    """Return the lines of the body of a function of `compiled_math`, in double precision."""
+    block = traced(lambda trace: twin(function)(Number(trace, "x")))
+    *lines, last = Writer().lines(block, ["return"])
+    return [each.replace(" floor(", " floor_of(") for each in lines] + [last.replace("return =", "return")]
+
+
 def _of(block: Block, wanted: list[bool]) -> Block:
     """Return a block with the wanted of its results."""
     return Block(block.operations, tuple(compress(block.results, wanted)))
 
 
-def _used(block: Block) -> set[str]:
+def used_by(block: Block) -> set[str]:
     """Return the names that the results of a block depend on."""
     used = {each for each in block.results if isinstance(each, str)}
     for each in reversed(block.operations):
         if isinstance(each, Branch):
             wanted = [name in used for name, _ in each.outcomes]
             if any(wanted):
-                used |= {each.condition} | _used(_of(each.yes, wanted)) | _used(_of(each.no, wanted))
+                used |= {each.condition} | used_by(_of(each.yes, wanted)) | used_by(_of(each.no, wanted))
         elif each.name in used:
             used.update(name for name in each.arguments if isinstance(name, str))
     return used

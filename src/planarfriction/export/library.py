@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation, writing
+from planarfriction.compiler import compiled_math
 from planarfriction.errors import InvalidValueError
-from planarfriction.export.c_source import Writer
+from planarfriction.export.c_source import Writer, of_compiled
+from planarfriction.export.passes import passes_of
 from planarfriction.export.pieces import Pieces, pieces_of
 from planarfriction.export.samples import samples_of
 from planarfriction.export.slip import Slip, slip_of
@@ -54,9 +56,9 @@ FILES = {"h": ".h", "c": ".c", "test.c": "_test.c", "cmake": ".cmake"}
 def export_c(model: Any, folder: Any, *, name: str = "friction", precision: str = "double") -> tuple[Path, ...]:
     """Write a model as C source into a folder; return the files `<name>.h`, `.c`, `_test.c` and `.cmake`.
 
-    The source is C99 and C++17, calls nothing but `math.h`, allocates nothing and keeps no state of its own. Its step
-    is the model's own (see `FrictionModel.step`), traced from the same formulas. The test is a program that compares
-    the library with numbers of the model; the CMake file has a target for each.
+    The source is C99 and C++17, calls nothing but `math.h` and `memcpy`, allocates nothing and keeps no state of its
+    own. Its step is the model's own (see `FrictionModel.step`), traced from the same formulas. The test is a program
+    that compares the library with numbers of the model; the CMake file has a target for each.
 
     Raises InvalidValueError for a name that is no C identifier, an unknown precision, and models without source (see
     `pieces_of`); FileError if the folder cannot be written.
@@ -85,6 +87,11 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str) -> list[str]:
     functions = _functions(writer, pieces, first)
     tables = _tables(writer, pieces.tables, functions) | ({} if slip is None else _tables(writer, slip.tables))
     step = functions["step"].splitlines()
+    vector = Writer(precision, own=precision == "double")
+    places = [f"next[{first} + {i * pieces.stride}]" for i in range(pieces.states)]
+    passes = passes_of(vector, pieces.step, pieces.count, places)
+    own = {each: "\n".join(of_compiled(getattr(compiled_math, each))) for each in ("exp", "sin")}
+    own = {each: lines for each, lines in own.items() if passes and f"{each}_of(" in "".join(passes.each)}
     values = functions | {
         "name": name,
         "version": planarfriction.__version__,
@@ -104,6 +111,8 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str) -> list[str]:
         "zero": writer.constant(0.0),
         "one": writer.constant(1.0),
         "slip": None if slip is None else _search(writer, slip),
+        "passes": passes,
+        "own": own,
         "samples": samples_of(model, slip, writer),
         "operations": pieces.count * sum("=" in line for line in step),
         "functions": pieces.count * sum(any(f"{each}{writer.suffix}(" in line for each in _SLOW) for line in step),

@@ -47,5 +47,8 @@ def samples_of(model: Any, slip: Slip | None, writer: Writer, count: int = 32) -
     if slip is not None:
         needed = np.einsum("ni,ni->n", slip.surface.twist(-loads), loads) / MU
         loads = np.column_stack([loads, needed])
-    texts = [[[writer.constant(float(x)) for x in row] for row in table] for table in (rows, wrenches, loads)]
-    return Samples(*texts, *map(writer.constant, (MU, float(lever), TOLERANCES[writer.suffix])))
+    steps, after, held = (
+        [[writer.constant(float(x)) for x in row] for row in table] for table in (rows, wrenches, loads)
+    )
+    mu, arm, tolerance = map(writer.constant, (MU, float(lever), TOLERANCES[writer.suffix]))
+    return Samples(steps, after, held, mu, arm, tolerance)

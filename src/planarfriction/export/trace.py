@@ -26,9 +26,10 @@ class Operation(NamedTuple):
     name: str
     """Name of its result."""
     kind: str
-    """"real", "index" or "bool"."""
+    """"real", "index", "wide" (64 bits) or "bool"."""
     text: str
-    """Its source with `{0}`, `{1}` for the arguments, and `$` before the name of a mathematical function."""
+    """Its source with `{0}`, `{1}` for the arguments, and `$` before the name of a mathematical function, `@` before
+    that of a function of `compiled_math`, whose domain may be smaller."""
     arguments: tuple[Any, ...]
     """Names, or constants of Python."""
 
@@ -120,6 +121,9 @@ class Number:
 
     __rand__, __ror__, __hash__ = __and__, __or__, None  # type: ignore[assignment]
 
+    def __lshift__(self, other: Any) -> Any:
+        return self._noted("{0} << {1}", self, other)
+
     def _noted(self, text: str, *arguments: Any) -> Number:
         return self.trace.note(text, kind_of(arguments), *arguments)
 
@@ -142,6 +146,8 @@ def _is(value: Any, constant: float) -> bool:
 
 def kind_of(arguments: tuple) -> str:
     """Return the kind of a result: an index if all arguments are."""
+    if any(isinstance(each, Number) and each.kind == "wide" for each in arguments):
+        return "wide"
     whole = all(each.kind == "index" if isinstance(each, Number) else isinstance(each, int) for each in arguments)
     return "index" if whole else "real"
 
@@ -295,7 +301,7 @@ _pow = _function("$pow({0}, {1})", math.pow)
 
 
 class Mathematics:
-    """Functions for symbols instead of `math`, of `compiled_math` and of what kernels take from NumPy."""
+    """Functions for symbols instead of those of `math` and what kernels take from NumPy."""
 
     pi, inf = math.pi, math.inf
     where, power = staticmethod(_where), staticmethod(_power)
@@ -312,3 +318,12 @@ class Mathematics:
     is_finite = staticmethod(_function("isfinite({0})", math.isfinite, "bool"))
     integer = staticmethod(_function("(int)({0})", int, "index"))
     real = float64 = staticmethod(_function("{0}", float))
+
+
+class CompiledMathematics(Mathematics):
+    """Functions for symbols instead of those of `compiled_math`."""
+
+    exp = staticmethod(_function("@exp({0})", math.exp))
+    sin = staticmethod(_function("@sin({0})", math.sin))
+    wide = staticmethod(_function("(long long)(int)({0})", int, "wide"))
+    of_bits = staticmethod(_function("of_bits({0})", float))

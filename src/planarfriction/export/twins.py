@@ -9,14 +9,14 @@ from __future__ import annotations
 import dis
 import functools
 import math
-import types
 from collections.abc import Callable
+from types import CellType, CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
 
 from planarfriction.compiler import compiled_math, memory
-from planarfriction.export.trace import Mathematics, Number, Table, flat
+from planarfriction.export.trace import CompiledMathematics, Mathematics, Number, Table, flat
 from planarfriction.kernels import hermite, published_contact, reduced_contact, vectors
 
 
@@ -101,7 +101,11 @@ def _patch_of_levels(data: Any, at: Any, node: int, row: int, t: tuple, t_slopes
 _TWINS: dict[int, Any] = {
     id(own): twin
     for own, twin in (
-        (compiled_math, Mathematics),
+        (compiled_math, CompiledMathematics),
+        (compiled_math.minimum, Mathematics.minimum),
+        (compiled_math.maximum, Mathematics.maximum),
+        (compiled_math._bits_to_float, CompiledMathematics.of_bits),
+        (compiled_math.types.int64, CompiledMathematics.wide),
         (math, Mathematics),
         (np, Mathematics),
         (vectors.dot, _dot),
@@ -126,7 +130,7 @@ _BUILT_IN = {"int": Mathematics.integer, "float": Mathematics.real}
 class _Module:
     """A module whose functions are twins."""
 
-    def __init__(self, own: types.ModuleType) -> None:
+    def __init__(self, own: ModuleType) -> None:
         self._own = own
 
     def __getattr__(self, name: str) -> Any:
@@ -137,16 +141,16 @@ def twin(own: Any) -> Any:
     """Return the twin of a function, a module or a record of functions; anything else is its own twin."""
     if id(own) in _TWINS:
         return _TWINS[id(own)]
-    if isinstance(own, types.ModuleType):
+    if isinstance(own, ModuleType):
         return _Module(own)
     if isinstance(own, tuple):
         return _like(own, [twin(each) for each in own])
     function = getattr(own, "py_func", own)
-    if not isinstance(function, types.FunctionType):
+    if not isinstance(function, FunctionType):
         return own
     space: dict[str, Any] = {"__builtins__": function.__globals__.get("__builtins__"), **_BUILT_IN}
-    cells = [types.CellType() for _ in function.__closure__ or ()]
-    made = types.FunctionType(function.__code__, space, function.__name__, function.__defaults__, tuple(cells))
+    cells = [CellType() for _ in function.__closure__ or ()]
+    made = FunctionType(function.__code__, space, function.__name__, function.__defaults__, tuple(cells))
     _TWINS[id(own)] = joined(made) if _has_jumps(function.__code__) else made
     _KEPT.append(own)
     for name in _global_names(function.__code__):
@@ -167,7 +171,7 @@ def joined(function: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
-def _has_jumps(code: types.CodeType) -> bool:
+def _has_jumps(code: CodeType) -> bool:
     return any(each.opcode in dis.hasjrel or each.opcode in dis.hasjabs for each in dis.get_instructions(code))
 
 
@@ -175,7 +179,7 @@ _KEPT: list[Any] = []
 """Functions that have twins: their `id` stays theirs."""
 
 
-def _global_names(code: types.CodeType) -> set[str]:
+def _global_names(code: CodeType) -> set[str]:
     """Return the names that code may look up, with those of the code inside it."""
-    inner = [each for each in code.co_consts if isinstance(each, types.CodeType)]
+    inner = [each for each in code.co_consts if isinstance(each, CodeType)]
     return set(code.co_names).union(*map(_global_names, inner))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 import shutil
 import subprocess
 import tempfile
@@ -44,6 +45,28 @@ int each(int n, double *state, const double *twists, double *wrench, double *sec
 """
 """Steps in a row, and steps timed one by one, with the clock's own time."""
 
+COUNTED = """#include "friction.h"
+#include <stdio.h>
+#include <valgrind/callgrind.h>
+
+int main(void)
+{
+    static double state[FRICTION_STATES], twist[3], wrench[3];
+    while (fread(twist, sizeof twist, 1, stdin) == 1) {
+        CALLGRIND_ZERO_STATS;
+        if (friction_step_default(state, twist, 1.0, 1e-4, wrench) != FRICTION_OK) {
+            return 1;
+        }
+        CALLGRIND_DUMP_STATS;
+    }
+    return 0;
+}
+"""
+"""Steps in a row, each counted apart."""
+
+STEPS = 150
+"""Steps whose instructions are counted."""
+
 SAMPLES = 1_000_000
 """Steps of which the 99.9th percentile is taken."""
 
@@ -54,11 +77,12 @@ MODELS: dict[str, Any] = {
 }
 """Models by the end of the benchmark's name."""
 
+NO_VALGRIND = Measurement("", None, "", "left out: needs gcc and valgrind", None, None)
 NO_COMPILER = Measurement("", None, "", "left out: needs gcc", None, None)
 
 
-VECTOR = "-ffast-math", "-fno-finite-math-only", "-D__FAST_MATH__"
-"""Options with which cells are stepped in vectors: sums are reordered, NaN and infinity still count."""
+VECTOR = "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=fast"
+"""Options with which cells are stepped in vectors; NaN and infinity still count."""
 
 
 def library(model: Any, folder: Path, *options: str) -> ctypes.CDLL:
@@ -80,6 +104,23 @@ def step(full: bool, kind: str, vector: bool = False) -> Measurement:
 def percentile(full: bool, kind: str) -> Measurement:
     """Measure the 99.9th percentile of the time of single steps in C against their median."""
     return _measured(kind, _percentile)
+
+
+def instructions(full: bool, kind: str) -> Measurement:
+    """Count the most instructions of a step in C against the median step, under valgrind."""
+    if shutil.which("gcc") is None or not Path("/usr/include/valgrind/callgrind.h").exists():
+        return NO_VALGRIND
+    with tempfile.TemporaryDirectory() as folder:
+        export_c(MODELS[kind](), folder)
+        (Path(folder) / "counted.c").write_text(COUNTED)
+        made = "gcc", "-std=c99", "-O2", "friction.c", "counted.c", "-o", "counted", "-lm"
+        subprocess.run(made, cwd=folder, check=True)
+        run = "valgrind", "--tool=callgrind", "--callgrind-out-file=counts", "./counted"
+        subprocess.run(run, cwd=folder, check=True, input=mixed_twists(STEPS).tobytes(), capture_output=True)
+        dumps = [each.read_text() for each in Path(folder).glob("counts.*")]
+    totals = [re.search(r"^totals: (\d+)", each, re.MULTILINE) for each in dumps]
+    counts = [int(each[1]) for each in totals if each]
+    return line(float(max(counts)), "instructions", "the median of the same steps", float(np.median(counts)))
 
 
 def _measured(kind: str, measure: Any, *options: str) -> Measurement:

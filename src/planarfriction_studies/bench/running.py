@@ -43,6 +43,7 @@ BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
     "warp.step.published": partial(steps.warp_step, kind=ReducedModelPublished),
     **{f"export.step.{kind}": partial(exported.step, kind=kind) for kind in exported.MODELS},
     "export.step.reduced.vector": partial(exported.step, kind="reduced", vector=True),
+    **{f"export.step.{kind}.instructions": partial(exported.instructions, kind=kind) for kind in exported.MODELS},
     **{f"export.step.{kind}.999": partial(exported.percentile, kind=kind) for kind in exported.MODELS},
     "coupled.four_feet.call": steps.coupled,
     "coupled.four_feet.batch": partial(steps.coupled, environments=1000),

@@ -1,0 +1,90 @@
+"""Steps of cells in passes over a few dozen of them, which compilers turn into vector code.
+
+The step of a cell is a chain of hundreds of operations of which each waits for the one before. In passes over many
+cells, of which each does a share of the operations, the processor has several cells in hand at a time.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from planarfriction.export.c_source import TYPES, Writer, used_by
+from planarfriction.export.trace import Block, Branch, Operation
+
+CELLS = 40
+"""Cells of a block: those of the default model; 3 kB of stack."""
+
+PASSES = 4
+"""Passes over a block: from three on they take the same time, half of that of one."""
+
+
+class Passes(NamedTuple):
+    """Source of the step of a block of cells."""
+
+    cells: int
+    blocks: int
+    rows: int
+    """Numbers of each cell that one pass leaves to the next."""
+    shared: str
+    """Lines of what all cells have in common."""
+    each: list[str]
+    """Lines of each pass, of cell `k` in row `i` of the block; the last leaves the wrench in `row[0]` to `row[2]`."""
+
+
+def passes_of(writer: Writer, block: Block, count: int, places: Sequence[str]) -> Passes | None:
+    """Split the step of a cell, whose new state goes to `places`; None for one that has branches."""
+    if any(isinstance(each, Branch) for each in block.operations):
+        return None
+    used = used_by(block)
+    operations = [each for each in block.operations if each.name in used]
+    common: set[str] = set()
+    for each in operations:
+        if all(name in common or not re.match(r"t\d|.*\bk\]", name) for name in _names(each)):
+            common.add(each.name)
+    own = [each for each in operations if each.name not in common]
+    ends = [0, *_cuts(own, block), len(own)]
+    kept = [_handed(own, block, end) for end in ends]
+    shared = [writer.line(each) for each in operations if each.name in common]
+    rows, texts, places_of = 3, [], {}
+    for first, last, after in zip(ends, ends[1:], kept[1:], strict=False):
+        before, places_of = places_of, {name: row for name, row in places_of.items() if name in after}
+        for name in after:
+            places_of.setdefault(name, next(row for row in range(99) if row not in places_of.values()))
+        rows = max(rows, 1 + max(places_of.values(), default=0))
+        read = {name for each in own[first:last] for name in _names(each)}
+        read |= set(block.results) if last == len(own) else set()
+        lines = [f"    const real {name} = row[{row}][i];" for name, row in before.items() if name in read]
+        lines += [writer.line(each) for each in own[first:last]]
+        lines += [f"    row[{row}][i] = {name};" for name, row in places_of.items() if name not in before]
+        if last == len(own):
+            results = [writer.atom(each) for each in block.results]
+            lines += [f"    {place} = {result};" for place, result in zip(places, results, strict=False)]
+            lines += [f"    row[{j}][i] = share[k] * {result};" for j, result in enumerate(results[len(places) :])]
+        texts.append("\n".join(f"    {line}" for line in lines))
+    cells = min(count, CELLS)
+    return Passes(cells, -(-count // cells), rows, "\n".join(shared), texts)
+
+
+def _names(operation: Operation) -> Iterator[str]:
+    return (each for each in operation.arguments if isinstance(each, str))
+
+
+def _handed(own: list[Operation], block: Block, end: int) -> list[str]:
+    """Return the names that operations before a place leave to those after it, in order; none behind the last."""
+    later = {name for each in own[end:] for name in _names(each)} | set(block.results)
+    return [each.name for each in own[:end] if each.name in later] if end < len(own) else []
+
+
+def _cuts(own: list[Operation], block: Block) -> list[int]:
+    """Return places where few numbers are handed on, and nothing but real ones, about evenly spread."""
+    kinds = {each.name: each.kind for each in own}
+    spread = len(own) // (3 * PASSES)
+
+    def cost(end: int) -> float:
+        names = _handed(own, block, end)
+        return len(names) if all(TYPES[kinds[name]] == "real" for name in names) else float("inf")
+
+    middles = (share * len(own) // PASSES for share in range(1, PASSES))
+    return [min(range(middle - spread, middle + spread + 1), key=cost) for middle in middles]
