@@ -62,7 +62,7 @@ python_maximum_signature_line_length = 90
 autodoc_default_options = {"members": True}
 napoleon_google_docstring = napoleon_numpy_docstring = False  # `api_pages` applies it where there are sections
 napoleon_use_rtype = False
-OPTIONAL = ("torch", "jax", "warp", "mujoco", "pydrake")
+OPTIONAL = ("torch", "jax", "warp", "mujoco", "mujoco_warp", "pydrake")
 MISSING = [name for name in OPTIONAL if importlib.util.find_spec(name) is None]
 autodoc_mock_imports = MISSING
 
@@ -71,7 +71,7 @@ nitpick_ignore_regex = [
     # Types in signatures, the only references that no one writes: of other libraries, since no inventory of theirs is
     # downloaded for a link, and of ours where they are no one's to make, and so stand in no `__all__`.
     (r"py:class", r".*"),
-    (r"py:.*", r"(np|numpy|xr|xarray|matplotlib|scipy|torch|jax|jaxlib|warp|wp|numba|mujoco|pydrake)\..*"),
+    (r"py:.*", r"(np|numpy|xr|xarray|matplotlib|scipy|torch|jax|jaxlib|warp|wp|numba|mujoco\w*|mjw|pydrake)\..*"),
 ]
 
 # -- the gallery: every script is run, and again when it has changed

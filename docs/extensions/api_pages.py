@@ -21,7 +21,7 @@ from sphinx.pycode import ModuleAnalyzer
 import planarfriction
 from planarfriction.described import HEADING
 
-OPTIONAL = ("torch", "jax", "warp", "adapters.mujoco", "adapters.mjx", "adapters.drake")
+OPTIONAL = ("torch", "jax", "warp", "adapters.mujoco", "adapters.mjx", "adapters.mujoco_warp", "adapters.drake")
 """Public modules that load a package of an extra, and so stand in no list of the package."""
 
 COMPILED = ("compiler", "kernels", "limit_surface.loops")

@@ -22,10 +22,12 @@ ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")] + sorted(
     (ROOT / "docs").glob("*.md")
 )
-OPTIONAL = ("torch", "jax", "warp", "mujoco", "mujoco.mjx", "pydrake", "zarr")
+OPTIONAL = ("torch", "jax", "warp", "mujoco", "mujoco.mjx", "mujoco_warp", "pydrake", "zarr")
 """Packages behind an extra; `planarfriction.torch`, `planarfriction.adapters.mujoco` and so on carry their names."""
 RECIPES = ("pybullet", "genesis", "newton")
 """Hosts that a page has recipes for, and no extra of ours installs."""
+SLOW_PAGES = ("mujoco-warp.md",)
+"""Pages whose hosts compile for a minute."""
 FAMILIES = (families.LAWS, families.MODELS, families.SURFACES, families.SHAPES, families.SCENES)
 MODULES = {module.name for module in pkgutil.iter_modules(planarfriction.__path__)}
 
@@ -94,7 +96,15 @@ def ids(page: Path) -> str:
     return page.name
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if any(b.language == "python" for b in blocks(page))], ids=ids)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=pytest.mark.slow if page.name in SLOW_PAGES else ())
+        for page in PAGES
+        if any(b.language == "python" for b in blocks(page))
+    ],
+    ids=ids,
+)
 def test_the_python_of_a_page_runs_and_prints_what_the_page_says(page, tmp_path, monkeypatch):
     """In order, in one namespace, in an empty folder.
 

@@ -19,7 +19,7 @@ import planarfriction as pf
 from planarfriction.described import HEADING
 
 FRONT_ENDS = {"torch": "torch", "jax": "jax", "adapters.mujoco": "mujoco", "adapters.mjx": "mujoco.mjx"}
-FRONT_ENDS |= {"adapters.drake": "pydrake", "warp": "warp"}
+FRONT_ENDS |= {"adapters.drake": "pydrake", "warp": "warp", "adapters.mujoco_warp": "mujoco_warp"}
 MODULES = [name for name in pf.__all__ if inspect.ismodule(getattr(pf, name))]
 PLAIN = [name for name in MODULES if name not in ("errors", "families", "formulas")]
 OF_PYTHON = {"NotImplementedError", "AttributeError", "TypeError", "StopIteration", "KeyError"}

@@ -56,7 +56,7 @@ HOMES = {
 }
 """Package -> the floors whose modules may import it when they load; no floor may load the rest of HEAVY that way."""
 
-SIMULATORS = {"planarfriction.adapters.mjx": "jax"}
+SIMULATORS = {"planarfriction.adapters.mjx": "jax", "planarfriction.adapters.mujoco_warp": "warp"}
 """Adapters of simulators that calculate with a package which has a floor of its own."""
 
 

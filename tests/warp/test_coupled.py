@@ -147,6 +147,7 @@ def problem(worlds=3):
         normal_force=np.tile([1.0, 2.0], (worlds, 1)),
         wrench=np.zeros((worlds, 2, 3)),
         twist_response=np.tile(1e-3 * np.diag([1.0, 1.0, 1e4] * 2), (worlds, 1, 1)),
+        load_response=np.tile([[0.1, 0.0, 20.0, 0.0, 0.2, -10.0], [-0.1, 0.0, 10.0, 0.0, 0.2, 30.0]], (worlds, 1, 1)),
     )
     return np.zeros((worlds, *PATCHES.state_shape)), host
 
@@ -173,6 +174,22 @@ def test_parameters():
         )
         expected = own.step(state[w], HostStep(*(None if each is None else each[w] for each in host)), 1e-3)
         assert results.wrench.numpy()[w] == pytest.approx(expected.wrench, rel=1e-6)
+
+
+def test_moments():
+    """The pressure of a patch of three states follows moments, in a patch of another size too."""
+    model = pf.ReducedModelPublished(SHAPES[0], LAW, surface=pf.LimitSurfaceEllipsoid(SHAPES[0]))
+    both = problem()[1]
+    host = HostStep(*(each[:, :1] for each in both[:3]), both.twist_response[:, :3, :3], both.load_response[:, :1, :3])
+    host = host._replace(moments=np.array([[[0.003, -0.002]], [[0.0, 0.01]], [[0.0, 0.0]]]))
+    kernel = front.CoupledPatches([model], worlds=3, parameters={"scale": 1.5}, dtype=wp.float64, device="cpu")
+    results, state = kernel.results(), np.zeros((3, 3))
+    kernel.step(array(wp.float64, state), given(wp.float64, host), 1e-3, results)
+    larger = pf.ContactPatch.disc(0.015, cells=15)
+    same = CoupledPatches([pf.ReducedModelPublished(larger, LAW, surface=pf.LimitSurfaceEllipsoid(larger))])
+    expected = same.step(state, host, 1e-3)
+    assert results.wrench.numpy() == pytest.approx(expected.wrench, rel=1e-6)
+    assert len({round(each, 6) for each in expected.wrench[:, 0, 0]}) == 3
 
 
 def test_no_load(kernel):
@@ -207,7 +224,7 @@ def test_bad_arrays(kernel):
     for words, change in {
         "normal_force must have shape": {"normal_force": single},
         "load_response must have shape": {"load_response": host.twist_response},
-        "moments must be None": {"moments": single},
+        "moments must be None.* model 1": {"moments": array(wp.float64, np.zeros((3, 2, 2)))},
     }.items():
         with pytest.raises(pf.FrictionError, match=words):
             kernel.step(state, host._replace(**change), 1e-3, results)

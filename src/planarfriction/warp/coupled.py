@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -65,7 +65,11 @@ class CoupledPatches:
         which = [next(i for i, each in enumerate(known) if each is model) for model in self.models]
         pieces = [pieces_of(model) for model in known]
         radii = [float(np.sqrt((model.patch.positions**2).sum(1).mean())) or 1.0 for model in self.models]
-        source = coupled_source_of(pieces, which, radii, precision)
+        points = [model.compiled.points()[0] for model in self.models]
+        self.follows = tuple(len(each) == 1 for each in points)
+        """True for patches whose pressure can follow moments."""
+        centres = [each[0] if len(each) == 1 else [] for each in points]
+        source = coupled_source_of(pieces, which, radii, centres, precision)
         self.state_shape = (sum(math.prod(model.state_shape) for model in self.models),)
         """Shape of the state of the patches of a world."""
         self.names = tuple((*pieces[kind].parameters, "scale") for kind in which)
@@ -109,11 +113,39 @@ class CoupledPatches:
         that goes into its twists, if that is more than the `tolerance` [m/s]. A world with numbers that are not finite
         or out of range keeps its state, has no wrenches and -1 `iterations` (see `check`).
 
-        Raises InvalidValueError for arrays of another shape, precision or device, moments, and a step or a tolerance
-        out of range.
+        Pressures follow moments of patches with three states.
+
+        Raises InvalidValueError for arrays of another shape, precision or device, moments of other patches, and a step
+        or a tolerance out of range.
         """
         if host.moments is not None:
-            raise InvalidValueError("moments", "be None: pressures do not follow them in Warp", "an array")
+            self.check_follows(range(len(self.models)))
+        self.launch(state, host, dt, results, tolerance, iterations)
+
+    def check_follows(self, patches: Iterable[int]) -> None:
+        """Check that the pressure of `patches` can follow moments here.
+
+        Raises InvalidValueError for patches of models with more than three states.
+        """
+        for p in patches:
+            if not self.follows[p]:
+                rule = "be None, and pressure fixed: of patches with more than three states it does not follow in Warp"
+                raise InvalidValueError("moments", rule, f"model {p}: {type(self.models[p]).__name__}")
+
+    def launch(
+        self,
+        state: wp.array[Any],
+        host: HostStep,
+        dt: float,
+        results: CoupledStep,
+        tolerance: float = coupling.TOLERANCE,
+        iterations: int | None = None,
+        skip: wp.array[Any] | None = None,
+    ) -> None:
+        """Step as `step` does, but not worlds whose `skip` is not 0; of patches only those that can follow moments do.
+
+        Raises InvalidValueError as `step` does, for arrays and numbers.
+        """
         if results.state is state:
             raise InvalidValueError("results.state", "be another array than state", "the same")
         k, one = len(self.models), Problems()
@@ -128,6 +160,10 @@ class CoupledPatches:
         one.twist_response = self._address("twist_response", host.twist_response, 3 * k, 3 * k)
         if host.load_response is not None:
             one.load_response = self._address("load_response", host.load_response, k, 3 * k)
+        if host.moments is not None:
+            one.moments = self._address("moments", host.moments, k, 2)
+        if skip is not None:
+            one.skip = self._address("skip", skip, dtype=wp.int32)
         one.new_state = self._address("results.state", results.state, *self.state_shape)
         one.new_wrench = self._address("results.wrench", results.wrench, k, 3)
         one.new_twist = self._address("results.twist", results.twist, k, 3)

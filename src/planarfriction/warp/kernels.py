@@ -46,6 +46,7 @@ class Problems:
     wrench: wp.uint64
     twist_response: wp.uint64
     load_response: wp.uint64
+    moments: wp.uint64
     new_state: wp.uint64
     new_wrench: wp.uint64
     new_twist: wp.uint64
@@ -54,6 +55,8 @@ class Problems:
     residual: wp.uint64
     converged: wp.uint64
     status: wp.uint64
+    skip: wp.uint64
+    """0, or the address of numbers that are not 0 for worlds to leave out."""
 
 
 @functools.lru_cache

@@ -35,8 +35,18 @@ def source_of(pieces: Pieces, precision: str) -> Source:
     return Source(_rendered("step.cpp.j2", own=own), numbers, places)
 
 
-def coupled_source_of(models: Sequence[Pieces], which: Sequence[int], radii: Sequence[float], precision: str) -> Source:
-    """Return the source of a step in contact space of patches: ``which` model each has, and its lever arm [m]."""
+def coupled_source_of(
+    models: Sequence[Pieces],
+    which: Sequence[int],
+    radii: Sequence[float],
+    points: Sequence[Sequence[float]],
+    precision: str,
+) -> Source:
+    """Return the source of a step in contact space.
+
+    `which` are the models of the patches, `radii` their lever arms [m], `points` their centres [m], empty of patches
+    whose pressure cannot follow moments.
+    """
     kinds, numbers, places = _described(models, precision, slopes=True)
     columns = [len(models[kind].parameters) + 1 for kind in which]
     states = [models[kind].count * models[kind].states for kind in which]
@@ -50,6 +60,8 @@ def coupled_source_of(models: Sequence[Pieces], which: Sequence[int], radii: Seq
         precision=precision,
         starts=starts,
         radii=[writer.constant(each) for each in radii],
+        points=[[writer.constant(each) for each in point] for point in points],
+        reach=writer.constant(PRECISIONS[precision]),
         rounding=list(map(writer.constant, ROUNDING[precision])),
         shortening="\n".join(writer.lines(traced(_shortening), ["too_far", "share"], indent=" " * 16)),
         **{name.lower(): writer.constant(getattr(coupling, name)) for name in names},

@@ -93,6 +93,11 @@ def _layout(patches: Sequence[PatchContact], nv: int) -> Layout:
     return memory_layout(sum(math.prod(patch.model.state_shape) for patch in patches), len(patches), nv)
 
 
+def room_of(patches: Sequence[PatchContact], nv: int) -> int:
+    """Return the count of numbers that patches remember."""
+    return _layout(patches, nv).size
+
+
 def prepare(spec: Any, patches: Sequence[PatchContact]) -> None:
     """Prepare an `MjSpec` for the patches: add a contact pair without friction for each, and room in the user data.
 
@@ -168,9 +173,12 @@ def check_once(patches: Sequence[PatchContact]) -> None:
 
 
 class Placed:
-    """A patch found in a compiled model."""
+    """A patch found in a compiled model.
 
-    def __init__(self, m: Any, patch: PatchContact) -> None:
+    `unprepared`: geoms without a pair will do, if their own contacts have no friction (condim 1); `pair` is -1 then.
+    """
+
+    def __init__(self, m: Any, patch: PatchContact, *, unprepared: bool = False) -> None:
         self.patch, self.site = patch, _named(m, "site", patch.site, mujoco.mjtObj.mjOBJ_SITE)
         self.geoms = np.array([_named(m, "geoms", name, mujoco.mjtObj.mjOBJ_GEOM) for name in patch.geoms])
         bodies, owner = m.geom_bodyid[self.geoms], m.site_bodyid[self.site]
@@ -195,7 +203,9 @@ class Placed:
                 self.pair = pair
                 self.check(m)
                 return
-        raise InvalidValueError("pair", "be in the model (prepare adds it)", " and ".join(patch.geoms))
+        self.pair = -1
+        if not (unprepared and (m.geom_condim[self.geoms] == 1).all()):
+            raise InvalidValueError("pair", "be in the model (prepare adds it)", " and ".join(patch.geoms))
 
     def check(self, m: Any) -> None:
         """Refuse a pair with friction of its own, and time steps at which MuJoCo's own normal contact is lost.

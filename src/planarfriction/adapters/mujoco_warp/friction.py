@@ -1,0 +1,346 @@
+# pyright: reportAttributeAccessIssue=false
+"""Steps of MuJoCo Warp with patch friction, implicit in contact space."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import mujoco
+import mujoco_warp as mjw
+import numpy as np
+import warp as wp
+
+from planarfriction import validation
+from planarfriction.adapters.mujoco.friction import Report
+from planarfriction.adapters.mujoco.patches import (
+    PatchContact,
+    Placed,
+    check_once,
+    memory,
+    parameters_in,
+    place_of_parameters,
+    room_of,
+)
+from planarfriction.adapters.mujoco_warp.loops import geometry, responses
+from planarfriction.coupling import HostStep
+from planarfriction.errors import InvalidValueError
+from planarfriction.warp import CoupledPatches
+
+INTEGRATORS = {
+    int(mujoco.mjtIntegrator.mjINT_EULER): "Euler",
+    int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST): "implicitfast",
+}
+
+DISPLACEMENT = "centre_x", "centre_y"
+"""Parameters of a displacement (see `pf.randomise`)."""
+
+PASSES = 3
+"""Solutions of a step at most: again where the first has activated other constraints."""
+
+
+class Friction:
+    """Patch friction for `worlds` environments of a model that `prepare` has prepared.
+
+    Either call `step()` instead of `mujoco_warp.step`, or use `with friction.install():`, which adds friction to
+    `mujoco_warp.step(friction.model, friction.data)` itself, and to CUDA graphs of it. States are stored in the data,
+    in the last numbers of `userdata`, in the same way as by `planarfriction.adapters.mujoco`: `mujoco_warp.reset_data`
+    resets them too, of single worlds if asked.
+
+    Parameters
+    ----------
+    m
+        A model of MuJoCo.
+    patches
+        Patches in it. The pressure of those whose model has three states may follow the contact forces; for others,
+        say `pressure="fixed"`.
+    worlds
+        Number of environments.
+    parameters
+        Numbers of the laws for each environment, and `scale` (see `planarfriction.warp.CoupledPatches`).
+    model, data
+        Those of MuJoCo Warp, if they are made already; else they are made from `m`, at its initial state.
+    nconmax, njmax
+        Contacts and constraints of a world at most, if the data are made here.
+
+    Raises `InvalidValueError` for an unsuitable integrator or cone, noslip iterations, sleeping, disabled actuation,
+    too little user data, names that are not in the model, pairs with friction of their own, models without source (see
+    `export_c`), and pressure that is to follow but cannot.
+    """
+
+    def __init__(
+        self,
+        m: Any,
+        patches: Sequence[PatchContact],
+        *,
+        worlds: int = 1,
+        parameters: Mapping[str, Any] | None = None,
+        model: Any = None,
+        data: Any = None,
+        nconmax: int | None = None,
+        njmax: int | None = None,
+    ) -> None:
+        check_once(patches)
+        self.m, self.patches, self.placed = m, tuple(patches), [Placed(m, each, unprepared=True) for each in patches]
+        _check(m, self.placed)
+        worlds = data.nworld if data is not None else validation.count("worlds", worlds)
+        own = _parameters(m, self.placed, worlds) | dict(parameters or {})
+        self.coupled = CoupledPatches([patch.model for patch in patches], worlds=worlds, parameters=own)
+        self._check_pressure()
+        self.model = mjw.put_model(m) if model is None else model
+        """Model of MuJoCo Warp."""
+        self.data: Any = data
+        """Data of all environments, of MuJoCo Warp."""
+        if data is None:
+            d = mujoco.MjData(m)
+            mujoco.mj_forward(m, d)
+            self.data = mjw.put_data(m, d, nworld=worlds, nconmax=nconmax, njmax=njmax)
+        prepared = m.nuserdata if any(each.pair >= 0 for each in self.placed) else 0
+        size = room_of(patches, m.nv)
+        self._memory = self.data.userdata if prepared else wp.zeros((worlds, size), dtype=float)
+        self._at = memory(patches, m.nv, prepared or size)
+        self._make(worlds)
+
+    def _check_pressure(self) -> None:
+        """Refuse patches whose pressure is to follow the contact forces, but cannot."""
+        for placed, follows in zip(self.placed, self.coupled.follows, strict=True):
+            if placed.follows and not follows:
+                rule = (
+                    f'be "fixed" between {" and ".join(placed.patch.geoms)}: in Warp that of three states alone follows'
+                )
+                raise InvalidValueError("pressure", rule, placed.patch.pressure)
+
+    # ------------------------------------------------------------------ what the data hold
+
+    def states(self) -> wp.array[Any]:
+        """Return the states of all patches at the ends of the last steps, a view [worlds, states]."""
+        return self._kept(self._at.new, self.coupled.state_shape[0])
+
+    def wrenches(self) -> wp.array[Any]:
+        """Return the last wrenches on the sites' bodies, in the patches' frames, a view [worlds, 3k] [N, N, N m]."""
+        return self._kept(self._at.wrench, 3 * len(self.patches))
+
+    def twists(self) -> wp.array[Any]:
+        """Return the last twists of the sites' bodies relative to the others, a view [worlds, 3k] [m/s, m/s, rad/s]."""
+        return self._kept(self._at.twist, 3 * len(self.patches))
+
+    def loads(self) -> wp.array[Any]:
+        """Return the normal forces at the ends of the last steps, a view [worlds, k] [N]."""
+        return self._kept(self._at.load, len(self.patches))
+
+    def report(self) -> Report:
+        """Wait for the device; return the statistics of the last step, arrays [worlds]."""
+        u: Any = self._memory.numpy().copy()
+        at = self._at
+        rounds, passes = u[:, at.iterations].astype(int), u[:, at.passes].astype(int)
+        return Report(rounds, passes, u[:, at.residual], u[:, at.converged] > 0.0)
+
+    def reset(self) -> None:
+        """Relax all bristles."""
+        self._kept(self._at.state, self._at.converged + 1 - self._at.state).zero_()
+
+    def _kept(self, first: int, count: int) -> Any:
+        return self._memory[:, first : first + count]
+
+    # ------------------------------------------------------------------ steps
+
+    def step(self) -> None:
+        """Take a step of all environments with patch friction, instead of `mujoco_warp.step`."""
+        with self.install():
+            mjw.step(self.model, self.data)
+
+    @contextmanager
+    def install(self) -> Iterator[Friction]:
+        """Add friction to `mujoco_warp.step` of the model within a `with` block, after a control callback, if any."""
+        callbacks = self.model.callback
+        before = callbacks.control
+
+        def control(m: Any, d: Any) -> None:
+            if before is not None:
+                before(m, d)
+            self.plan(m, d)
+
+        callbacks.control = control
+        try:
+            yield self
+        finally:
+            callbacks.control = before
+
+    def plan(self, m: Any, d: Any) -> None:
+        """Add friction to the passive forces for the step from where the data are (a control callback)."""
+        own, dt = self._bound(m, d), m.opt.timestep
+        worlds, patches, frames, scratch, problem = d.nworld, self._patches, self._frames, self._scratch, self._problem
+        contacts, results = own["contacts"], self._results
+
+        def launch(kernel: Any, *inputs: Any) -> None:
+            wp.launch(kernel, dim=worlds, inputs=inputs)
+
+        launch(
+            geometry.recall, patches, self._places, d.time, dt, self._memory, self._state, problem.guess, frames.held
+        )
+        places = d.site_xpos, d.site_xmat
+        launch(
+            geometry.place,
+            *(patches, own["tree"], contacts, frames, *places, d.qvel, problem.guess, d.qfrc_passive),
+        )
+        mjw.fwd_actuation(m, d)
+        mjw.fwd_acceleration(m, d, factorize=True)
+        mjw.solve(m, d)
+        launch(geometry.follow_centres, patches, contacts, frames, *places, dt, d.qvel, problem.guess)
+        dynamics = own["dynamics"]
+        if dynamics.implicit == 2:
+            mjw.deriv_smooth_vel(m, d, self._metric)
+        for i in range(PASSES):
+            launch(
+                responses.respond,
+                *(patches, contacts, dynamics, frames, scratch, problem, int(i == 0), dt, d.qvel, d.qfrc_smooth),
+            )
+            self.coupled.launch(self._state, self._host, self._dt, results, skip=scratch.done)
+            launch(
+                responses.settle,
+                *(contacts, dynamics, frames, scratch, problem, results.wrench, results.iterations, dt),
+            )
+        launch(
+            responses.remember,
+            *(patches, self._places, frames, scratch, problem, *results[:4], results.residual, results.converged),
+            *(self._memory, d.qfrc_passive, d.qacc_warmstart),
+        )
+
+    # ------------------------------------------------------------------ what is made once
+
+    def _make(self, worlds: int) -> None:
+        """Make the arrays that steps work with."""
+        m, k, nv, device = self.m, len(self.patches), self.m.nv, self.coupled.device
+        njmax = self.data.efc.force.shape[1]
+
+        def zeros(*shape: int, dtype: Any = float) -> Any:
+            return wp.zeros((worlds, *shape), dtype=dtype, device=device)
+
+        self._dt = float(m.opt.timestep)
+        self._patches, self._places = self._numbers(), self._places_of()
+        self._frames = _filled(
+            geometry.Frames(),
+            {
+                "owner": zeros(njmax, dtype=int), "lever": zeros(njmax, dtype=wp.vec2), "touching": zeros(k, dtype=int),
+                "axes": zeros(k, dtype=wp.mat33), "origin": zeros(k, dtype=wp.vec3), "rolling": zeros(k),
+                "jacobian": zeros(3 * k, nv), "held": zeros(k, dtype=wp.vec3), "centre": zeros(k, dtype=wp.vec3),
+            },
+        )  # fmt: skip
+        double = {"dtype": wp.float64}
+        self._scratch = _filled(
+            responses.Scratch(),
+            {
+                "done": zeros(dtype=int), "active": zeros(njmax, dtype=int), "stiff": zeros(nv, nv, **double),
+                "answers": zeros(nv, 3 * k + 1, **double), "gains": zeros(nv, 3 * k + 1, **double),
+                "acceleration": zeros(nv, **double), "pressed": zeros(k, dtype=wp.vec2),
+                "rounds": zeros(dtype=int), "passes": zeros(dtype=int),
+            },
+        )  # fmt: skip
+        arrays = [zeros(k, 3), zeros(k), zeros(k, 3), zeros(3 * k, 3 * k), zeros(k, 3 * k), zeros(k, 2)]
+        names = "twist", "load", "guess", "response", "load_response", "moments"
+        self._problem, self._host = (
+            _filled(responses.Problem(), dict(zip(names, arrays, strict=True))),
+            HostStep(*arrays),
+        )
+        self._state, self._results = self.coupled.rest(), self.coupled.results()
+        self._metric = zeros(self.model.nC)
+        damped = bool(m.dof_damping.any()) and not m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
+        self._implicit = int(damped) if m.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER else 2
+
+    def _places_of(self) -> Any:
+        places = self._at._asdict()
+        return _filled(geometry.Places(), {geometry.AFTER: places.pop("new"), **places})
+
+    def _numbers(self) -> Any:
+        """Return the numbers of the patches for kernels."""
+        columns = {
+            "site": [each.site for each in self.placed],
+            "own": [each.own for each in self.placed],
+            "other": [each.other for each in self.placed],
+            "support": [each.bodies[0] for each in self.placed],
+            "owner": [each.bodies[1] for each in self.placed],
+            "at_contact": [int(each.at_contact) for each in self.placed],
+            "follows": [int(each.follows) for each in self.placed],
+        }
+        device, positions = self.coupled.device, [each.model.patch.positions for each in self.patches]
+        points = [each.model.compiled.points()[0] for each in self.patches]
+        found = {name: wp.array(each, dtype=int, device=device) for name, each in columns.items()}
+        radius = np.array([np.sqrt((each**2).sum(1).mean()) for each in positions])
+        return _filled(
+            geometry.Patches(),
+            {
+                **found,
+                "count": len(self.patches),
+                "states": self.coupled.state_shape[0],
+                "radius": wp.array(radius, dtype=float, device=device),
+                "point": wp.array([each[0] for each in points], dtype=wp.vec2, device=device),
+            },
+        )
+
+    def _bound(self, m: Any, d: Any) -> dict[str, Any]:
+        """Return the arrays of model and data in the structs of kernels."""
+        if m is not self.model or d is not self.data:
+            raise InvalidValueError("model, data", "be those of the friction", "others")
+        if not hasattr(self, "_own"):
+            efc, c = d.efc, d.contact
+            contacts = {"nefc": d.nefc, "type": efc.type, "id": efc.id, "force": efc.force}
+            contacts |= {"geom": c.geom, "frame": c.frame, "pos": c.pos}
+            dynamics = {
+                "sparse": int(m.is_sparse), "nnz": efc.J_rownnz, "first": efc.J_rowadr, "column": efc.J_colind,
+                "jacobian": efc.J, "stiffness": efc.D, "aref": efc.aref, "loss": efc.frictionloss, "inertia": d.M,
+                "metric": self._metric, "inertia_nnz": m.M_rownnz, "inertia_first": m.M_rowadr,
+                "inertia_column": m.M_colind, "damping": m.dof_damping, "implicit": self._implicit,
+            }  # fmt: skip
+            tree = {"root": m.body_rootid, "ancestor": m.body_isdofancestor, "centre": d.subtree_com, "axis": d.cdof}
+            self._own = {
+                "contacts": _filled(geometry.Contacts(), contacts),
+                "dynamics": _filled(responses.Dynamics(), dynamics),
+                "tree": _filled(geometry.Tree(), tree),
+            }
+        return self._own
+
+
+def _parameters(m: Any, placed: Sequence[Placed], worlds: int) -> dict[str, np.ndarray]:
+    """Return the parameters of patches that stand in a prepared model, for all worlds.
+
+    Raises InvalidValueError for patches that are displaced.
+    """
+    if any(each.pair < 0 for each in placed):
+        return {}
+    found = parameters_in(m, place_of_parameters(m), len(placed))
+    for name in DISPLACEMENT:
+        if found[name].any():
+            raise InvalidValueError(name, "be 0: in Warp patches lie at their sites", found[name].tolist())
+    own = {name: np.tile(values, (worlds, 1)) for name, values in found.items() if name not in DISPLACEMENT}
+    if not any(each.patch.model.law.numbers.elasto_plastic for each in placed):
+        del own["breakaway_ratio"]
+    return own
+
+
+def _filled(struct: Any, values: Mapping[str, Any]) -> Any:
+    """Return a struct of Warp with these values."""
+    for name, value in values.items():
+        setattr(struct, name, value)
+    return struct
+
+
+def _check(m: Any, placed: Sequence[Placed]) -> None:
+    """Refuse options of a model that do not fit."""
+    if m.opt.integrator not in INTEGRATORS:
+        name = mujoco.mjtIntegrator(m.opt.integrator).name.removeprefix("mjINT_")
+        raise InvalidValueError("integrator", f"be {', '.join(INTEGRATORS.values())}", name)
+    if m.opt.cone != mujoco.mjtCone.mjCONE_PYRAMIDAL:
+        name = mujoco.mjtCone(m.opt.cone).name.removeprefix("mjCONE_").lower()
+        raise InvalidValueError("cone", "be pyramidal, where constraints are linear in their ranges", name)
+    if m.opt.noslip_iterations > 0:
+        raise InvalidValueError("noslip_iterations", "be 0: they would change the solution", m.opt.noslip_iterations)
+    if m.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP):
+        raise InvalidValueError("sleep", "be disabled: sleeping bodies do not react to wrenches", "enabled")
+    if m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_ACTUATION):
+        raise InvalidValueError(
+            "actuation", "be enabled: MuJoCo Warp calls control callbacks with it alone", "disabled"
+        )
+    for each in placed:
+        if each.pair >= 0:
+            each.check(m)

@@ -1,0 +1,291 @@
+"""Places of patches in contact in the worlds of MuJoCo Warp, and the Jacobian of their twists, as kernels.
+
+As `planarfriction.adapters.mujoco.loops.geometry` and `centres`, one thread a world.
+"""
+
+# No `from __future__ import annotations` here: Warp reads the types themselves.
+
+from typing import Any
+
+import mujoco
+import warp as wp
+
+from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
+from planarfriction.adapters.mujoco.loops.geometry import ALONG
+from planarfriction.adapters.mujoco.loops.records import Memory
+
+FRICTIONLESS = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS))
+
+
+@wp.struct
+class Patches:
+    """Patches of a model: `count` and arrays [k]."""
+
+    count: int
+    states: int
+    site: wp.array(dtype=int)
+    own: wp.array(dtype=int)
+    other: wp.array(dtype=int)
+    owner: wp.array(dtype=int)
+    support: wp.array(dtype=int)
+    at_contact: wp.array(dtype=int)
+    follows: wp.array(dtype=int)
+    radius: wp.array(dtype=float)
+    point: wp.array(dtype=wp.vec2)
+    """Centres of patches whose pressure is fixed."""
+
+
+@wp.struct
+class Tree:
+    """Arrays of a model and its data that Jacobians of points depend on."""
+
+    root: wp.array(dtype=int)
+    ancestor: wp.array2d(dtype=int)
+    centre: wp.array2d(dtype=wp.vec3)
+    axis: wp.array2d(dtype=wp.spatial_vector)
+
+
+@wp.struct
+class Contacts:
+    """Contacts and constraints of all worlds."""
+
+    nefc: wp.array(dtype=int)
+    type: wp.array2d(dtype=int)
+    id: wp.array2d(dtype=int)
+    geom: wp.array(dtype=wp.vec2i)
+    frame: wp.array(dtype=wp.mat33)
+    pos: wp.array(dtype=wp.vec3)
+    force: wp.array2d(dtype=float)
+
+
+@wp.struct
+class Frames:
+    """Places of patches in all worlds, as `place` writes them."""
+
+    owner: wp.array2d(dtype=int)
+    """Patch of each constraint, -1 of others [E, njmax]."""
+    lever: wp.array2d(dtype=wp.vec2)
+    """Place of each of its contacts in its frame [E, njmax]."""
+    touching: wp.array2d(dtype=int)
+    axes: wp.array2d(dtype=wp.mat33)
+    """Axes x, y and normal of the patches, as rows [E, k]."""
+    origin: wp.array2d(dtype=wp.vec3)
+    rolling: wp.array2d(dtype=float)
+    """Speed at which the bodies roll on each other [rad/s], [E, k]."""
+    jacobian: wp.array3d(dtype=float)
+    """[E, 3k, nv]"""
+    held: wp.array2d(dtype=wp.vec3)
+    """Origins at the beginning of the step in the frames of the sites; 0 at a site, or for none [E, k]."""
+    centre: wp.array2d(dtype=wp.vec3)
+    """Origins in the step [E, k]."""
+
+
+AFTER = "after"
+"""Name of the place of `new` states, which C++ keeps for itself."""
+
+
+def _places() -> Any:
+    """Return a struct with the places of what patches remember (see `Memory`)."""
+    names = [AFTER if name == "new" else name for name in Memory._fields]
+    return wp.struct(type("Places", (), {"__annotations__": dict.fromkeys(names, int)}))
+
+
+Places = _places()
+
+
+@wp.kernel(enable_backward=False)
+def recall(
+    patches: Patches,
+    at: Places,
+    now: wp.array(dtype=float),
+    timestep: wp.array(dtype=float),
+    memory: wp.array2d(dtype=float),
+    state: wp.array2d(dtype=float),
+    guess: wp.array3d(dtype=float),
+    held: wp.array2d(dtype=wp.vec3),
+):
+    """Bring states, guesses and origins to the times of the worlds: those of the last step's end, or of its start."""
+    w = wp.tid()
+    time = now[w]
+    if time == memory[w, at.next]:
+        for i in range(patches.states):
+            memory[w, at.state + i] = memory[w, at.after + i]
+        for i in range(3 * patches.count):
+            memory[w, at.guess + i] = memory[w, at.wrench + i]
+            memory[w, at.held + i] = memory[w, at.centre + i]
+    elif time != memory[w, at.time]:
+        for i in range(patches.states):
+            memory[w, at.state + i] = 0.0
+        for i in range(3 * patches.count):
+            memory[w, at.guess + i] = 0.0
+            memory[w, at.held + i] = 0.0
+    memory[w, at.time] = time
+    memory[w, at.next] = time + timestep[w % timestep.shape[0]]
+    for i in range(patches.states):
+        state[w, i] = memory[w, at.state + i]
+    for p in range(patches.count):
+        first = at.held + 3 * p
+        held[w, p] = wp.vec3(memory[w, first], memory[w, first + 1], memory[w, first + 2])
+        for i in range(3):
+            guess[w, p, i] = memory[w, at.guess + 3 * p + i]
+
+
+@wp.func
+def jacobian_of(tree: Tree, w: int, point: wp.vec3, body: int, dof: int) -> wp.spatial_vector:
+    """Return the velocity of a point of a body, and its spin, by a degree of freedom."""
+    if tree.ancestor[body, dof] == 0:
+        return wp.spatial_vector()
+    axis = tree.axis[w, dof]
+    turn = wp.spatial_top(axis)
+    move = wp.spatial_bottom(axis) + wp.cross(turn, point - tree.centre[w, tree.root[body]])
+    return wp.spatial_vector(move, turn)
+
+
+@wp.func
+def axes_of(turned: wp.mat33, normal: wp.vec3) -> wp.mat33:
+    """Return the axes of a patch as rows: x along that of its site, across the normal."""
+    one = wp.vec3(turned[0, 0], turned[1, 0], turned[2, 0])
+    two = wp.vec3(turned[0, 1], turned[1, 1], turned[2, 1])
+    x = one - wp.dot(one, normal) * normal
+    if wp.dot(x, x) < wp.static(ALONG):
+        x = two - wp.dot(two, normal) * normal
+    x = wp.normalize(x)
+    y = wp.cross(normal, x)
+    return wp.matrix_from_rows(x, y, normal)
+
+
+@wp.kernel(enable_backward=False)
+def place(
+    patches: Patches,
+    tree: Tree,
+    contacts: Contacts,
+    frames: Frames,
+    site_xpos: wp.array2d(dtype=wp.vec3),
+    site_xmat: wp.array2d(dtype=wp.mat33),
+    qvel: wp.array2d(dtype=float),
+    guess: wp.array3d(dtype=float),
+    passive: wp.array2d(dtype=float),
+):
+    """Write the frames of the patches, the Jacobian of their twists, and add the guesses to the passive forces."""
+    w = wp.tid()
+    nv = frames.jacobian.shape[2]
+    nefc = wp.min(contacts.nefc[w], frames.owner.shape[1])
+    for r in range(nefc):
+        frames.owner[w, r] = -1
+    for p in range(patches.count):
+        normal = wp.vec3()
+        middle = wp.vec3()
+        count = int(0)
+        for r in range(nefc):
+            if contacts.type[w, r] == FRICTIONLESS:
+                c = contacts.id[w, r]
+                geoms = contacts.geom[c]
+                sign = float(0.0)
+                if geoms[0] == patches.other[p] and geoms[1] == patches.own[p]:
+                    sign = 1.0
+                if geoms[1] == patches.other[p] and geoms[0] == patches.own[p]:
+                    sign = -1.0
+                if sign != 0.0:
+                    frames.owner[w, r] = p
+                    frame = contacts.frame[c]
+                    normal += sign * wp.vec3(frame[0, 0], frame[0, 1], frame[0, 2])
+                    middle += contacts.pos[c]
+                    count += 1
+        frames.touching[w, p] = count
+        for i in range(3):
+            if count == 0:
+                guess[w, p, i] = 0.0
+        if count == 0:
+            for i in range(nv):
+                for j in range(3):
+                    frames.jacobian[w, 3 * p + j, i] = 0.0
+            continue
+        normal = wp.normalize(normal)
+        middle = middle / float(count)
+        site = patches.site[p]
+        turned = site_xmat[w, site]
+        axes = axes_of(turned, normal)
+        origin = site_xpos[w, site]
+        held = frames.held[w, p]
+        if patches.at_contact[p] != 0:
+            if held[0] == 0.0 and held[1] == 0.0 and held[2] == 0.0:
+                origin = middle
+            else:
+                origin += turned * held
+                origin += wp.dot(normal, middle - origin) * normal
+        tilt = wp.vec3()
+        for i in range(nv):
+            both = jacobian_of(tree, w, origin, patches.owner[p], i)
+            both -= jacobian_of(tree, w, origin, patches.support[p], i)
+            move = axes * wp.spatial_top(both)
+            turn = axes * wp.spatial_bottom(both)
+            frames.jacobian[w, 3 * p, i] = move[0]
+            frames.jacobian[w, 3 * p + 1, i] = move[1]
+            frames.jacobian[w, 3 * p + 2, i] = turn[2]
+            tilt += qvel[w, i] * turn
+            passive[w, i] = (
+                passive[w, i] + move[0] * guess[w, p, 0] + move[1] * guess[w, p, 1] + turn[2] * guess[w, p, 2]
+            )
+        frames.rolling[w, p] = wp.sqrt(tilt[0] * tilt[0] + tilt[1] * tilt[1])
+        frames.axes[w, p] = axes
+        frames.origin[w, p] = origin
+        for r in range(nefc):
+            if frames.owner[w, r] == p:
+                away = axes * (contacts.pos[contacts.id[w, r]] - origin)
+                frames.lever[w, r] = wp.vec2(away[0], away[1])
+
+
+@wp.func
+def speed_of(frames: Frames, qvel: wp.array2d(dtype=float), w: int, p: int) -> float:
+    """Return the speed at which a patch slides [m/s]."""
+    v = wp.vec2()
+    for i in range(frames.jacobian.shape[2]):
+        v += qvel[w, i] * wp.vec2(frames.jacobian[w, 3 * p, i], frames.jacobian[w, 3 * p + 1, i])
+    return wp.length(v)
+
+
+@wp.kernel(enable_backward=False)
+def follow_centres(
+    patches: Patches,
+    contacts: Contacts,
+    frames: Frames,
+    site_xpos: wp.array2d(dtype=wp.vec3),
+    site_xmat: wp.array2d(dtype=wp.mat33),
+    timestep: wp.array(dtype=float),
+    qvel: wp.array2d(dtype=float),
+    guess: wp.array3d(dtype=float),
+):
+    """Move origins towards the centres of the contact forces, as far as bodies move on each other, and note them."""
+    w = wp.tid()
+    nefc = wp.min(contacts.nefc[w], frames.owner.shape[1])
+    for p in range(patches.count):
+        frames.centre[w, p] = wp.vec3()
+        if frames.touching[w, p] == 0 or patches.at_contact[p] == 0:
+            continue
+        total = float(0.0)
+        sum = wp.vec2()
+        for r in range(nefc):
+            if frames.owner[w, r] == p:
+                total += contacts.force[w, r]
+                sum += contacts.force[w, r] * frames.lever[w, r]
+        if total > 0.0:
+            held = frames.held[w, p]
+            share = float(1.0)
+            if held[0] != 0.0 or held[1] != 0.0 or held[2] != 0.0:
+                rate = frames.rolling[w, p]
+                if patches.radius[p] > 0.0:
+                    rate += speed_of(frames, qvel, w, p) / patches.radius[p]
+                share = wp.min(1.0, timestep[w % timestep.shape[0]] * rate / wp.static(FOLLOWS))
+            move = (share / total) * sum
+            for i in range(frames.jacobian.shape[2]):
+                spin = frames.jacobian[w, 3 * p + 2, i]
+                frames.jacobian[w, 3 * p, i] = frames.jacobian[w, 3 * p, i] - move[1] * spin
+                frames.jacobian[w, 3 * p + 1, i] = frames.jacobian[w, 3 * p + 1, i] + move[0] * spin
+            guess[w, p, 2] = guess[w, p, 2] - move[0] * guess[w, p, 1] + move[1] * guess[w, p, 0]
+            for r in range(nefc):
+                if frames.owner[w, r] == p:
+                    frames.lever[w, r] = frames.lever[w, r] - move
+            axes = frames.axes[w, p]
+            frames.origin[w, p] = frames.origin[w, p] + wp.transpose(axes) * wp.vec3(move[0], move[1], 0.0)
+        site = patches.site[p]
+        frames.centre[w, p] = wp.transpose(site_xmat[w, site]) * (frames.origin[w, p] - site_xpos[w, site])

@@ -1,0 +1,381 @@
+"""Response of MuJoCo Warp's step to wrenches on patches, for a fixed set of active constraints, as kernels.
+
+As `planarfriction.adapters.mujoco.loops.responses`, with accelerations that are exact for these constraints:
+`H a = f + Jp' W_0 + Jc' (D a_ref + c)`, and in double precision, as stiff contacts next to inertia need. One thread a
+world; worlds that are `done` are left alone.
+"""
+
+# No `from __future__ import annotations` here: Warp reads the types themselves.
+
+import mujoco
+import warp as wp
+
+from planarfriction.adapters.mujoco_warp.loops.geometry import Contacts, Frames, Patches, Places
+
+EQUALITY = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_EQUALITY))
+DOF_LOSS = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF))
+TENDON_LOSS = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON))
+
+SLACK = wp.constant(1e-6)
+"""Speed [m/s] by which a constraint may leave its range without a new solution: single precision knows no less."""
+
+
+@wp.struct
+class Dynamics:
+    """Inertia and constraints of all worlds."""
+
+    sparse: int
+    """1 if the Jacobian of the constraints is sparse."""
+    nnz: wp.array2d(dtype=int)
+    first: wp.array2d(dtype=int)
+    column: wp.array3d(dtype=int)
+    jacobian: wp.array3d(dtype=float)
+    stiffness: wp.array2d(dtype=float)
+    aref: wp.array2d(dtype=float)
+    loss: wp.array2d(dtype=float)
+    inertia: wp.array2d(dtype=float)
+    """M, and the metric of the integrator, below the diagonal, row by row."""
+    metric: wp.array2d(dtype=float)
+    inertia_nnz: wp.array(dtype=int)
+    inertia_first: wp.array(dtype=int)
+    inertia_column: wp.array(dtype=int)
+    damping: wp.array2d(dtype=float)
+    implicit: int
+    """0: Euler, 1: Euler with damping, 2: `metric`."""
+
+
+@wp.struct
+class Scratch:
+    """What kernels of a step hand on."""
+
+    done: wp.array(dtype=int)
+    active: wp.array2d(dtype=int)
+    """0: no force, 1: force that follows the acceleration, 2, 3: at the friction loss, positive or negative."""
+    stiff: wp.array3d(dtype=wp.float64)
+    answers: wp.array3d(dtype=wp.float64)
+    """H^-1 J' and, last, the acceleration under the guess [E, nv, 3k + 1]."""
+    gains: wp.array3d(dtype=wp.float64)
+    """Velocities per dt that the integrator gains from these."""
+    acceleration: wp.array2d(dtype=wp.float64)
+    pressed: wp.array2d(dtype=wp.vec2)
+    """Centres of pressure of the first pass, which is held [E, k]."""
+    rounds: wp.array(dtype=int)
+    passes: wp.array(dtype=int)
+
+
+@wp.struct
+class Problem:
+    """Problem in contact space of all worlds (see `coupling.HostStep`)."""
+
+    twist: wp.array3d(dtype=float)
+    load: wp.array2d(dtype=float)
+    guess: wp.array3d(dtype=float)
+    response: wp.array3d(dtype=float)
+    load_response: wp.array3d(dtype=float)
+    moments: wp.array3d(dtype=float)
+
+
+@wp.func
+def count_of(own: Dynamics, w: int, r: int, nv: int) -> int:
+    """Return the count of numbers in a row of the constraints' Jacobian."""
+    if own.sparse != 0:
+        return own.nnz[w, r]
+    return nv
+
+
+@wp.func
+def column_of(own: Dynamics, w: int, r: int, i: int) -> int:
+    """Return the column of a number in a row."""
+    if own.sparse != 0:
+        return own.column[w, 0, own.first[w, r] + i]
+    return i
+
+
+@wp.func
+def number_of(own: Dynamics, w: int, r: int, i: int) -> wp.float64:
+    """Return a number in a row."""
+    if own.sparse != 0:
+        return wp.float64(own.jacobian[w, 0, own.first[w, r] + i])
+    return wp.float64(own.jacobian[w, r, i])
+
+
+@wp.func
+def gap_of(own: Dynamics, acceleration: wp.array2d(dtype=wp.float64), w: int, r: int) -> wp.float64:
+    """Return the excess of the acceleration of a row over the one at which it has no force."""
+    total = -wp.float64(own.aref[w, r])
+    for i in range(count_of(own, w, r, acceleration.shape[1])):
+        total += number_of(own, w, r, i) * acceleration[w, column_of(own, w, r, i)]
+    return total
+
+
+@wp.func
+def range_of(kind: int, force: wp.float64, loss: wp.float64) -> int:
+    """Return the range of a row with a force."""
+    if kind == EQUALITY:
+        return 1
+    if kind == DOF_LOSS or kind == TENDON_LOSS:
+        if force >= loss:
+            return 2
+        if force <= -loss:
+            return 3
+        return 1
+    if force > wp.float64(0.0):
+        return 1
+    return 0
+
+
+@wp.func
+def write_inertia(own: Dynamics, numbers: wp.array2d(dtype=float), w: int, out: wp.array3d(dtype=wp.float64)):
+    nv = out.shape[1]
+    for i in range(nv):
+        for j in range(nv):
+            out[w, i, j] = wp.float64(0.0)
+    for i in range(nv):
+        for n in range(own.inertia_nnz[i]):
+            at = own.inertia_first[i] + n
+            j = own.inertia_column[at]
+            out[w, i, j] = wp.float64(numbers[w, at])
+            out[w, j, i] = wp.float64(numbers[w, at])
+
+
+@wp.func
+def solve(h: wp.array3d(dtype=wp.float64), w: int, x: wp.array3d(dtype=wp.float64)):
+    """Solve `h x' = x` for all columns in place, by Cholesky's factors; h is lost."""
+    nv = h.shape[1]
+    columns = x.shape[2]
+    for j in range(nv):
+        for i in range(j, nv):
+            s = h[w, i, j]
+            for n in range(j):
+                s -= h[w, i, n] * h[w, j, n]
+            if i == j:
+                h[w, j, j] = wp.sqrt(wp.max(s, wp.float64(1e-30)))
+            else:
+                h[w, i, j] = s / h[w, j, j]
+    for c in range(columns):
+        for i in range(nv):
+            s = x[w, i, c]
+            for n in range(i):
+                s -= h[w, i, n] * x[w, n, c]
+            x[w, i, c] = s / h[w, i, i]
+        for m in range(nv):
+            i = nv - 1 - m
+            s = x[w, i, c]
+            for n in range(i + 1, nv):
+                s -= h[w, n, i] * x[w, n, c]
+            x[w, i, c] = s / h[w, i, i]
+
+
+@wp.func
+def accelerate(
+    own: Dynamics, contacts: Contacts, frames: Frames, s: Scratch, w: int, nefc: int, smooth: wp.array2d(dtype=float)
+):
+    """Write the answers of accelerations to wrenches, and the acceleration under the guess."""
+    nv = s.stiff.shape[1]
+    last = s.answers.shape[2] - 1
+    write_inertia(own, own.inertia, w, s.stiff)
+    for i in range(nv):
+        for c in range(last):
+            s.answers[w, i, c] = wp.float64(frames.jacobian[w, c, i])
+        s.answers[w, i, last] = wp.float64(smooth[w, i])
+    for r in range(nefc):
+        kind = s.active[w, r]
+        if kind == 0:
+            continue
+        count = count_of(own, w, r, nv)
+        weight = wp.float64(own.stiffness[w, r])
+        pushed = weight * wp.float64(own.aref[w, r])
+        if kind == 2:
+            pushed = wp.float64(own.loss[w, r])
+        if kind == 3:
+            pushed = -wp.float64(own.loss[w, r])
+        for n in range(count):
+            i = column_of(own, w, r, n)
+            one = number_of(own, w, r, n)
+            s.answers[w, i, last] = s.answers[w, i, last] + one * pushed
+            if kind == 1:
+                for m in range(count):
+                    j = column_of(own, w, r, m)
+                    s.stiff[w, i, j] = s.stiff[w, i, j] + weight * one * number_of(own, w, r, m)
+    solve(s.stiff, w, s.answers)
+
+
+@wp.func
+def gain(own: Dynamics, s: Scratch, w: int, dt: wp.float64):
+    """Write what the integrator makes of these accelerations: `Mh^-1 M a` with its own metric."""
+    nv = s.stiff.shape[1]
+    for i in range(nv):
+        for c in range(s.answers.shape[2]):
+            s.gains[w, i, c] = s.answers[w, i, c]
+    if own.implicit == 0:
+        return
+    write_inertia(own, own.inertia, w, s.stiff)
+    for c in range(s.answers.shape[2]):
+        for i in range(nv):
+            total = wp.float64(0.0)
+            for j in range(nv):
+                total += s.stiff[w, i, j] * s.answers[w, j, c]
+            s.gains[w, i, c] = total
+    if own.implicit == 2:
+        write_inertia(own, own.metric, w, s.stiff)
+    else:
+        for i in range(nv):
+            s.stiff[w, i, i] = s.stiff[w, i, i] + dt * wp.float64(own.damping[w % own.damping.shape[0], i])
+    solve(s.stiff, w, s.gains)
+
+
+@wp.kernel(enable_backward=False)
+def respond(
+    patches: Patches,
+    contacts: Contacts,
+    own: Dynamics,
+    frames: Frames,
+    s: Scratch,
+    out: Problem,
+    first_pass: int,
+    timestep: wp.array(dtype=float),
+    qvel: wp.array2d(dtype=float),
+    smooth: wp.array2d(dtype=float),
+):
+    """Write twists, loads and their responses; first with the constraints that MuJoCo's solver has found."""
+    w = wp.tid()
+    nefc = wp.min(contacts.nefc[w], frames.owner.shape[1])
+    if first_pass != 0:
+        touching = int(0)
+        for p in range(patches.count):
+            touching += frames.touching[w, p]
+        s.done[w] = wp.where(touching == 0, 1, 0)
+        s.passes[w] = 0
+        s.rounds[w] = 0
+        for r in range(nefc):
+            s.active[w, r] = range_of(contacts.type[w, r], wp.float64(contacts.force[w, r]), wp.float64(own.loss[w, r]))
+    if s.done[w] != 0:
+        return
+    dt = wp.float64(timestep[w % timestep.shape[0]])
+    accelerate(own, contacts, frames, s, w, nefc, smooth)
+    gain(own, s, w, dt)
+    nv = s.stiff.shape[1]
+    n = 3 * patches.count
+    for i in range(nv):
+        s.acceleration[w, i] = s.answers[w, i, n]
+    for c in range(n):
+        v = wp.float64(0.0)
+        for i in range(nv):
+            v += wp.float64(frames.jacobian[w, c, i]) * (wp.float64(qvel[w, i]) + dt * s.gains[w, i, n])
+        out.twist[w, c / 3, c % 3] = float(v)
+        for e in range(n):
+            total = wp.float64(0.0)
+            for i in range(nv):
+                total += wp.float64(frames.jacobian[w, c, i]) * s.gains[w, i, e]
+            out.response[w, c, e] = float(dt * total)
+    for p in range(patches.count):
+        load = wp.float64(0.0)
+        moments = wp.vec2()
+        for e in range(n):
+            out.load_response[w, p, e] = 0.0
+        for r in range(nefc):
+            if frames.owner[w, r] == p and s.active[w, r] == 1:
+                weight = wp.float64(own.stiffness[w, r])
+                force = -weight * gap_of(own, s.acceleration, w, r)
+                load += force
+                moments += float(force) * frames.lever[w, r]
+                for e in range(n):
+                    total = wp.float64(0.0)
+                    for i in range(count_of(own, w, r, nv)):
+                        total += number_of(own, w, r, i) * s.answers[w, column_of(own, w, r, i), e]
+                    out.load_response[w, p, e] = out.load_response[w, p, e] - float(weight * total)
+        out.load[w, p] = wp.max(float(load), 0.0)
+        if first_pass != 0:
+            s.pressed[w, p] = patches.point[p]
+            if patches.follows[p] != 0 and load > wp.float64(0.0):
+                s.pressed[w, p] = moments / float(load)
+        centre = s.pressed[w, p]
+        out.moments[w, p, 0] = centre[1] * out.load[w, p]
+        out.moments[w, p, 1] = -centre[0] * out.load[w, p]
+
+
+@wp.kernel(enable_backward=False)
+def settle(
+    contacts: Contacts,
+    own: Dynamics,
+    frames: Frames,
+    s: Scratch,
+    problem: Problem,
+    wrench: wp.array3d(dtype=float),
+    rounds: wp.array(dtype=int),
+    timestep: wp.array(dtype=float),
+):
+    """Find the acceleration under the wrenches; a world is done if no constraint leaves its range by it."""
+    w = wp.tid()
+    if s.done[w] != 0:
+        return
+    s.passes[w] = s.passes[w] + 1
+    s.rounds[w] = s.rounds[w] + rounds[w]
+    last = s.answers.shape[2] - 1
+    for i in range(s.answers.shape[1]):
+        total = s.answers[w, i, last]
+        for c in range(last):
+            change = wrench[w, c / 3, c % 3] - problem.guess[w, c / 3, c % 3]
+            total += s.answers[w, i, c] * wp.float64(change)
+        s.acceleration[w, i] = total
+    s.done[w] = 1
+    dt = wp.float64(timestep[w % timestep.shape[0]])
+    for r in range(wp.min(contacts.nefc[w], frames.owner.shape[1])):
+        gap = gap_of(own, s.acceleration, w, r)
+        loss = wp.float64(own.loss[w, r])
+        weight = wp.float64(own.stiffness[w, r])
+        now = range_of(contacts.type[w, r], -weight * gap, loss)
+        if now != s.active[w, r]:
+            s.active[w, r] = now
+            if dt * wp.abs(wp.abs(gap) - loss / weight) > wp.float64(SLACK):
+                s.done[w] = 0
+
+
+@wp.kernel(enable_backward=False)
+def remember(
+    patches: Patches,
+    at: Places,
+    frames: Frames,
+    s: Scratch,
+    problem: Problem,
+    state: wp.array2d(dtype=float),
+    wrench: wp.array3d(dtype=float),
+    twist: wp.array3d(dtype=float),
+    load: wp.array2d(dtype=float),
+    residual: wp.array(dtype=float),
+    converged: wp.array(dtype=int),
+    memory: wp.array2d(dtype=float),
+    passive: wp.array2d(dtype=float),
+    warmstart: wp.array2d(dtype=float),
+):
+    """Write the result of the step into the memory, the passive forces and the start of the solver."""
+    w = wp.tid()
+    touches = float(0.0)
+    if s.passes[w] > 0:
+        touches = 1.0
+    for i in range(patches.states):
+        memory[w, at.after + i] = 0.0
+        if touches > 0.0:
+            memory[w, at.after + i] = state[w, i]
+    for p in range(patches.count):
+        memory[w, at.load + p] = 0.0
+        if touches > 0.0:
+            memory[w, at.load + p] = load[w, p]
+        for i in range(3):
+            place = 3 * p + i
+            memory[w, at.centre + place] = frames.centre[w, p][i]
+            memory[w, at.wrench + place] = 0.0
+            memory[w, at.twist + place] = 0.0
+            if touches > 0.0:
+                memory[w, at.wrench + place] = wrench[w, p, i]
+                memory[w, at.twist + place] = twist[w, p, i]
+                change = wrench[w, p, i] - problem.guess[w, p, i]
+                for j in range(passive.shape[1]):
+                    passive[w, j] = passive[w, j] + frames.jacobian[w, place, j] * change
+    if touches > 0.0:
+        for j in range(passive.shape[1]):
+            warmstart[w, j] = float(s.acceleration[w, j])
+    memory[w, at.iterations] = float(s.rounds[w])
+    memory[w, at.passes] = float(s.passes[w])
+    memory[w, at.residual] = wp.where(touches > 0.0, residual[w], 0.0)
+    memory[w, at.converged] = wp.where(touches > 0.0, float(converged[w]), 1.0)
