@@ -147,7 +147,7 @@ def problem(worlds=3):
         normal_force=np.tile([1.0, 2.0], (worlds, 1)),
         wrench=np.zeros((worlds, 2, 3)),
         twist_response=np.tile(1e-3 * np.diag([1.0, 1.0, 1e4] * 2), (worlds, 1, 1)),
-        load_response=np.tile([[0.1, 0.0, 20.0, 0.0, 0.2, -10.0], [-0.1, 0.0, 10.0, 0.0, 0.2, 30.0]], (worlds, 1, 1)),
+        load_response=np.tile([[0.05, 0.0, 3.0, 0.0, 0.02, -2.0], [-0.05, 0.0, 2.0, 0.0, 0.02, 5.0]], (worlds, 1, 1)),
     )
     return np.zeros((worlds, *PATCHES.state_shape)), host
 

@@ -146,13 +146,19 @@ class Friction:
     # ------------------------------------------------------------------ steps
 
     def step(self) -> None:
-        """Take a step of all environments with patch friction, instead of `mujoco_warp.step`."""
+        """Take a step of all environments with patch friction, instead of `mujoco_warp.step`.
+
+        Raises InvalidValueError if `model` or `data` have been replaced.
+        """
         with self.install():
             mjw.step(self.model, self.data)
 
     @contextmanager
     def install(self) -> Iterator[Friction]:
-        """Add friction to `mujoco_warp.step` of the model within a `with` block, after a control callback, if any."""
+        """Add friction to `mujoco_warp.step` of the model within a `with` block, after a control callback, if any.
+
+        Raises InvalidValueError, in a step, for data of another model or made elsewhere.
+        """
         callbacks = self.model.callback
         before = callbacks.control
 
@@ -168,7 +174,10 @@ class Friction:
             callbacks.control = before
 
     def plan(self, m: Any, d: Any) -> None:
-        """Add friction to the passive forces for the step from where the data are (a control callback)."""
+        """Add friction to the passive forces for the step from where the data are (a control callback).
+
+        Raises InvalidValueError for another model and other data than `model` and `data`.
+        """
         own, dt = self._bound(m, d), m.opt.timestep
         worlds, patches, frames, scratch, problem = d.nworld, self._patches, self._frames, self._scratch, self._problem
         contacts, results = own["contacts"], self._results
