@@ -12,6 +12,7 @@ GROUP = "planarfriction.commands"
 OWN = {
     "bench": "planarfriction_studies.commands.definitions:bench",
     "measured": "planarfriction_studies.commands.definitions:measured",
+    "referee": "planarfriction_studies.commands.referee:referee",
     "reproduce": "planarfriction_studies.commands.definitions:reproduce",
     "simulators": "planarfriction_studies.commands.definitions:simulators",
     "explore": "planarfriction_explorer.command:explore",

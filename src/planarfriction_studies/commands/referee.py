@@ -1,0 +1,148 @@
+"""The command `referee`; it loads what it needs when it runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from planarfriction.cli.options import FILE
+
+
+@click.group(
+    invoke_without_command=True,
+    short_help="Judge the friction of simulators by exact cases.",
+    help="""Judge the contact friction of simulators by cases with exact truths: closed forms, or exact motions.
+
+    Every engine that is installed runs every case at its defaults and at good settings, this library's adapters among
+    them. Marks: ok within what is allowed, off up to ten times that, fails beyond it; - without words for the case.
+
+    \b
+    Examples:
+      planarfriction referee
+      planarfriction referee --quick
+      planarfriction referee --engine MuJoCo --case stop --step 0.005
+      planarfriction referee --json referee.json --out referee/
+      planarfriction referee export cases/
+    """,
+)
+@click.option(
+    "--engine",
+    "engines",
+    metavar="NAME",
+    multiple=True,
+    help="Only this engine, or all whose names begin so; may be repeated.",
+)
+@click.option("--case", "cases", metavar="NAME", multiple=True, help="Only this case, or a TOML file; may be repeated.")
+@click.option("--step", type=float, help="Time step in s. Default: those of each case.")
+@click.option("--quick", is_flag=True, help="The first two engines.")
+@click.option("--list", "list_only", is_flag=True, help="List cases and engines.")
+@click.option("--json", "file", type=FILE, help="File for a JSON list of case, engine, error, allowed, cost and more.")
+@click.option("--out", "folder", type=FILE, help="Folder for referee.json and referee.html, with a picture per case.")
+@click.pass_context
+def referee(
+    context: click.Context,
+    engines: tuple[str, ...],
+    cases: tuple[str, ...],
+    step: float | None,
+    quick: bool,
+    list_only: bool,
+    file: Path | None,
+    folder: Path | None,
+) -> int:
+    """Judge (the help above is what users see). An interrupt keeps what is done."""
+    if context.invoked_subcommand is not None:
+        return 0
+    from planarfriction import validation
+    from planarfriction.cli import INTERRUPTED
+    from planarfriction.cli.console import note, print_table, work_progress
+    from planarfriction.writing import check_writable, make_folder
+    from planarfriction_studies.referee import report
+    from planarfriction_studies.referee.run import Verdict, run
+
+    chosen = _cases(cases)
+    left_out: list[str] = []
+    found = _engines(engines, left_out)[: 2 if quick else None]
+    if list_only:
+        print_table("Cases", ["name", "description"], [[each.name, each.title] for each in chosen.values()])
+        print_table("Engines", ["name", "settings"], [[each.name, each.settings] for each in found])
+        return 0
+    steps = None if step is None else (validation.positive("--step", step),)
+    if file is not None:
+        check_writable(file)
+    if folder is not None:
+        make_folder(folder)
+    verdicts: list[Verdict] = []
+    code = 0
+    try:
+        with work_progress("referee") as progress:
+            run(chosen, found, verdicts, steps=steps, progress=progress)
+    except KeyboardInterrupt:
+        note(f"interrupted: {len(verdicts)} of {len(chosen) * len(found)} results are finished")
+        code = INTERRUPTED
+    print_table("Friction against the truth: error over what is allowed", *report.table(verdicts))
+    for text in left_out:
+        note(f"left out: {text}")
+    for path in report.write(verdicts, chosen, found, file, folder):
+        note(f"wrote {path}")
+    return code
+
+
+@referee.command(
+    short_help="Write all cases for other engines.",
+    help="""Write all cases to FOLDER, to be run without this library: for each its TOML, MJCF of its bodies, pairs and
+    friction, the forces on its bodies over time, and the truths with their errors, as CSV.
+
+    \b
+    Examples:
+      planarfriction referee export cases/
+    """,
+)
+@click.argument("folder", type=FILE)
+def export(folder: Path) -> int:
+    """Export (the help above is what users see)."""
+    from planarfriction.cli.console import note
+    from planarfriction.writing import make_folder
+    from planarfriction_studies.referee.case import all_cases
+    from planarfriction_studies.referee.export import export_case
+
+    make_folder(folder)
+    for case in all_cases().values():
+        export_case(case, folder)
+    note(f"wrote {folder}")
+    return 0
+
+
+def _cases(names: tuple[str, ...]) -> dict[str, Any]:
+    """Return the cases that are asked for: by name, or from a file."""
+    from planarfriction import validation
+    from planarfriction_studies.referee.case import all_cases, read_case
+
+    own = all_cases()
+    if not names:
+        return own
+    found = [
+        read_case(Path(name)) if name.endswith(".toml") else own[validation.choice("--case", name, own)]
+        for name in names
+    ]
+    return {case.name: case for case in found}
+
+
+def _engines(names: tuple[str, ...], left_out: list[str]) -> list[Any]:
+    """Return the engines that are asked for."""
+    from planarfriction.errors import InvalidValueError
+    from planarfriction_studies.referee.engines import installed
+
+    found = list(installed(left_out))
+    for name in names:
+        if not any(engine.name.lower().startswith(name.lower()) for engine in found):
+            rule = f"begin the name of an engine that is installed: {'; '.join(engine.name for engine in found)}"
+            raise InvalidValueError("--engine", rule, name)
+    exact = {name.lower() for name in names} & {each.name.lower() for each in found}
+
+    def asked(engine: Any) -> bool:
+        name = engine.name.lower()
+        return name in exact or any(name.startswith(each.lower()) for each in names if each.lower() not in exact)
+
+    return [each for each in found if not names or asked(each)]

@@ -1,0 +1,110 @@
+"""Runs of cases in engines: errors, and times of a step."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from planarfriction_studies.referee.case import QUANTITIES, Case, Path3
+from planarfriction_studies.referee.engines import Engine, World
+
+MARKS = {"ok": "within what is allowed", "off": "up to ten times that", "fails": "beyond, or no result"}
+
+_FAILS = 10.0
+"""Error over what is allowed from which a result has nothing to do with the truth."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Judgement of an engine in a case: the worst of its quantities and time steps."""
+
+    case: str
+    engine: str
+    mark: str
+    """ok, off, fails, or - where the engine has no words for the case."""
+    error: float | None
+    """Error of the worst quantity, in its unit."""
+    allowed: float
+    """Largest error that passes, in the same unit."""
+    unit: str
+    quantity: str
+    """The worst quantity and its body."""
+    dt: float
+    """Time step of the worst one [s]."""
+    cost: float | None
+    """Median processor time of a step of the engine [s]."""
+    reason: str = ""
+    """Reason of no result."""
+
+
+def trace(case: Case, world: World, dt: float) -> tuple[Path3, float]:
+    """Run a case; return the path of its bodies and the median time of a step [s]."""
+    for _ in range(round(case.settle / dt)):
+        world.step(case.wrenches(None, *world.poses()))
+    for i, body in enumerate(case.moving):
+        if any(body.velocity):
+            world.throw(i, np.array(body.velocity))
+    steps = round(case.time / dt)
+    poses, costs = [world.poses()], []
+    for i in range(steps):
+        wrenches = case.wrenches((i + 0.5) * dt, *poses[-1])
+        start = time.process_time()
+        world.step(wrenches)
+        costs.append(time.process_time() - start)
+        poses.append(world.poses())
+    positions, rotations = (np.array(each) for each in zip(*poses, strict=True))
+    turns = np.unwrap(np.arctan2(rotations[..., 1, 0], rotations[..., 0, 0]), axis=0)
+    return Path3(dt * np.arange(steps + 1), positions, turns), float(np.median(costs))
+
+
+def judge(case: Case, engine: Engine, steps: Sequence[float] | None = None) -> Verdict:
+    """Run a case in an engine with its time steps, or with others [s], and judge its worst quantity."""
+    if reason := engine.cannot(case):
+        truth = case.truths[0]
+        return Verdict(
+            case.name, engine.name, "-", None, truth.allowed, QUANTITIES[truth.quantity], "", 0.0, None, reason
+        )
+    verdicts = [_judge(case, engine, dt) for dt in steps or case.steps]
+    return max(verdicts, key=lambda each: np.inf if each.error is None else each.error / each.allowed)
+
+
+def _judge(case: Case, engine: Engine, dt: float) -> Verdict:
+    def verdict(mark: str, error: float | None, truth: Any, cost: float | None, reason: str = "") -> Verdict:
+        what = f"{truth.quantity} of {truth.body}"
+        unit = QUANTITIES[truth.quantity]
+        return Verdict(case.name, engine.name, mark, error, truth.allowed, unit, what, dt, cost, reason)
+
+    try:
+        path, cost = trace(case, engine.build(case, dt), dt)
+    except Exception as error:  # an engine may raise anything
+        return verdict("fails", None, case.truths[0], None, " ".join(f"{type(error).__name__}: {error}".split())[:200])
+    if not (np.isfinite(path.positions).all() and np.isfinite(path.turns).all()):
+        return verdict("fails", None, case.truths[0], cost, "positions are not finite")
+    errors = [abs(case.measure(truth, path) - truth.value) for truth in case.truths]
+    error, truth = max(zip(errors, case.truths, strict=True), key=lambda pair: pair[0] / pair[1].allowed)
+    share = error / truth.allowed
+    return verdict("ok" if share <= 1.0 else "off" if share <= _FAILS else "fails", error, truth, cost)
+
+
+def run(
+    cases: Mapping[str, Case],
+    engines: Sequence[Engine],
+    verdicts: list[Verdict],
+    *,
+    steps: Sequence[float] | None = None,
+    progress: Callable[[str], None] = lambda words: None,
+) -> None:
+    """Judge all engines in all cases; verdicts are appended one by one, so that an interrupt keeps what is done."""
+    for engine in engines:
+        for case in cases.values():
+            progress(f"{engine.name}, {case.name}")
+            verdicts.append(judge(case, engine, steps))
+
+
+def to_rows(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
+    """Return verdicts as plain rows for JSON."""
+    return [asdict(each) for each in verdicts]

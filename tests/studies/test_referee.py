@@ -1,0 +1,365 @@
+"""The referee: its truths against a second way to each, its judgement of engines with known errors, and its files."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from planarfriction.cli import main
+from planarfriction.errors import FileError
+from planarfriction_studies.referee import truths
+from planarfriction_studies.referee.case import FOLDER, all_cases, read_case
+from planarfriction_studies.referee.export import export_case
+from planarfriction_studies.referee.run import judge, run
+
+CASES = all_cases()
+TRUTHS = {
+    f"{case.name} {truth.quantity} {truth.body}": truth
+    for case in CASES.values()
+    for truth in case.truths
+    if truth.source != "held"
+}
+G = 9.81
+
+
+# ---------------------------------------------------------------------- truths
+
+
+@pytest.mark.parametrize("name", [name for name, truth in TRUTHS.items() if truth.source != "slide"])
+def test_stated_values(name):
+    truth = TRUTHS[name]
+    assert abs(truths.value(truth.source, truth.given) - truth.value) <= truth.error
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name, truth in TRUTHS.items() if truth.source == "slide"])
+def test_stated_motions(name):
+    truth = TRUTHS[name]
+    assert abs(truths.value(truth.source, truth.given) - truth.value) <= truth.error
+
+
+@pytest.mark.slow
+def test_a_disc_is_a_patch():
+    """The general motion against the disc's closed form: both have errors of 1e-9."""
+    a = TRUTHS["disc x 10 rad/s"].given
+    x, y, turn = truths.end(a["mu"], 0.2, 1e-3, 3.0, twist=(a["speed"], 0.0, a["spin"]), disc=a["radius"])
+    assert (x, y) == pytest.approx((TRUTHS["disc x 10 rad/s"].value, 0.0), abs=1e-8)
+    assert turn == pytest.approx(TRUTHS["disc turn 10 rad/s"].value, abs=1e-8)
+
+
+def dry(pull, bears, speed=0.0, *, time, dt=5e-5):
+    """Path `[n, 2]` of time and displacement of a unit mass on dry friction, step by step."""
+    x, v, path = 0.0, speed, [(0.0, 0.0)]
+    for i in range(round(time / dt)):
+        t = (i + 0.5) * dt
+        u = v + dt * pull(t)
+        u = math.copysign(max(abs(u) - dt * bears(t, v), 0.0), u)
+        x, v = x + 0.5 * dt * (u + v), u
+        path.append(((i + 1) * dt, x))
+    return np.array(path)
+
+
+def passes(path, threshold):
+    return path[np.argmax(path[:, 1] > threshold), 0]
+
+
+def second(source, a):
+    """Compute a truth by small steps."""
+    if source == "slope":
+        across = a["mu"] * G * math.cos(a["tilt"])
+        return dry(lambda t: G * math.sin(a["tilt"]), lambda t, v: across, time=a["time"])[-1, 1]
+    if source == "stop":
+        way = dry(lambda t: 0.0, lambda t, v: a["mu"] * G, a["speed"], time=a["speed"] / (a["mu"] * G))[-1, 1]
+        return way * a.get("cosine", 1.0)
+    if source == "stribeck_stop":
+        curve = lambda t, v: G * (a["mu_c"] + (a["mu_s"] - a["mu_c"]) * math.exp(-((v / a["v_s"]) ** 2)))  # noqa: E731
+        return dry(lambda t: 0.0, curve, a["speed"], time=0.5)[-1, 1]
+    if source == "shaken":
+        pull = lambda t: a["amplitude"] * math.sin(2.0 * math.pi * a["frequency"] * t)  # noqa: E731
+        return dry(pull, lambda t, v: a["mu"] * G, time=a["time"])[-1, 1]
+    if source == "grip_slips":
+        load = lambda t, v: 2.0 * a["mu"] * max(a["load"] - a["rate"] * t, 0.0) / a["mass"]  # noqa: E731
+        return passes(dry(lambda t: G, load, time=1.5), a["threshold"])
+    if source == "pad_turns":
+        x = (np.arange(400) + 0.5) / 400 - 0.5
+        bears = 2.0 * a["mu"] * a["load"] * a["side"] * np.hypot(x, x[:, None]).mean() / a["inertia"]
+        return passes(dry(lambda t: a["rate"] * t / a["inertia"], lambda t, v: bears, time=1.5), a["threshold"])
+    assert source == "tower"
+    moving = (a["above"] + 1) * a["mass"]
+    return dry(lambda t: a["force"] / moving, lambda t, v: a["mu"] * G, time=a["time"])[-1, 1]
+
+
+@pytest.mark.parametrize("name", [name for name, truth in TRUTHS.items() if truth.source not in ("slide", "disc")])
+def test_small_steps_agree(name):
+    truth = TRUTHS[name]
+    assert second(truth.source, truth.given) == pytest.approx(truth.value, abs=5e-5)  # of a step of 50 us at 1 m/s
+
+
+def cells(a, count=30):
+    """Positions [n, 2] and shares of the load of small cells of a patch, with a linear pressure."""
+    x = (np.arange(count) + 0.5) / count - 0.5
+    unit = np.stack(np.meshgrid(x, x), axis=-1).reshape(-1, 2)
+    if a.get("radius"):
+        polar = np.stack(np.meshgrid(np.sqrt((np.arange(count) + 0.5) / count), 2.0 * math.pi * x), -1).reshape(-1, 2)
+        points = a["radius"] * polar[:, :1] * np.stack([np.cos(polar[:, 1]), np.sin(polar[:, 1])], axis=1)
+        return points, np.full(len(points), 1.0 / len(points))
+    parts = [(unit * r[2:] + r[:2], np.full(len(unit), r[2] * r[3])) for r in a["rectangles"]]
+    points, shares = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return points, shares / shares.sum()
+
+
+def moved(a):
+    """Compute where a patch ends by small steps and a sum over cells."""
+    (points, shares), dt = cells(a), a["time"] / 4000
+    centre = shares @ points
+    mu = np.broadcast_to(a["mu"], 2)
+    pose, twist = np.zeros(3), np.array(a.get("twist", (0.0, 0.0, 0.0)), dtype=float)
+    masses = np.array([a["mass"], a["mass"], a["inertia"]])
+    for _ in range(round(a["time"] / dt)):
+        c, s = math.cos(pose[2]), math.sin(pose[2])
+        arms = (points - centre) @ np.array([[c, s], [-s, c]])
+        velocities = twist[:2] + twist[2] * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
+        pulls = mu**2 * velocities
+        sizes = np.sqrt((mu**2 * velocities**2).sum(1, keepdims=True))
+        pulls = -pulls / np.maximum(sizes, 1e-6) * shares[:, None] * a["mass"] * G
+        push = np.array(a.get("push", (0.0, 0.0)))
+        arm = np.array([[c, -s], [s, c]]) @ (np.array(a.get("at", (0.0, 0.0))) - centre)
+        torque = (arms[:, 0] * pulls[:, 1] - arms[:, 1] * pulls[:, 0]).sum() + arm[0] * push[1] - arm[1] * push[0]
+        slower = twist + dt * np.array([*(pulls.sum(0) + push), torque]) / masses
+        if not push.any() and np.hypot(*twist[:2]) < 5e-3:  # the rest of the way is below 1e-5 m
+            break
+        pose, twist = pose + 0.5 * dt * (twist + slower), slower
+    c, s = math.cos(pose[2]) - 1.0, math.sin(pose[2])
+    x, y = pose[:2] - [c * centre[0] - s * centre[1], s * centre[0] + c * centre[1]]
+    return {"x": x, "y": y, "turn": pose[2], "distance": math.hypot(x, y), "angle": pose[2]}
+
+
+@pytest.mark.parametrize("name", ["line", "angle", "anisotropic", "push", "disc"])
+def test_sums_over_cells_agree(name):
+    case = CASES[name]
+    known = [truth for truth in case.truths if truth.body == case.truths[0].body]
+    a = dict(known[0].given)
+    if name == "disc":
+        a |= {"mass": 0.2, "inertia": 1e-3, "time": 1.2, "twist": (a["speed"], 0.0, a["spin"])}
+    found = moved(a)
+    for truth in known:  # a tenth of what is allowed: of the cells, the steps, and the last millimetre per second
+        assert abs(found[truth.given["what"]] - truth.value) < 0.1 * truth.allowed
+
+
+@pytest.mark.parametrize("name", ["off_centre", "capsule", "shaken_grip", "hold", "cycled_load"])
+def test_what_is_held_can_be_held(name):
+    """Shares of the largest force and torque sum to less than 1: the limit surface is convex."""
+    case = CASES[name]
+    middle, upright = np.zeros((len(case.moving), 3)), np.tile(np.eye(3), (len(case.moving), 1, 1))
+    names, worst = [body.name for body in case.moving], 0.0
+    for t in np.linspace(0.0, case.time, 301):
+        wrenches = dict(zip(names, case.wrenches(t, middle, upright), strict=True))
+        for contact in case.contacts:
+            body = next(case.shapes[each][0] for each in contact.pair if case.shapes[each][0].joint == "free")
+            force = wrenches[body.name][:3] + body.mass * np.array(case.gravity)
+            bears = contact.mu[0] * (-2.0 * wrenches["upper"][2] if "upper" in wrenches else -force[2])
+            at = (np.array(case.shapes[contact.pair[1]][0].position) + contact.at - body.position)[:2]
+            points, shares = cells({"rectangles": [[0.0, 0.0, *contact.patch]]})
+            torque = abs(at[0] * force[1] - at[1] * force[0]) / (shares @ np.hypot(*points.T))
+            worst = max(worst, (np.hypot(*force[:2]) + torque) / bears)
+    assert 0.05 < worst < 0.95
+
+
+# ---------------------------------------------------------------------- judgement
+
+
+@dataclass(frozen=True)
+class Fake:
+    """An engine that knows the truth of `stop`, and misses it by a share of what is allowed."""
+
+    share: float
+    name: str = "fake"
+    settings: str = "none"
+    package: str = "numpy"
+
+    def cannot(self, case):
+        return "nothing" if self.share < 0.0 else None
+
+    def build(self, case, dt):
+        if math.isinf(self.share):
+            raise RuntimeError("no\nsuch contact")
+        return FakeWorld(case, dt, self.share)
+
+
+class FakeWorld:
+    def __init__(self, case, dt, share):
+        self.case, self.steps, self.thrown = case, 0, {}
+        self.settle, self.count = round(case.settle / dt), round(case.time / dt)
+        self.ends = [truth.value + share * truth.allowed for truth in case.truths]
+
+    def step(self, wrenches):
+        assert wrenches.shape == (len(self.case.moving), 6)
+        self.steps += 1
+
+    def poses(self):
+        done = max(self.steps - self.settle, 0) / self.count
+        positions = np.array([[3.0 + done * end, 1.0, 0.0] for end in self.ends])
+        return positions, np.tile(np.eye(3), (len(positions), 1, 1))
+
+    def throw(self, body, velocity):
+        self.thrown[body] = velocity
+
+
+@pytest.mark.parametrize(
+    ("share", "mark"),
+    [
+        (0, "ok"),
+        (0.9, "ok"),
+        (1.1, "off"),
+        (9, "off"),
+        (11, "fails"),
+        (math.nan, "fails"),
+        (math.inf, "fails"),
+        (-1, "-"),
+    ],
+)
+def test_a_known_error_is_found(share, mark):
+    verdict = judge(CASES["stop"], Fake(share))
+    assert verdict.mark == mark
+    if math.isfinite(share) and share >= 0.0:
+        assert verdict.error / verdict.allowed == pytest.approx(share, abs=1e-9)
+        assert verdict.cost >= 0.0
+    else:
+        assert verdict.error is None and verdict.reason and "\n" not in verdict.reason
+
+
+def test_the_worst_time_step_counts():
+    class Coarse(Fake):
+        def build(self, case, dt):
+            return FakeWorld(case, dt, dt / 1e-3)
+
+    verdict = judge(CASES["stop"], Coarse(0.0), (1e-3, 4e-3, 2e-3))
+    assert verdict.dt == 4e-3 and verdict.error / verdict.allowed == pytest.approx(4.0)
+
+
+def test_what_is_done_is_kept():
+    def stop(words):
+        if len(verdicts) == 1:
+            raise KeyboardInterrupt
+
+    verdicts = []
+    with pytest.raises(KeyboardInterrupt):
+        run({"stop": CASES["stop"]}, [Fake(0.0), Fake(2.0)], verdicts, progress=stop)
+    assert [each.mark for each in verdicts] == ["ok"]
+
+
+def test_each_quantity():
+    case = CASES["disc"]
+    times = np.linspace(0.0, 1.0, 11)
+    places = np.zeros((11, 3, 3))
+    places[:, 0, 0], places[:, 0, 1] = 2.0 + times, 1.0 - 2.0 * times
+    turns = np.zeros((11, 3))
+    turns[:, 0] = 0.3 + 4.0 * times**2
+    from planarfriction_studies.referee.case import Path3
+
+    def of(quantity, threshold=0.0):
+        truth = replace(case.truths[0], quantity=quantity, threshold=threshold)
+        return case.measure(truth, Path3(times, places, turns))
+
+    assert [of("x"), of("y"), of("turn")] == pytest.approx([1.0, -2.0, 4.0])
+    assert [of("moved"), of("drift")] == pytest.approx([math.sqrt(5.0), math.sqrt(5.0)])
+    assert of("slips", 0.25 * math.sqrt(5.0)) == pytest.approx(0.25)
+    assert [of("turns", 1.0), of("turns", 9.0)] == pytest.approx([0.5, 1.0])
+
+
+# ---------------------------------------------------------------------- cases and files
+
+
+def test_cases_are_whole():
+    assert len(CASES) >= 14
+    for case in CASES.values():
+        assert case.title and case.about.strip() and case.why.strip() and case.truths
+        assert all(truth.allowed > 10.0 * truth.error for truth in case.truths)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('quantity = "x"', 'quantity = "z"', "'z' is not one of the quantities"),
+        ('body = "0.3 m/s"', 'body = "none"', "'none' is not one of the moving bodies"),
+        ('pair = ["floor", "0.3 m/s"]', 'pair = ["roof", "0.3 m/s"]', "'roof' is not one of the shapes"),
+        ("mass = 0.3", "weight = 0.3", "unexpected keyword argument 'weight'"),
+    ],
+)
+def test_a_mistake_is_one_line(tmp_path, old, new, words):
+    path = tmp_path / "mine.toml"
+    path.write_text((FOLDER / "stop.toml").read_text().replace(old, new))
+    with pytest.raises(FileError, match=words) as caught:
+        read_case(path)
+    assert "\n" not in str(caught.value)
+
+
+def rows_of(path):
+    return list(csv.DictReader(path.read_text().splitlines()))
+
+
+def test_export(tmp_path):
+    for name in ("push", "ramp"):
+        export_case(CASES[name], tmp_path)
+    rows = rows_of(tmp_path / "push-forces.csv")
+    assert {row["fx [N]"] for row in rows} == {"2.5"}
+    assert float(rows[0]["tz [N m]"]) == pytest.approx(-2.5 * 0.015)
+    inclines = {row["body"]: row for row in rows_of(tmp_path / "ramp-forces.csv")}
+    assert float(inclines["0.4 0.25"]["fx [N]"]) == pytest.approx(0.3 * G * math.sin(0.4))
+    truth = rows_of(tmp_path / "push-truth.csv")[0]
+    assert float(truth["value"]) == CASES["push"].truths[0].value
+    assert read_case(tmp_path / "push.toml") == CASES["push"]
+
+
+@pytest.mark.mujoco
+def test_exported_bodies_are_those_of_the_case(tmp_path):
+    mujoco = pytest.importorskip("mujoco")
+    case = CASES["angle"]
+    export_case(case, tmp_path)
+    m = mujoco.MjModel.from_xml_path(str(tmp_path / "angle.xml"))
+    body = m.body("foot")
+    assert body.mass[0] == case.moving[0].mass and np.allclose(body.ipos, case.moving[0].centre_of_mass)
+    assert np.allclose(sorted(body.inertia), sorted(case.moving[0].moments)) and m.npair == 2
+
+
+@pytest.mark.mujoco
+def test_mujoco(tmp_path, capsys):
+    pytest.importorskip("mujoco")
+    file, folder = tmp_path / "referee.json", tmp_path / "out"
+    names = ["stop", "heading", "off_middle"]
+    arguments = ["--engine", "MuJoCo", *(part for name in names for part in ("--case", name))]
+    assert main(["referee", *arguments, "--json", str(file), "--out", str(folder)]) == 0
+    rows = {row["case"]: row for row in json.loads(file.read_text())}
+    assert all(row.keys() >= {"case", "engine", "error", "allowed", "cost"} for row in rows.values())
+    # a pyramid knows directions, and the known fault shows as such
+    assert {name: rows[name]["mark"] for name in names} == {"stop": "ok", "heading": "fails", "off_middle": "ok"}
+    assert "fails" in capsys.readouterr().out
+    stored = json.loads((folder / "referee.json").read_text())
+    assert stored["settings"].keys() == {"MuJoCo"} and stored["versions"]["mujoco"]
+    page = (folder / "referee.html").read_text()
+    assert page.count("<h2 id=") == len(names) and (folder / "heading.svg").exists()
+
+
+@pytest.mark.parametrize("name", ["drake", "pybullet"])
+def test_other_engines_stop(name):
+    from planarfriction_studies.referee import engines
+
+    pytest.importorskip(engines.MODULES[name])
+    module = __import__(f"planarfriction_studies.referee.engines.{name}", fromlist=["ENGINES"])
+    assert [judge(CASES[case], module.ENGINES[0]).mark for case in ("stop", "stribeck")] == ["ok", "-"]
+
+
+@pytest.mark.slow
+@pytest.mark.mujoco
+def test_patches_pass():
+    pytest.importorskip("mujoco")
+    from planarfriction_studies.referee.engines.mujoco import ENGINES
+
+    patches = next(engine for engine in ENGINES if engine.name == "MuJoCo, patches")
+    marks = {name: judge(CASES[name], patches).mark for name in ("hold", "push", "line", "anisotropic", "stribeck")}
+    assert set(marks.values()) == {"ok"}, marks
