@@ -149,7 +149,9 @@ def test_bad_options(options, words, tmp_path):
 
 
 def test_models_without_source(tmp_path):
-    soft = pf.ReducedModel(pf.ContactPatch.disc(0.01, pressure=pf.SoftFinger(k=2.0, c=0.009, n=1.0 / 3.0)), LAW)
+    soft = pf.ReducedModel(
+        pf.ContactPatch.disc(0.01, pressure=pf.SoftFinger(k=2.0, c=0.009, n=1.0 / 3.0)), LAW, parts=1
+    )
     with pytest.raises(pf.FrictionError, match="model must have a patch whose shape does not depend on the load"):
         pf.export_c(soft, tmp_path)
     with pytest.raises(pf.FrictionError, match="model must be one of DistributedModel"):

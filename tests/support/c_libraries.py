@@ -27,6 +27,14 @@ MODELS = {
     "potential": lambda: pf.ReducedModelPublished(METRIC, LAW, surface=pf.LimitSurfaceTable(METRIC)),
     "ellipsoid": lambda: pf.ReducedModelPublished(DISC, LAW, surface=pf.LimitSurfaceEllipsoid(DISC)),
 }
+MAPS = {load: np.clip(np.add.outer(np.arange(-4, 5), load * np.arange(-4, 5)), 0.0, None) for load in (0.5, 1.0, 3.0)}
+FOLLOWING = {
+    "soft": lambda: pf.ReducedModel(
+        pf.ContactPatch.disc(0.01, pressure=pf.SoftFinger(k=2.0, c=0.009, n=1.0 / 3.0), cells=15), LAW
+    ),
+    "maps": lambda: pf.DistributedModel(pf.ContactPatch.from_pressure(MAPS, cell_size=1e-3), LAW),
+}
+"""Models whose shape follows the load."""
 REDUCED = [name for name in MODELS if name != "distributed"]
 KINDS = {"double": np.float64, "float": np.float32}
 STRICT = "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror"
@@ -76,7 +84,7 @@ def _folder() -> tempfile.TemporaryDirectory:
 @functools.cache
 def library(name: str, precision: str = "double", *options: str) -> Library:
     """Compile the model called `name` once, without a warning, and load it."""
-    model = MODELS[name]()
+    model = (MODELS | FOLLOWING)[name]()
     folder = Path(_folder().name) / "-".join([name, precision, *options])
     pf.export_c(model, folder, precision=precision)
     (folder / "driver.c").write_text(DRIVER)

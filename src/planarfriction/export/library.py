@@ -67,7 +67,7 @@ def export_c(model: Any, folder: Any, *, name: str = "friction", precision: str 
         raise InvalidValueError("name", f"be a C identifier of at most {LONGEST_NAME} characters", name)
     validation.choice("precision", precision, PRECISIONS)
     folder = validation.path("folder", folder)
-    texts = _texts(model, pieces_of(model), name, precision)
+    texts = _texts(model, pieces_of(model, fixed=False), name, precision)
     writing.make_folder(folder)
     files = tuple(folder / f"{name}{end}" for end in FILES.values())
     with contextlib.ExitStack() as stack:  # all can be written, or none is
@@ -89,7 +89,8 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str) -> list[str]:
     step = functions["step"].splitlines()
     vector = Writer(precision, own=precision == "double")
     places = [f"next[{first} + {i * pieces.stride}]" for i in range(pieces.states)]
-    passes = passes_of(vector, pieces.step, pieces.count, places)
+    share = "(at->low[k] + at->part * (at->high[k] - at->low[k]))" if pieces.rungs else "share[k]"
+    passes = passes_of(vector, pieces.step, pieces.count, places, share)
     own = {each: "\n".join(of_compiled(getattr(compiled_math, each))) for each in ("exp", "sin")}
     own = {each: lines for each, lines in own.items() if passes and f"{each}_of(" in "".join(passes.each)}
     values = functions | {
@@ -112,8 +113,9 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str) -> list[str]:
         "one": writer.constant(1.0),
         "slip": None if slip is None else _search(writer, slip),
         "passes": passes,
+        "share": share,
         "own": own,
-        "samples": samples_of(model, slip, writer),
+        "samples": samples_of(model, slip, writer, pieces.tables.get("rungs")),
         "operations": pieces.count * sum("=" in line for line in step),
         "functions": pieces.count * sum(any(f"{each}{writer.suffix}(" in line for each in _SLOW) for line in step),
     }
@@ -152,7 +154,7 @@ def _tables(
     return {
         table: ("int", list(map(str, numbers))) if numbers.dtype.kind == "i" else _table(writer, numbers)
         for table, numbers in tables.items()
-        if functions is None or table == "share" or any(f"{table}[" in each for each in functions.values())
+        if functions is None or table in ("share", "rungs") or any(f"{table}[" in each for each in functions.values())
     }
 
 

@@ -33,8 +33,11 @@ class Passes(NamedTuple):
     """Lines of each pass, of cell `k` in row `i` of the block; the last leaves the wrench in `row[0]` to `row[2]`."""
 
 
-def passes_of(writer: Writer, block: Block, count: int, places: Sequence[str]) -> Passes | None:
-    """Split the step of a cell, whose new state goes to `places`; None for one that has branches."""
+def passes_of(writer: Writer, block: Block, count: int, places: Sequence[str], share: str) -> Passes | None:
+    """Split the step of a cell, whose new state goes to `places`; None for one that has branches.
+
+    `share` is its share of the load.
+    """
     if any(isinstance(each, Branch) for each in block.operations):
         return None
     used = used_by(block)
@@ -61,7 +64,7 @@ def passes_of(writer: Writer, block: Block, count: int, places: Sequence[str]) -
         if last == len(own):
             results = [writer.atom(each) for each in block.results]
             lines += [f"    {place} = {result};" for place, result in zip(places, results, strict=False)]
-            lines += [f"    row[{j}][i] = share[k] * {result};" for j, result in enumerate(results[len(places) :])]
+            lines += [f"    row[{j}][i] = {share} * {result};" for j, result in enumerate(results[len(places) :])]
         texts.append("\n".join(f"    {line}" for line in lines))
     cells = min(count, CELLS)
     return Passes(cells, -(-count // cells), rows, "\n".join(shared), texts)

@@ -9,6 +9,7 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction.errors import InvalidValueError
+from planarfriction.export.loads import ladder_of
 from planarfriction.export.trace import Block, Mathematics, Number, Table, Trace, traced
 from planarfriction.export.twins import twin
 from planarfriction.formulas import LawNumbers
@@ -45,19 +46,21 @@ class Pieces(NamedTuple):
     """Wrench of steady sliding per unit load."""
     slopes: Callable[[], Block]
     """Trace new states, wrench and derivatives by states, twist and parameters: rows of the wrench, then of states."""
+    rungs: int = 0
+    """Number of loads, the table `rungs`, that `share` [rungs, count] is for; 0 for a fixed shape."""
 
 
-def pieces_of(model: Any) -> Pieces:
-    """Take a model apart.
+def pieces_of(model: Any, *, fixed: bool = True) -> Pieces:
+    """Take a model apart; only one of a `fixed` shape, or also cells whose pressure follows the load.
 
-    Raises InvalidValueError for models without straight-line source: laws of the user's own, patches whose shape
+    Raises InvalidValueError for models without straight-line source: laws of the user's own, other patches whose shape
     depends on the load, friction that differs from cell to cell in other ways than by a metric.
     """
     whole = model.reduction if isinstance(model, ReducedModel) else model
     for kind, taken_apart in _KINDS.items():
         if type(whole) is kind and isinstance(getattr(model.law, "numbers", None), LawNumbers):
-            if whole.patch.depends_on_load:
-                rule = "have a patch whose shape does not depend on the load"
+            if whole.patch.depends_on_load and (fixed or kind is not DistributedModel):
+                rule = "have a patch whose shape does not depend on the load" + ("" if fixed else ", or cells")
                 raise InvalidValueError("model", rule, model.patch.name or "a patch that does")
             return taken_apart(whole)
     names = ", ".join(kind.__name__ for kind in (*_KINDS, ReducedModel))
@@ -123,8 +126,14 @@ def _distributed(model: DistributedModel) -> Pieces:
         rows = tuple((by_z, lever.wrench(own, by_u), *(by_law[i] for i in kept)) for by_z, by_u, *by_law in bars)
         return new, lever.wrench(own, traction), rows
 
-    tables = {**dict(zip(names, numbers, strict=False)), "share": model.patch.weights()}
-    return Pieces(n, 2, n, 1, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes))
+    tables, rungs = dict(zip(names, numbers, strict=False)), 0
+    if model.patch.depends_on_load:
+        ladder = ladder_of(model.patch)
+        tables |= {"share": ladder.shares, "rungs": ladder.rungs}
+        rungs = len(ladder.rungs)
+    else:
+        tables["share"] = model.patch.weights()
+    return Pieces(n, 2, n, 1, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes), rungs)
 
 
 def _of_three_states(
@@ -202,7 +211,7 @@ def _moments(model: MomentModel) -> Pieces:
         else:
             data = Table(trace, "map", None, Number(trace, "first[k]", "index"))
             factor = [Number(trace, f"factor[6 * k + {i}]") for i in range(6)]
-        return ReducedContact(_law(trace, law), ReducedPatch(*factor, 0.0), data, 0)
+        return ReducedContact(_law(trace, law), ReducedPatch._make([*factor, 0.0]), data, 0)
 
     tables = {"share": np.array([part.share for part in parts]), "map": np.concatenate(maps)}
     if len(maps) > 1:

@@ -30,8 +30,11 @@ class Samples(NamedTuple):
     tolerance: str
 
 
-def samples_of(model: Any, slip: Slip | None, writer: Writer, count: int = 32) -> Samples:
-    """Step a model from rest through random twists, loads and periods, from sticking to sliding."""
+def samples_of(model: Any, slip: Slip | None, writer: Writer, rungs: Any = None, count: int = 32) -> Samples:
+    """Step a model from rest through random twists, loads and periods, from sticking to sliding.
+
+    Loads are the `rungs` between which shapes are interpolated, if there are any.
+    """
     rng, kind = np.random.default_rng(0), KINDS[writer.suffix]
     lever = 1.0 if slip is None else slip.surface.contact_radius
     speeds = model.law.numbers.v_s * 10.0 ** rng.uniform(-3.0, 2.0, (count, 1))
@@ -39,6 +42,8 @@ def samples_of(model: Any, slip: Slip | None, writer: Writer, count: int = 32) -
         rng.normal(size=(count, 3)) * speeds / [1.0, 1.0, lever],
         10.0 ** rng.uniform([-1.0, -5.0], [1.0, -2.0], (count, 2)),
     ]).astype(kind).astype(float)  # fmt: skip
+    if rungs is not None:
+        rows[:, 3] = rng.choice(rungs[np.clip(np.searchsorted(rungs, [0.1, 10.0]), 0, len(rungs) - 1)], count)
     state, wrenches = model.rest(), []
     for row in rows:
         state, wrench = model.step(state, row[:3], row[3], row[4])

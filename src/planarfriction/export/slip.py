@@ -40,8 +40,8 @@ class Slip(NamedTuple):
 
 
 def slip_of(patch: ContactPatch, precision: str) -> Slip | None:
-    """Trace the search in the `LimitSurfaceTable` of a patch; None for a patch of one point, which has none."""
-    if not patch.contact_radius() > 0.0:
+    """Trace the search in the `LimitSurfaceTable` of a patch; None for patches of one point or of many shapes."""
+    if patch.depends_on_load or not patch.contact_radius() > 0.0:
         return None
     surface = LimitSurfaceTable(patch)
     _, size, data = surface.numbers

@@ -112,7 +112,7 @@ def _by_load(patch: ContactPatch, count: int) -> ContactPatch:
     """Return the few cells of a patch whose shape depends on the load."""
     if patch.cells <= count:
         return patch
-    mean = patch.weights(_loads_of_change(patch)).mean(axis=0)
+    mean = patch.weights(loads_of_change(patch)).mean(axis=0)
     problem = WeightProblem.of(patch.positions, mean, DEGREE)
     chosen = problem.solution(count, np.zeros(patch.cells, bool)) > 0.0
     metric = None if patch.metric is None else patch.metric.reshape(-1, 2, 2)[0]
@@ -122,7 +122,7 @@ def _by_load(patch: ContactPatch, count: int) -> ContactPatch:
     return ContactPatch(patch.positions[chosen], areas, law, None, patch.name, metric=metric, asymmetry=asymmetry)
 
 
-def _loads_of_change(patch: ContactPatch) -> np.ndarray:
+def loads_of_change(patch: ContactPatch) -> np.ndarray:
     """Return loads [N] from the lowest to the highest at which the shape changes, by equal changes of the shape."""
     moved = 0.5 * np.abs(np.diff(patch.weights(PROBED), axis=0)).sum(axis=1)
     changes = np.flatnonzero(moved > 0.0)
