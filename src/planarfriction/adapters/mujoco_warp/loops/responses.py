@@ -140,30 +140,35 @@ def write_inertia(own: Dynamics, numbers: wp.array2d(dtype=float), w: int, out: 
 
 @wp.func
 def solve(h: wp.array3d(dtype=wp.float64), w: int, x: wp.array3d(dtype=wp.float64)):
-    """Solve `h x' = x` for all columns in place, by Cholesky's factors; h is lost."""
+    """Solve `h x' = x` for all columns in place, by factors `L' L`; h is lost.
+
+    The last degrees of freedom come first: they are the leaves of trees, and zeros between branches stay.
+    """
     nv = h.shape[1]
     columns = x.shape[2]
-    for j in range(nv):
-        for i in range(j, nv):
-            s = h[w, i, j]
-            for n in range(j):
-                s -= h[w, i, n] * h[w, j, n]
-            if i == j:
-                h[w, j, j] = wp.sqrt(wp.max(s, wp.float64(1e-30)))
-            else:
-                h[w, i, j] = s / h[w, j, j]
-    for c in range(columns):
-        for i in range(nv):
-            s = x[w, i, c]
-            for n in range(i):
-                s -= h[w, i, n] * x[w, n, c]
-            x[w, i, c] = s / h[w, i, i]
-        for m in range(nv):
-            i = nv - 1 - m
-            s = x[w, i, c]
-            for n in range(i + 1, nv):
-                s -= h[w, n, i] * x[w, n, c]
-            x[w, i, c] = s / h[w, i, i]
+    zero = wp.float64(0.0)
+    for m in range(nv):
+        k = nv - 1 - m
+        root = wp.sqrt(wp.max(h[w, k, k], wp.float64(1e-30)))
+        h[w, k, k] = root
+        for c in range(columns):
+            x[w, k, c] = x[w, k, c] / root
+        for i in range(k):
+            share = h[w, k, i] / root
+            h[w, k, i] = share
+            if share != zero:
+                for j in range(i + 1):
+                    h[w, i, j] = h[w, i, j] - share * h[w, k, j]
+                for c in range(columns):
+                    x[w, i, c] = x[w, i, c] - share * x[w, k, c]
+    for k in range(nv):
+        for i in range(k):
+            share = h[w, k, i]
+            if share != zero:
+                for c in range(columns):
+                    x[w, k, c] = x[w, k, c] - share * x[w, i, c]
+        for c in range(columns):
+            x[w, k, c] = x[w, k, c] / h[w, k, k]
 
 
 @wp.func
@@ -193,7 +198,7 @@ def accelerate(
             i = column_of(own, w, r, n)
             one = number_of(own, w, r, n)
             s.answers[w, i, last] = s.answers[w, i, last] + one * pushed
-            if kind == 1:
+            if kind == 1 and one != wp.float64(0.0):
                 for m in range(count):
                     j = column_of(own, w, r, m)
                     s.stiff[w, i, j] = s.stiff[w, i, j] + weight * one * number_of(own, w, r, m)
@@ -260,14 +265,15 @@ def respond(
         s.acceleration[w, i] = s.answers[w, i, n]
     for c in range(n):
         v = wp.float64(0.0)
-        for i in range(nv):
-            v += wp.float64(frames.jacobian[w, c, i]) * (wp.float64(qvel[w, i]) + dt * s.gains[w, i, n])
-        out.twist[w, c / 3, c % 3] = float(v)
         for e in range(n):
-            total = wp.float64(0.0)
-            for i in range(nv):
-                total += wp.float64(frames.jacobian[w, c, i]) * s.gains[w, i, e]
-            out.response[w, c, e] = float(dt * total)
+            out.response[w, c, e] = 0.0
+        for i in range(nv):
+            share = wp.float64(frames.jacobian[w, c, i])
+            if share != wp.float64(0.0):
+                v += share * (wp.float64(qvel[w, i]) + dt * s.gains[w, i, n])
+                for e in range(n):
+                    out.response[w, c, e] = out.response[w, c, e] + float(dt * share * s.gains[w, i, e])
+        out.twist[w, c / 3, c % 3] = float(v)
     for p in range(patches.count):
         load = wp.float64(0.0)
         moments = wp.vec2()
@@ -279,11 +285,12 @@ def respond(
                 force = -weight * gap_of(own, s.acceleration, w, r)
                 load += force
                 moments += float(force) * frames.lever[w, r]
-                for e in range(n):
-                    total = wp.float64(0.0)
-                    for i in range(count_of(own, w, r, nv)):
-                        total += number_of(own, w, r, i) * s.answers[w, column_of(own, w, r, i), e]
-                    out.load_response[w, p, e] = out.load_response[w, p, e] - float(weight * total)
+                for i in range(count_of(own, w, r, nv)):
+                    share = weight * number_of(own, w, r, i)
+                    if share != wp.float64(0.0):
+                        j = column_of(own, w, r, i)
+                        for e in range(n):
+                            out.load_response[w, p, e] = out.load_response[w, p, e] - float(share * s.answers[w, j, e])
         out.load[w, p] = wp.max(float(load), 0.0)
         if first_pass != 0:
             s.pressed[w, p] = patches.point[p]
