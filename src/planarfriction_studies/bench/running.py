@@ -13,7 +13,15 @@ from planarfriction import validation
 from planarfriction.errors import MissingExtraError
 from planarfriction.limit_surface import LimitSurfaceExact, LimitSurfaceTable
 from planarfriction.models import ReducedModel, ReducedModelPublished
-from planarfriction_studies.bench import exported, gradients, simulator_costs, steps, whole_runs, workflows
+from planarfriction_studies.bench import (
+    exported,
+    gradients,
+    mujoco_scenes,
+    simulator_costs,
+    steps,
+    whole_runs,
+    workflows,
+)
 from planarfriction_studies.bench.measurement import Measurement
 
 BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
@@ -41,6 +49,7 @@ BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
     "step.reduced.four": steps.reduced_four,
     "warp.step.reduced": partial(steps.warp_step, kind=ReducedModel),
     "warp.step.published": partial(steps.warp_step, kind=ReducedModelPublished),
+    "warp.coupled": steps.warp_coupled,
     **{f"export.step.{kind}": partial(exported.step, kind=kind) for kind in exported.MODELS},
     "export.step.reduced.vector": partial(exported.step, kind="reduced", vector=True),
     **{f"export.step.{kind}.instructions": partial(exported.instructions, kind=kind) for kind in exported.MODELS},
@@ -53,6 +62,8 @@ BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
     "mujoco.grip": simulator_costs.mujoco_grip,
     "mujoco.rollout": simulator_costs.mujoco_rollout,
     "mjx.discs": simulator_costs.mjx_discs,
+    "mujoco_warp.disc": partial(simulator_costs.mujoco_warp, scene=mujoco_scenes.disc(1.0, 10.0)),
+    "mujoco_warp.grip": partial(simulator_costs.mujoco_warp, scene=mujoco_scenes.grip()),
     "drake.disc.point": partial(simulator_costs.drake_disc, contact="point"),
     "drake.disc.hydroelastic": partial(simulator_costs.drake_disc, contact="hydroelastic"),
     "gradient.published": gradients.published,

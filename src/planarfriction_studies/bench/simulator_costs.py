@@ -137,6 +137,45 @@ def mjx_discs(full: bool) -> Measurement:
     return line(value, "us per step", words, theirs)
 
 
+WORLDS, NJMAX = 64, 200
+"""Worlds of MuJoCo Warp, and the room for the constraints of each."""
+
+
+def mujoco_warp(full: bool, scene: MujocoScene) -> Measurement:
+    """Measure a step of one of `WORLDS` in MuJoCo Warp on Warp's CPU device, with patch friction and with its own.
+
+    In turns, after steps in which contacts settle. Raises `MissingExtraError` without MuJoCo Warp.
+    """
+    from planarfriction.adapters import mujoco_warp as adapter  # before anything else: its error names the extra
+
+    # isort: split
+    import mujoco
+    import mujoco_warp as mjw
+    import warp as wp
+
+    text = scene.text(Native(cone="pyramidal", impratio=1.0, condim=1), 2e-3, "Euler")
+    spec = mujoco.MjSpec.from_string(text)
+    patches = [adapter.PatchContact(scene.model, site=site, geoms=geoms) for site, geoms in scene.patches]
+    adapter.prepare(spec, patches)
+    m = spec.compile()
+    friction = adapter.Friction(m, patches, worlds=WORLDS, njmax=NJMAX)
+    own, d = scene.native(Native(cone="pyramidal", impratio=1.0))
+    model, data = mjw.put_model(own), mjw.put_data(own, d, nworld=WORLDS, njmax=NJMAX)
+    for each in (friction.data, data):
+        if m.nu:
+            each.ctrl.assign(np.tile(scene.control(0.0), (WORLDS, 1)).astype(np.float32))
+        if scene.start is not None:
+            each.qvel.assign(np.tile(scene.start, (WORLDS, 1)).astype(np.float32))
+    runs = friction.step, lambda: mjw.step(model, data)
+    for run in runs * 100:
+        run()
+    wp.synchronize()
+    times = np.array([[once(run) for run in runs] for _ in range(STEPS)]) / WORLDS
+    value, theirs = (statistics.median(column) * 1e6 for column in times.T)
+    words = f"MuJoCo Warp's own friction, condim 4, pyramidal (patch friction costs {value / theirs:.2g} times as much)"
+    return line(value, "us per step", words, theirs)
+
+
 def _rolled(step: Callable[..., Any], m: Any, d: Any) -> Callable[[], None]:
     """Return a compiled roll-out of discs with different starts, whose contact has settled."""
     import jax

@@ -106,12 +106,17 @@ def coupled(full: bool, environments: int = 1) -> Measurement:
     return line(value * 1e6, "us per step", words, _python_step(model, 2000) * 1e6)
 
 
-def _four_feet(model: ReducedModel, environments: int, dt: float = 1e-3) -> Callable[[], CoupledStep]:
-    """Return an implicit step of boxes of 0.2 kg with random velocities, one per environment, from bristles at rest."""
+def _boxes(environments: int, dt: float) -> HostStep:
+    """Return a step of boxes of 0.2 kg on four feet with random velocities, one per environment."""
     rows = np.concatenate([[[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]] for x, y in FEET])
-    response, patches = dt * rows @ np.diag([5.0, 5.0, 5e3]) @ rows.T, CoupledPatches([model] * 4)
+    response = dt * rows @ np.diag([5.0, 5.0, 5e3]) @ rows.T
     velocity = np.random.default_rng(7).normal(size=(environments, 3)) * [0.05, 0.05, 0.5]
-    host = HostStep((velocity @ rows.T).reshape(-1, 4, 3), np.full(4, 0.5), np.zeros((4, 3)), response)
+    return HostStep((velocity @ rows.T).reshape(-1, 4, 3), np.full(4, 0.5), np.zeros((4, 3)), response)
+
+
+def _four_feet(model: ReducedModel, environments: int, dt: float = 1e-3) -> Callable[[], CoupledStep]:
+    """Return an implicit step of `_boxes` from bristles at rest."""
+    patches, host = CoupledPatches([model] * 4), _boxes(environments, dt)
     return lambda: patches.step(patches.rest(), host, dt)
 
 
@@ -192,3 +197,22 @@ def warp_step(full: bool, kind: type[ReducedModel] | type[ReducedModelPublished]
     theirs = median(lambda: model.step(rest, twists, 1.0, 1e-3), 9, 10)
     words = "the same in one call of the compiled step, on all processors"
     return line(ours / count * 1e6, "us", words, theirs / count * 1e6)
+
+
+def warp_coupled(full: bool) -> Measurement:
+    """Measure an implicit step of 1000 boxes on four feet in a kernel of Warp, single precision, on its CPU device.
+
+    Raises MissingExtraError without Warp.
+    """
+    front: Any = importlib.import_module("planarfriction.warp")
+    import warp as wp
+
+    count, dt, model = 1000, 1e-3, ReducedModel(disc(), law())
+    friction = front.CoupledPatches([model] * 4, worlds=count, device="cpu")
+    shapes = (count, 4, 3), (count, 4), (count, 4, 3), (count, 12, 12)
+    given = zip(_boxes(count, dt)[:4], shapes, strict=True)
+    arrays = [wp.array(np.broadcast_to(each, shape), dtype=wp.float32, device="cpu") for each, shape in given]
+    state, results, host = friction.rest(), friction.results(), HostStep(*arrays)
+    ours = median(lambda: friction.step(state, host, dt, results), 9) / count
+    theirs = median(_four_feet(model, count), 9) / count
+    return line(ours * 1e6, "us", "the same in one call of the compiled step, on all processors", theirs * 1e6)
