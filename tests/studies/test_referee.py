@@ -5,7 +5,10 @@ from __future__ import annotations
 import csv
 import json
 import math
+import os
+import runpy
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +18,7 @@ from planarfriction.errors import FileError
 from planarfriction_studies.referee import truths
 from planarfriction_studies.referee.case import FOLDER, all_cases, read_case
 from planarfriction_studies.referee.export import export_case
-from planarfriction_studies.referee.run import judge, run
+from planarfriction_studies.referee.run import Apart, judge, run
 
 CASES = all_cases()
 TRUTHS = {
@@ -233,6 +236,23 @@ def test_a_known_error_is_found(share, mark):
         assert verdict.error is None and verdict.reason and "\n" not in verdict.reason
 
 
+@dataclass(frozen=True)
+class Crashing(Fake):
+    """An engine that ends its process in one case."""
+
+    def build(self, case, dt):
+        if case.name == "disc":
+            os._exit(3)
+        return super().build(case, dt)
+
+
+def test_a_crash_is_one_failure():
+    verdicts = []
+    with Apart() as apart:
+        run({name: CASES[name] for name in ("disc", "stop")}, [Crashing(0.5)], verdicts, judged=apart.judge)
+    assert [(each.mark, each.reason) for each in verdicts] == [("fails", "the engine ended the process"), ("ok", "")]
+
+
 def test_the_worst_time_step_counts():
     class Coarse(Fake):
         def build(self, case, dt):
@@ -363,3 +383,14 @@ def test_patches_pass():
     patches = next(engine for engine in ENGINES if engine.name == "MuJoCo, patches")
     marks = {name: judge(CASES[name], patches).mark for name in ("hold", "push", "line", "anisotropic", "stribeck")}
     assert set(marks.values()) == {"ok"}, marks
+
+
+def test_the_page_shows_the_stored_run():
+    docs = Path(__file__).parents[2] / "docs"
+    if not docs.is_dir():
+        pytest.skip("no docs beside these tests")
+    maker = runpy.run_path(str(docs / "make_referee.py"))
+    stored, page = json.loads((docs / "referee.json").read_text()), (docs / "referee.md").read_text()
+    assert maker["filled"](page, stored) == page
+    assert {row["case"] for row in stored["verdicts"]} == set(CASES)
+    assert all(row["allowed"] in [truth.allowed for truth in CASES[row["case"]].truths] for row in stored["verdicts"])

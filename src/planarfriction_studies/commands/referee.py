@@ -59,7 +59,7 @@ def referee(
     from planarfriction.cli.console import note, print_table, work_progress
     from planarfriction.writing import check_writable, make_folder
     from planarfriction_studies.referee import report
-    from planarfriction_studies.referee.run import Verdict, run
+    from planarfriction_studies.referee.run import Apart, Verdict, run
 
     chosen = _cases(cases)
     left_out: list[str] = []
@@ -76,8 +76,8 @@ def referee(
     verdicts: list[Verdict] = []
     code = 0
     try:
-        with work_progress("referee") as progress:
-            run(chosen, found, verdicts, steps=steps, progress=progress)
+        with Apart() as apart, work_progress("referee") as progress:
+            run(chosen, found, verdicts, steps=steps, judged=apart.judge, progress=progress)
     except KeyboardInterrupt:
         note(f"interrupted: {len(verdicts)} of {len(chosen) * len(found)} results are finished")
         code = INTERRUPTED

@@ -38,7 +38,8 @@ def table(verdicts: Sequence[Verdict]) -> tuple[list[str], list[list[str]]]:
 def _cell(verdict: Verdict | None) -> str:
     if verdict is None or verdict.error is None:
         return "" if verdict is None else verdict.mark
-    return f"{verdict.mark} {verdict.error / verdict.allowed:.2g}"
+    share = verdict.error / verdict.allowed
+    return f"{verdict.mark} {share:{'.0f' if share >= 10.0 else '.2g'}}"
 
 
 def _cost(verdicts: Sequence[Verdict], engine: str) -> str:

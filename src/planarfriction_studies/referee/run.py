@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -64,30 +67,63 @@ def trace(case: Case, world: World, dt: float) -> tuple[Path3, float]:
 def judge(case: Case, engine: Engine, steps: Sequence[float] | None = None) -> Verdict:
     """Run a case in an engine with its time steps, or with others [s], and judge its worst quantity."""
     if reason := engine.cannot(case):
-        truth = case.truths[0]
-        return Verdict(
-            case.name, engine.name, "-", None, truth.allowed, QUANTITIES[truth.quantity], "", 0.0, None, reason
-        )
+        return no_result("-", case, engine, reason)
     verdicts = [_judge(case, engine, dt) for dt in steps or case.steps]
     return max(verdicts, key=lambda each: np.inf if each.error is None else each.error / each.allowed)
 
 
-def _judge(case: Case, engine: Engine, dt: float) -> Verdict:
-    def verdict(mark: str, error: float | None, truth: Any, cost: float | None, reason: str = "") -> Verdict:
-        what = f"{truth.quantity} of {truth.body}"
-        unit = QUANTITIES[truth.quantity]
-        return Verdict(case.name, engine.name, mark, error, truth.allowed, unit, what, dt, cost, reason)
+def no_result(mark: str, case: Case, engine: Engine, reason: str, dt: float = 0.0) -> Verdict:
+    """Return a verdict without numbers, for a reason in one line."""
+    truth, words = case.truths[0], " ".join(reason.split())[:200]
+    unit = QUANTITIES[truth.quantity]
+    return Verdict(case.name, engine.name, mark, None, truth.allowed, unit, "", dt, None, words)
 
+
+def _judge(case: Case, engine: Engine, dt: float) -> Verdict:
     try:
         path, cost = trace(case, engine.build(case, dt), dt)
     except Exception as error:  # an engine may raise anything
-        return verdict("fails", None, case.truths[0], None, " ".join(f"{type(error).__name__}: {error}".split())[:200])
+        return no_result("fails", case, engine, f"{type(error).__name__}: {error}", dt)
     if not (np.isfinite(path.positions).all() and np.isfinite(path.turns).all()):
-        return verdict("fails", None, case.truths[0], cost, "positions are not finite")
+        return no_result("fails", case, engine, "positions are not finite", dt)
     errors = [abs(case.measure(truth, path) - truth.value) for truth in case.truths]
     error, truth = max(zip(errors, case.truths, strict=True), key=lambda pair: pair[0] / pair[1].allowed)
     share = error / truth.allowed
-    return verdict("ok" if share <= 1.0 else "off" if share <= _FAILS else "fails", error, truth, cost)
+    mark = "ok" if share <= 1.0 else "off" if share <= _FAILS else "fails"
+    what, unit = f"{truth.quantity} of {truth.body}", QUANTITIES[truth.quantity]
+    return Verdict(case.name, engine.name, mark, error, truth.allowed, unit, what, dt, cost)
+
+
+class Apart:
+    """Process of its own for each engine, as a context: an engine that crashes fails in that case alone."""
+
+    def __init__(self) -> None:
+        self._pool: ProcessPoolExecutor | None = None
+        self._engine = ""
+
+    def __enter__(self) -> Apart:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._end()
+
+    def _end(self) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(wait=False, cancel_futures=True)
+            self._pool = None
+
+    def judge(self, case: Case, engine: Engine, steps: Sequence[float] | None = None) -> Verdict:
+        """Judge as the function `judge` does."""
+        if self._engine != engine.name:
+            self._end()
+        if self._pool is None:
+            self._pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
+            self._engine = engine.name
+        try:
+            return self._pool.submit(judge, case, engine, steps).result()
+        except BrokenProcessPool:
+            self._end()
+            return no_result("fails", case, engine, "the engine ended the process")
 
 
 def run(
@@ -96,13 +132,14 @@ def run(
     verdicts: list[Verdict],
     *,
     steps: Sequence[float] | None = None,
+    judged: Callable[..., Verdict] = judge,
     progress: Callable[[str], None] = lambda words: None,
 ) -> None:
     """Judge all engines in all cases; verdicts are appended one by one, so that an interrupt keeps what is done."""
     for engine in engines:
         for case in cases.values():
             progress(f"{engine.name}, {case.name}")
-            verdicts.append(judge(case, engine, steps))
+            verdicts.append(judged(case, engine, steps))
 
 
 def to_rows(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:

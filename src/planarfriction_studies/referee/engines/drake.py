@@ -23,6 +23,8 @@ class Drake:
     settings: str
     contact: str = "point"
     approximation: str = "lagged"
+    stiction: float = 1e-4
+    """Stiction tolerance [m/s]: speed below which Drake's own friction is less than Coulomb's."""
     kind: str | None = None
     """Model of patches."""
     package: str = "drake"
@@ -52,7 +54,7 @@ class DrakeWorld:
         builder = DiagramBuilder()
         config = MultibodyPlantConfig(
             time_step=dt, contact_model="hydroelastic_with_fallback",
-            discrete_contact_approximation=engine.approximation,
+            discrete_contact_approximation=engine.approximation, stiction_tolerance=engine.stiction,
         )  # fmt: skip
         self.plant, scene_graph = AddMultibodyPlant(config, builder)
         plant = self.plant
@@ -65,8 +67,8 @@ class DrakeWorld:
         for body in case.moving:
             if body.joint == "free":
                 plant.SetDefaultFloatingBaseBodyPose(plant.GetBodyByName(body.name), RigidTransform(body.position))
-        self.wrenches = builder.AddSystem(_wrenches(plant, case))
-        builder.Connect(self.wrenches.get_output_port(), plant.get_applied_spatial_force_input_port())
+        self.forces = builder.AddSystem(_forces(plant.num_velocities()))
+        builder.Connect(self.forces.get_output_port(), plant.get_applied_generalized_force_input_port())
         if engine.kind is not None:
             from planarfriction.adapters.drake import Friction, prepare
 
@@ -101,8 +103,17 @@ class DrakeWorld:
         ]
 
     def step(self, wrenches: np.ndarray) -> None:
-        """Make a step."""
-        self.wrenches.values = wrenches
+        """Make a step; forces on free bodies act at their origins, those on pads along their slides."""
+        values = np.zeros(len(self.forces.values))
+        for body, own, wrench in zip(self.case.moving, self.bodies, wrenches, strict=True):
+            if body.joint == "slide":
+                values[self.plant.GetJointByName(body.name).velocity_start()] = wrench[2]
+                continue
+            rotation = self.plant.EvalBodyPoseInWorld(self.context, own).rotation().matrix()
+            lever, at = rotation @ np.array(body.centre_of_mass), own.floating_velocities_start_in_v()
+            values[at : at + 3] = wrench[3:] + np.cross(lever, wrench[:3])
+            values[at + 3 : at + 6] = wrench[:3]
+        self.forces.values = values
         self.now += 1
         self.simulator.AdvanceTo(self.now * self.dt)
 
@@ -121,31 +132,18 @@ class DrakeWorld:
         self.plant.SetFreeBodySpatialVelocity(context=self.context, body=self.bodies[body], V_JpJc=own)
 
 
-def _wrenches(plant: Any, case: Case) -> Any:
-    """Return a system that applies its `values [bodies, 6]` at the centres of mass."""
-    from pydrake.common.value import Value
-    from pydrake.multibody.math import SpatialForce
-    from pydrake.multibody.plant import ExternallyAppliedSpatialForce
+def _forces(size: int) -> Any:
+    """Return a system that applies its `values [size]`: generalized forces."""
     from pydrake.systems.framework import LeafSystem
 
-    class Wrenches(LeafSystem):
+    class Forces(LeafSystem):
         def __init__(self) -> None:
             super().__init__()
-            self.values = np.zeros((len(case.moving), 6))
-            empty = Value([ExternallyAppliedSpatialForce()])
-            self.DeclareAbstractOutputPort("wrenches", lambda: empty, self._write, {self.time_ticket()})
+            self.values = np.zeros(size)
+            write = lambda _, output: output.SetFromVector(self.values)  # noqa: E731
+            self.DeclareVectorOutputPort("forces", size, write, {self.time_ticket()})
 
-        def _write(self, _: Any, output: Any) -> None:
-            result = []
-            for body, value in zip(case.moving, self.values, strict=True):
-                each = ExternallyAppliedSpatialForce()
-                each.body_index = plant.GetBodyByName(body.name).index()
-                each.p_BoBq_B = np.array(body.centre_of_mass)
-                each.F_Bq_W = SpatialForce(value[3:], value[:3])
-                result.append(each)
-            output.set_value(result)
-
-    return Wrenches()
+    return Forces()
 
 
 def _add(plant: Any, case: Case, body: Body, contact: str) -> None:
@@ -226,14 +224,18 @@ def _keep_apart(scene_graph: Any, case: Case) -> None:
     scene_graph.collision_filter_manager().Apply(apart)
 
 
+_FEET = "feet at the corners for point contact, 1e4 N/m"
+
 ENGINES = [
-    Drake("Drake", "as it comes: lagged (a convex approximation), feet at the corners for point contact, 1e4 N/m"),
-    Drake("Drake, SAP", "sap, feet at the corners for point contact, 1e4 N/m", approximation="sap"),
-    Drake("Drake, TAMSI", "tamsi, feet at the corners for point contact, 1e4 N/m", approximation="tamsi"),
-    Drake("Drake, surfaces", "lagged, hydroelastic surfaces, 1e6 Pa, resolution 20 mm", "hydroelastic"),
+    Drake("Drake", f"as it comes: lagged (a convex approximation), stiction tolerance 1e-4 m/s; {_FEET}"),
+    Drake("Drake, SAP", f"sap; {_FEET}", approximation="sap"),
+    Drake("Drake, TAMSI", f"tamsi, stiction tolerance 1e-6 m/s; {_FEET}", approximation="tamsi", stiction=1e-6),
     Drake(
-        "Drake, patches",
-        "planarfriction: ReducedModel, 21 cells across, feet at the corners (hydroelastic: L and capsule)",
+        "Drake, surfaces", "lagged, stiction tolerance 1e-6 m/s, hydroelastic surfaces of 1e6 Pa, resolution 20 mm",
+        "hydroelastic", stiction=1e-6,
+    ),
+    Drake(
+        "Drake, patches", f"planarfriction: ReducedModel, 21 cells across; {_FEET}; hydroelastic: L and capsule",
         kind="reduced",
     ),
-]
+]  # fmt: skip

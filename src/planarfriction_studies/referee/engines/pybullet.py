@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,14 +31,27 @@ class Bullet:
         return BulletWorld(case, dt, dict(self.parameters))
 
 
+class Client:
+    """Physics server of its own: the functions of PyBullet that act on it."""
+
+    def __init__(self) -> None:
+        import pybullet
+
+        self._module, self._number = pybullet, pybullet.connect(pybullet.DIRECT)
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self._module, name)
+        return functools.partial(found, physicsClientId=self._number) if callable(found) else found
+
+    def __del__(self) -> None:
+        self.disconnect()
+
+
 class BulletWorld:
     """A case in PyBullet; its poses are those of centres of mass."""
 
     def __init__(self, case: Case, dt: float, parameters: dict[str, Any]) -> None:
-        import pybullet
-        from pybullet_utils.bullet_client import BulletClient
-
-        self.case, self.client = case, BulletClient(pybullet.DIRECT)
+        self.case, self.client = case, Client()
         client = self.client
         client.setGravity(*case.gravity)
         client.setTimeStep(dt)

@@ -1,0 +1,70 @@
+"""Put a run of the referee into docs/referee.md: `python docs/make_referee.py [FOLDER]`.
+
+FOLDER is that of `planarfriction referee --out`; without it, the tables are made again from docs/referee.json.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from planarfriction_studies.referee.case import QUANTITIES, all_cases
+from planarfriction_studies.referee.report import table
+from planarfriction_studies.referee.run import Verdict
+
+DOCS = Path(__file__).parent
+KEPT, PAGE = DOCS / "referee.json", DOCS / "referee.md"
+MARK = re.compile(r"<!-- referee: (?P<name>\w+) -->\n\n(?:(?:[^\n#<].*\n)+\n)?")
+
+
+def tables(stored: dict[str, Any]) -> dict[str, str]:
+    """Return what stands below each mark of the page, from a stored run."""
+    verdicts = [Verdict(**row) for row in stored["verdicts"]]
+    headings, rows = table(verdicts)
+    versions = ", ".join(f"{name} {version}" for name, version in stored["versions"].items())
+    return {
+        "run": f"Run on {stored['date']}: {stored['machine']}; {versions}.\n",
+        "results": markdown(headings, rows),
+        "settings": markdown(["engine", "settings"], list(stored["settings"].items())),
+        "cases": markdown(
+            ["case", "what happens", "truths", "allowed"],
+            [
+                [case.name, case.title, f"{len(case.truths)}", allowed(case.truths)]
+                for case in all_cases().values()
+            ],
+        ),
+    }  # fmt: skip
+
+
+def allowed(truths: Sequence[Any]) -> str:
+    """Return the smallest allowed error of each quantity."""
+    least = {truth.quantity: min(t.allowed for t in truths if t.quantity == truth.quantity) for truth in truths}
+    return ", ".join(f"{name} {value:.2g} {QUANTITIES[name]}" for name, value in least.items())
+
+
+def markdown(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table as lines of a page."""
+    lines = [headings, ["---"] * len(headings), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def filled(page: str, stored: dict[str, Any]) -> str:
+    """Return the page with the tables of a stored run."""
+    found = tables(stored)
+    return MARK.sub(lambda match: f"<!-- referee: {match['name']} -->\n\n{found[match['name']]}\n", page)
+
+
+def main(folders: Sequence[str]) -> None:
+    """Store a run, and fill the page."""
+    for folder in folders:
+        shutil.copy(Path(folder) / "referee.json", KEPT)
+    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8"), json.loads(KEPT.read_text())), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
