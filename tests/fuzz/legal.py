@@ -89,6 +89,7 @@ def objects() -> dict[str, Any]:
     log = pf.identify.Log(TIMES, TWISTS, -TWISTS, 2.0)
     surface = pf.LimitSurfaceCells(PATCH)
     signal = pf.Signal.sampled([0.0, 0.1], [1.0, 2.0])
+    watcher = pf.online.FrictionObserver(pf.ReducedModel(PATCH, LAW, cells=9), surface=pf.LimitSurfaceEllipsoid(PATCH))
     held = pf.online.Parts([0.2], [3e-4], [(0.01, 0.0)], [0.5])
     return {
         # parts
@@ -140,9 +141,9 @@ def objects() -> dict[str, Any]:
         "Slide": pf.identify.Slide(time, pose), "Log": log, "Uniform": pf.Uniform(),
         "LinearGradient": pf.LinearGradient((5.0, 2.0)), "PressureMaps": pf.PressureMaps([1.0, 2.0], np.ones((2, 3))),
         "PerCell": pf.patch.PerCell([1.0, 2.0, 3.0]),
-        "FrictionObserver": pf.online.FrictionObserver(
-            pf.ReducedModel(PATCH, LAW, cells=9), surface=pf.LimitSurfaceEllipsoid(PATCH)
-        ),
+        "FrictionObserver": watcher,
+        **{name: getattr(pf.online, name)(watcher) for name in ("Hold", "Hinge")},
+        **{name: getattr(pf.online, name)(watcher, 0.02) for name in ("SlideBy", "TurnBy")},
         "Parts": held, "Sensors": pf.online.Sensors(), "Gripper": pf.online.Gripper(held, 5.0, cells=3),
         "Slider": pf.planning.Slider(pf.LimitSurfaceEllipsoid(PATCH), SQUARE),
         **{name: getattr(pf, name)(PATCH) for name in pf.__all__ if name.startswith("LimitSurface")},
@@ -183,8 +184,13 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "sensors": pf.online.Sensors(),
         "bias": (0.03, 0.03, 3e-4),
     },
-    "online.FrictionObserver.update": {
-        "measurement": pf.online.Measurement(0.1, (0.0, 1.0, 0.0), 4.0, (0.0, 0.01, 0.0)),
+    **{
+        f"online.{name}.update": {"measurement": pf.online.Measurement(0.1, (0.0, 1.0, 0.0), 4.0, (0.0, 0.01, 0.0))}
+        for name in ("FrictionObserver", "Hold", "Hinge", "SlideBy", "TurnBy")
+    },
+    **{
+        f"online.{name}": {"observer": Fresh(lambda: objects()["FrictionObserver"]), "goal": 0.02, "feed_forward": None}
+        for name in ("Hold", "Hinge", "SlideBy", "TurnBy")
     },
     "PressureMaps": {"values": np.ones((2, 3))},
     "patch.PerCell": {"values": [1.0, 2.0, 3.0]},

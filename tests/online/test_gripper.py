@@ -98,6 +98,13 @@ def test_the_slip_sensor_counts_and_loses_nothing():
     assert abs(places[0, 1] - gripper.slip[0, 1]) < unit + 1e-3 * abs(gripper.twist[0, 1])
 
 
+def test_a_part_that_is_let_go_falls():
+    gripper = Gripper(parts(), 0.05, sensors=QUIET)
+    run(gripper, 0.0, 0.2)
+    assert gripper.normal_force[0] < 1e-3
+    assert gripper.centre[0, 1] == pytest.approx(-0.5 * 9.81 * 0.2**2, rel=0.1)
+
+
 def test_taps_and_tilts_load_the_part():
     gripper = Gripper(parts(tap=(1.0, 0.0, 0.0), tap_time=0.01, tilt=0.5, tilt_time=0.05, tilt_duration=0.01), 40.0)
     loads = []

@@ -1,9 +1,21 @@
-"""Friction while a gripper holds: an observer, a rig with sensors and delays, and published rules to compare with."""
+"""Friction while a gripper holds: an observer, controllers, a rig to try them on, and published rules beside them."""
 
+from planarfriction.online.controllers import Hinge, Hold, SlideBy, TurnBy
 from planarfriction.online.gripper import Gripper, Measurement, Parts, Sensors
 from planarfriction.online.observer import Estimate, FrictionObserver
 
-__all__ = ["Estimate", "FrictionObserver", "Gripper", "Measurement", "Parts", "Sensors"]
+__all__ = [
+    "Estimate",
+    "FrictionObserver",
+    "Gripper",
+    "Hinge",
+    "Hold",
+    "Measurement",
+    "Parts",
+    "Sensors",
+    "SlideBy",
+    "TurnBy",
+]
 
 
 def __dir__() -> list[str]:

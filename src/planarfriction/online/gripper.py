@@ -23,6 +23,9 @@ GRAVITY = 9.81
 DT = 1e-3
 """Time step, and time between samples of force and torque [s]."""
 
+LEAST = 1e-3
+"""Load [N] below which the contact shrinks no further: a part that was let go has no contact at all."""
+
 UNIT = 0.01
 """Radius [m] of the patch in which bristles are simulated; that of a finger is a scale of lengths."""
 
@@ -243,7 +246,7 @@ class Gripper:
     @property
     def radius(self) -> np.ndarray:
         """Radius of the contacts at the present grip force `[P]` [m]."""
-        return self.parts.radius * self.normal_force**self.parts.growth
+        return self.parts.radius * np.maximum(self.normal_force, LEAST) ** self.parts.growth
 
     @property
     def wrench(self) -> np.ndarray:

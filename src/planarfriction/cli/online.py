@@ -1,0 +1,72 @@
+"""`planarfriction online`: trials of the observer and the controllers of a gripper."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from planarfriction.cli.options import FILE
+
+WORDS = {
+    "slipped": "parts that slipped at the exploration",
+    "coverage_95": "95 % intervals that hold mu_c after the first slip",
+    "mu_c_within_5_percent": "mu_c within 5 %, or said to be undetermined",
+    "mu_c_determined": "mu_c said to be determined",
+    "mu_c_median_error": "median relative error of mu_c",
+    "detected_within_20_ms": "slips of 0.1 mm detected 20 ms after their samples",
+    "false_alarms_per_minute": "false alarms per minute",
+    "drops": "parts dropped, observer",
+    "rule_drops": "parts dropped, published rule with the true friction",
+    "grip_saved": "grip saved by the observer",
+    "slips_over_1_mm": "slips over 1 mm in taps and tilts, observer",
+    "rule_slips_over_1_mm": "the same, published rule",
+    "slide_within": "slides that end within 1 mm, observer",
+    "rule_slide_within": "the same, published rule",
+    "turn_within": "turns that end within 2 degrees, observer",
+    "rule_turn_within": "the same, published rule",
+    "hinge_within": "hinges that end within 1 mm and 2 degrees, observer",
+    "rule_hinge_within": "the same, published rule",
+}
+"""Rows of the table."""
+
+
+@click.group(short_help="Try the observer and the controllers of a gripper on random parts.")
+def online() -> None:
+    """Try the observer and the controllers of a gripper."""
+
+
+@online.command(
+    short_help="Hold, slide, turn and hinge random parts.",
+    help="""Hold, slide, turn and hinge random parts with unknown friction, and print what came of it.
+
+    The published rules do the same beside it, with the true friction. 1,000 parts take about half an hour.
+
+    \b
+    Example:
+      planarfriction online trials --parts 100 --json trials.json
+    """,
+)
+@click.option("--parts", type=int, default=1000, show_default=True, help="Number of random parts.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Random seed of parts and noise.")
+@click.option("--json", "file", type=FILE, help="File for the numbers of the table (JSON).")
+def trials(parts: int, seed: int, file: Path | None) -> None:
+    """Run the trials (the help above is what users see)."""
+    from planarfriction.cli.console import note, print_table, work_progress
+    from planarfriction.online.trials import run_trials
+    from planarfriction.writing import check_writable, write_text
+
+    if file is not None:
+        check_writable(file)
+    with work_progress("trials") as progress:
+        found = run_trials(parts, seed, progress=progress)
+    print_table(f"{found['parts']} parts, seed {found['seed']}", ["result", "value"], rows(found))
+    if file is not None:
+        write_text(file, json.dumps(found, indent=2) + "\n")
+        note(f"wrote {file}")
+
+
+def rows(found: dict[str, float]) -> list[list[str]]:
+    """Return the rows of the table."""
+    return [[words, f"{found[name]:g}"] for name, words in WORDS.items()]

@@ -1,0 +1,85 @@
+"""Controllers in the rig: parts are held with less grip than by the published rule, and slip as far as they shall."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction.errors import InvalidValueError
+from planarfriction.online import FrictionObserver, Gripper, Hinge, Hold, Measurement, Parts, SlideBy, TurnBy
+from planarfriction.online.controllers import trapezoid
+from planarfriction.online.trials import known_model, random_parts, trial
+
+COUNT = 4
+
+
+def few(**changes) -> Parts:
+    return dataclasses.replace(random_parts(COUNT, 3, 1), **changes)
+
+
+def test_parts_are_held_with_less_grip_than_by_the_rule():
+    ours, rule = (trial("hold", few(), 0.0, 1.0, ours=own, seed=0) for own in (True, False))
+    assert ours["grip"].sum() < 0.9 * rule["grip"].sum()
+    assert np.hypot(*ours["later"][:, :2].T).max() < 1e-3  # taps and a tilt
+    assert np.abs(ours["slip"][:, 2]).max() < np.radians(15.0)  # the exploration
+    assert np.isfinite(ours["first"][:, 0]).all()
+    assert np.abs(ours["first"][:, 0]).max() < 0.25
+    assert (ours["late"] <= 0.02).all()
+
+
+def test_parts_slide_as_far_as_they_shall():
+    parts = few(centre=((0.0, -0.01),) * COUNT, tap=(0.0, 0.0, 0.0), tilt=0.0)
+    slip = trial("slide", parts, -0.02, 1.0, ours=True, seed=0)["slip"]
+    assert slip[:, 1] == pytest.approx(-0.02, abs=1.5e-3)
+
+
+def test_a_part_turns_as_far_as_it_shall():
+    parts = few(centre=((0.025, 0.0),) * COUNT, tap=(0.0, 0.0, 0.0), tilt=0.0, mu_ratio=1.0)
+    slip = trial("turn", parts, np.radians(-45.0), 1.0, ours=True, seed=0)["slip"]
+    assert np.median(np.abs(slip[:, 2] - np.radians(-45.0))) < np.radians(2.0)
+
+
+def test_a_hinge_lets_the_part_hang():
+    parts = few(centre=((0.0, -0.05),) * COUNT, tap=(0.0, 0.0, 0.0), tilt=1.2, tilt_time=0.3, tilt_duration=1.0)
+    gripper = Gripper(parts, 20.0)
+    hinge, sample = Hinge(FrictionObserver(known_model(), batch=COUNT)), gripper.measurement
+    for _ in range(1800):
+        sample = gripper.step(hinge.update(sample))
+    assert (gripper.slip[:, 2] < -0.6).all()  # half of the turn and more: friction holds the rest
+    assert np.hypot(*gripper.slip[:, :2].T).max() < 0.05
+
+
+def test_the_trapezoid_is_the_integral_of_its_speed():
+    time = np.linspace(-0.5, 3.0, 3501)
+    place, speed, push = trapezoid(time, 0.03, 2.0)
+    assert place[-1] == pytest.approx(0.03)
+    assert np.abs(np.gradient(place, time) - speed).max() < 1e-4
+    assert np.cumsum(push)[-1] * 1e-3 == pytest.approx(0.0, abs=1e-4)
+    assert speed.max() == pytest.approx(0.02)
+
+
+def test_bad_samples_keep_the_grip_finite():
+    hold = Hold(FrictionObserver(known_model()), explore=0.0)
+    for k in range(100):
+        bad = k % 10 == 9
+        sample = Measurement(1e-3 * k, (0.0, np.nan if bad else 1.0, 0.0), np.nan if bad else 5.0)
+        force = float(hold.update(sample))
+        assert np.isfinite(force)
+    assert 1.0 / 0.52 < force < hold.most
+
+
+def test_wrong_settings_are_refused():
+    observer = FrictionObserver(pf.ReducedModel(pf.ContactPatch.disc(0.005, 9), pf.LuGre()))
+    with pytest.raises(InvalidValueError, match="observer must be a FrictionObserver"):
+        Hold(None)
+    with pytest.raises(InvalidValueError, match=r"probability must be between 0 and 0\.5"):
+        Hold(observer, probability=0.7)
+    with pytest.raises(InvalidValueError, match="goal must be finite and not zero"):
+        SlideBy(observer, 0.0)
+    with pytest.raises(InvalidValueError, match="duration must be"):
+        TurnBy(observer, 1.0, duration=-1.0)
+    with pytest.raises(InvalidValueError, match="reserve must be"):
+        Hinge(observer, reserve=0.0)
