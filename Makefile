@@ -76,7 +76,7 @@ $(VENV)/.package: pyproject.toml | $(BIN)/python
 # Tests of the optional front ends skip with their reason where a package is missing; here they run. This version of
 # PyTorch comes as a build for the CPU alone; others bring gigabytes for GPUs.
 $(VENV)/.test: $(VENV)/.package
-	$(PIP) --editable '.[test,torch,jax,quartic,mujoco,mjx,mujoco-warp,drake,warp,sweep,explore,browser,examples]' torch==2.13.0
+	$(PIP) --editable '.[test,torch,jax,quartic,mujoco,mjx,mujoco-warp,drake,warp,casadi,sweep,explore,browser,examples]' torch==2.13.0
 	touch $@
 
 $(LOWEST)/.test: pyproject.toml

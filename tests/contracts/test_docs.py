@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")] + sorted(
     (ROOT / "docs").glob("*.md")
 )
-OPTIONAL = ("torch", "jax", "warp", "mujoco", "mujoco.mjx", "mujoco_warp", "pydrake", "zarr")
+OPTIONAL = ("torch", "jax", "warp", "mujoco", "mujoco.mjx", "mujoco_warp", "pydrake", "zarr", "casadi")
 """Packages behind an extra; `planarfriction.torch`, `planarfriction.adapters.mujoco` and so on carry their names."""
 RECIPES = ("pybullet", "genesis", "newton")
 """Hosts that a page has recipes for, and no extra of ours installs."""

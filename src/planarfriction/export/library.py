@@ -53,12 +53,19 @@ FILES = {"h": ".h", "c": ".c", "test.c": "_test.c", "cmake": ".cmake"}
 """Ends of the names of files by their templates."""
 
 
-def export_c(model: Any, folder: Any, *, name: str = "friction", precision: str = "double") -> tuple[Path, ...]:
+CASADI = {"casadi.c": "_casadi.c"}
+"""End of the name of the file for CasADi."""
+
+
+def export_c(
+    model: Any, folder: Any, *, name: str = "friction", precision: str = "double", casadi: bool = False
+) -> tuple[Path, ...]:
     """Write a model as C source into a folder; return the files `<name>.h`, `.c`, `_test.c` and `.cmake`.
 
     The source is C99 and C++17, calls nothing but `math.h` and `memcpy`, allocates nothing and keeps no state of its
     own. Its step is the model's own (see `FrictionModel.step`), traced from the same formulas. The test is a program
     that compares the library with numbers of the model; the CMake file has a target for each.
+    With `casadi`, `<name>_casadi.c` holds the step and its Jacobian as functions that `casadi.external` loads.
 
     Raises InvalidValueError for a name that is no C identifier, an unknown precision, and models without source (see
     `pieces_of`); FileError if the folder cannot be written.
@@ -66,18 +73,21 @@ def export_c(model: Any, folder: Any, *, name: str = "friction", precision: str 
     if not (isinstance(name, str) and name.isascii() and name.isidentifier() and len(name) <= LONGEST_NAME):
         raise InvalidValueError("name", f"be a C identifier of at most {LONGEST_NAME} characters", name)
     validation.choice("precision", precision, PRECISIONS)
-    folder = validation.path("folder", folder)
-    texts = _texts(model, pieces_of(model, fixed=False), name, precision)
+    validation.instance("casadi", casadi, bool, "True or False")
+    if casadi and precision != "double":
+        raise InvalidValueError("precision", "be double for CasADi", precision)
+    folder, ends = validation.path("folder", folder), FILES | (CASADI if casadi else {})
+    texts = _texts(model, pieces_of(model, fixed=False), name, precision, tuple(ends))
     writing.make_folder(folder)
-    files = tuple(folder / f"{name}{end}" for end in FILES.values())
+    files = tuple(folder / f"{name}{end}" for end in ends.values())
     with contextlib.ExitStack() as stack:  # all can be written, or none is
         for file, text in zip(files, texts, strict=True):
             stack.enter_context(writing.replacing(file)).write(text.encode())
     return files
 
 
-def _texts(model: Any, pieces: Pieces, name: str, precision: str) -> list[str]:
-    """Return the text of each file."""
+def _texts(model: Any, pieces: Pieces, name: str, precision: str, kinds: tuple[str, ...]) -> list[str]:
+    """Return the text of each kind of file."""
     import jinja2
 
     import planarfriction
@@ -106,6 +116,7 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str) -> list[str]:
         "tables": tables,
         "columns": _columns(pieces),
         "stride": pieces.stride,
+        "pattern": _pattern(pieces),
         "first": first,
         "suffix": writer.suffix,
         "largest": writer.constant(PRECISIONS[precision]),
@@ -124,12 +135,20 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str) -> list[str]:
         undefined=jinja2.StrictUndefined,
         keep_trailing_newline=True,
     )
-    return [environment.get_template(f"library.{kind}.j2").render(values) for kind in FILES]
+    return [environment.get_template(f"library.{kind}.j2").render(values) for kind in kinds]
 
 
 def _columns(pieces: Pieces) -> int:
     """Return the number of derivatives of a number of a cell or part."""
     return pieces.states + 3 + len(pieces.parameters)
+
+
+def _pattern(pieces: Pieces) -> list[int]:
+    """Return rows, columns, starts of columns and rows of entries of the derivative of new states by states."""
+    states, own = pieces.count * pieces.states, range(pieces.states)
+    firsts = [c % pieces.stride if pieces.stride > 1 else c - c % pieces.states for c in range(states)]
+    rows = [first + pieces.stride * i for first in firsts for i in own]
+    return [states, states, *range(0, len(rows) + 1, pieces.states), *rows]
 
 
 def _functions(writer: Writer, pieces: Pieces, first: str) -> dict[str, str]:
