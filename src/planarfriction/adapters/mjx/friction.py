@@ -40,8 +40,8 @@ INTEGRATORS = {
 PASSES = 4
 """Number of new solutions of a step because it has activated other constraints."""
 
-SLACK = 1e-10
-"""Speed [m/s] to which the active constraints have to hold."""
+SLACK = {"float64": 1e-10, "float32": 1e-6}
+"""Speed [m/s] to which the active constraints have to hold, by precision."""
 
 
 class _Search(NamedTuple):
@@ -100,9 +100,9 @@ class Friction:
     those of its `models` (`planarfriction.jax`), one for each different model among the patches, and its `parameters`,
     by name, which replace numbers of these models.
 
-    Raises `InvalidValueError` without double precision, for an unsuitable integrator or cone, noslip iterations, too
-    little user data, names that are not in the model, pairs with friction of their own, models that JAX does not have,
-    and shapes that change with the load.
+    Raises `InvalidValueError` for an unsuitable integrator or cone, noslip iterations, too little user data, names that
+    are not in the model, pairs with friction of their own, models that JAX does not have, and shapes that change with
+    the load.
     """
 
     def __init__(self, m: Any, patches: Sequence[PatchContact]) -> None:
@@ -212,17 +212,10 @@ class Friction:
     def step(self, m: Any, d: Any) -> Any:
         """Take a step with patch friction, a pure function of JAX instead of `mjx.step`.
 
-        Raises InvalidValueError for a model of MJX in another implementation, and for data without its user data.
+        Raises InvalidValueError for a model of MJX in another implementation, data of another precision than JAX's own,
+        and data without their user data.
         """
-        if m.impl != mjx.Impl.JAX:
-            raise InvalidValueError("impl", "be JAX's: mjx.put_model(m, impl='jax')", m.impl.value)
-        if d.qpos.dtype != jnp.float64:
-            _refuse_precision(f"data of {d.qpos.dtype}")
-        if d.userdata.shape != (self._fixed.nuserdata,):
-            rule = (
-                f"have shape [{self._fixed.nuserdata}]: of one environment, of the model of the patches (see jax.vmap)"
-            )
-            raise InvalidValueError("userdata", rule, f"shape {list(d.userdata.shape)}")
+        self._check_inputs(m, d)
         given, dt, at = d, m.opt.timestep, self._fixed.memory
         states, guess = self.states(d), self._now(d, at.wrench, at.guess, 3 * len(self._fixed.which))
         held = self._now(d, at.centre, at.held, 3 * len(self._fixed.which)).reshape(-1, 3)
@@ -247,10 +240,26 @@ class Friction:
         shift = shift + own.displaced
         kept |= {"wrench": responses.back(wrench.reshape(-1, 3), -shift), "twist": responses.about(twist, shift)}
         kept |= {"time": given.time, "next": d.time, "iterations": found.iterations, "passes": found.passes}
-        kept |= {"residual": found.residual, "converged": found.converged & (found.slack <= SLACK)}
+        kept |= {
+            "residual": found.residual,
+            "converged": found.converged & (found.slack <= SLACK[found.slack.dtype.name]),
+        }
         d = d.replace(userdata=self._written(d.userdata, kept))
         # in double precision MJX makes long integers of some that came in short, at which `lax.scan` would stop
         return jax.tree.map(lambda after, before: after.astype(before.dtype), d, given)
+
+    def _check_inputs(self, m: Any, d: Any) -> None:
+        """Refuse models and data that a step cannot take."""
+        if m.impl != mjx.Impl.JAX:
+            raise InvalidValueError("impl", "be JAX's: mjx.put_model(m, impl='jax')", m.impl.value)
+        if d.qpos.dtype != jnp.result_type(float):
+            rule = f"be {jnp.result_type(float)}, that of JAX (see jax_enable_x64)"
+            raise InvalidValueError("precision", rule, f"data of {d.qpos.dtype}")
+        if d.userdata.shape != (self._fixed.nuserdata,):
+            rule = (
+                f"have shape [{self._fixed.nuserdata}]: of one environment, of the model of the patches (see jax.vmap)"
+            )
+            raise InvalidValueError("userdata", rule, f"shape {list(d.userdata.shape)}")
 
     def _own(self) -> _Own:
         """Return the friction of the environment."""
@@ -285,7 +294,7 @@ class Friction:
             return _Search(active, solved.wrench, centre, acceleration, iterations, passes, *ends)
 
         def unsettled(last: _Search) -> jax.Array:
-            return (last.passes == 0) | ((last.slack > SLACK) & (last.passes < PASSES))
+            return (last.passes == 0) | ((last.slack > SLACK[last.slack.dtype.name]) & (last.passes < PASSES))
 
         none, zero, count = jnp.zeros(where.rows.shape[1]), jnp.asarray(0.0), jnp.asarray(0)
         active = responses.Active(none > 0.0, none)
@@ -348,8 +357,6 @@ def _moved(m: Any, d: Any) -> Any:
 
 
 def _check(m: Any, placed: Sequence[Placed]) -> None:
-    if not jax.config.jax_enable_x64:
-        _refuse_precision("float32")
     if m.opt.integrator not in INTEGRATORS:
         rule = f"be {', '.join(INTEGRATORS.values())}"
         name = mujoco.mjtIntegrator(m.opt.integrator).name.removeprefix("mjINT_")
@@ -362,11 +369,6 @@ def _check(m: Any, placed: Sequence[Placed]) -> None:
         raise InvalidValueError("noslip_iterations", rule, m.opt.noslip_iterations)
     for each in placed:
         each.check(m)
-
-
-def _refuse_precision(given: str) -> None:
-    rule = 'be float64, which bristles need: call jax.config.update("jax_enable_x64", True) before making the data'
-    raise InvalidValueError("precision", rule, given)
 
 
 def _in_jax(model: models.FrictionModel) -> FrictionPytree:

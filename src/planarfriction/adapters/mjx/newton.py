@@ -18,6 +18,11 @@ from planarfriction.kernels.coupling import DOWNHILL, JOINT, ROUND, ROUNDING, SH
 _GUESS, _REST, _SEARCH = range(3)
 """Kinds of evaluation: the twists that the guess causes, twists at rest, or a point along a Newton step."""
 
+ROUNDING_SINGLE = 1e-5
+"""`ROUNDING` in single precision, in which the response of a host has that much less digits.
+
+What a body moves, its bristles give, to the last digit; so a held body does not creep however large this is."""
+
 Unit = Callable[[jax.Array], jax.Array]
 """Wrenches of the models' steps per unit load `[k, 3]` of their twists `[k, 3]`."""
 
@@ -180,7 +185,8 @@ def solve(unit: Unit, host: HostResponse, guess: jax.Array, radius: jax.Array, t
     count, lever = len(host.load), jnp.ones((len(host.load), 3)).at[:, 2].set(radius)
     caused = host.response @ guess
     speeds = lever.ravel() * (abs(host.twist + caused) + abs(caused))
-    near = jnp.maximum(tolerance, ROUNDING * speeds.max())
+    rounding = ROUNDING if speeds.dtype == jnp.float64 else ROUNDING_SINGLE
+    near = jnp.maximum(tolerance, rounding * speeds.max())
     diagonal = jnp.diagonal(host.response).reshape(-1, 3)
     scale = jnp.where(diagonal > 0.0, jnp.sqrt(abs(diagonal)), 1.0)
     search = _Search(unit, host, lever, diagonal, scale, near, most)
