@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -270,7 +270,3 @@ def _check(path: Path, case: Case) -> None:
 def all_cases() -> dict[str, Case]:
     """Return the cases of the package by name."""
     return {path.stem: read_case(path) for path in sorted(FOLDER.glob("*.toml"))}
-
-
-FIELDS = {cls.__name__: [each.name for each in fields(cls)] for cls in (Case, Body, Shape, Contact, Force, Truth)}
-"""Keys of the parts of a case, which the page explains."""
