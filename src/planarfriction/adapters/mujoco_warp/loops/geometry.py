@@ -154,6 +154,30 @@ def axes_of(turned: wp.mat33, normal: wp.vec3) -> wp.mat33:
     return wp.matrix_from_rows(x, y, normal)
 
 
+@wp.func
+def touch(patches: Patches, contacts: Contacts, frames: Frames, w: int, p: int, nefc: int):
+    """Mark the rows of a patch's contacts; return the sums of their normals and places, and their number."""
+    normal = wp.vec3()
+    middle = wp.vec3()
+    count = int(0)
+    for r in range(nefc):
+        if contacts.type[w, r] == FRICTIONLESS:
+            c = contacts.id[w, r]
+            geoms = contacts.geom[c]
+            sign = float(0.0)
+            if geoms[0] == patches.other[p] and geoms[1] == patches.own[p]:
+                sign = 1.0
+            if geoms[1] == patches.other[p] and geoms[0] == patches.own[p]:
+                sign = -1.0
+            if sign != 0.0:
+                frames.owner[w, r] = p
+                frame = contacts.frame[c]
+                normal += sign * wp.vec3(frame[0, 0], frame[0, 1], frame[0, 2])
+                middle += contacts.pos[c]
+                count += 1
+    return normal, middle, count
+
+
 @wp.kernel(enable_backward=False)
 def place(
     patches: Patches,
@@ -173,24 +197,7 @@ def place(
     for r in range(nefc):
         frames.owner[w, r] = -1
     for p in range(patches.count):
-        normal = wp.vec3()
-        middle = wp.vec3()
-        count = int(0)
-        for r in range(nefc):
-            if contacts.type[w, r] == FRICTIONLESS:
-                c = contacts.id[w, r]
-                geoms = contacts.geom[c]
-                sign = float(0.0)
-                if geoms[0] == patches.other[p] and geoms[1] == patches.own[p]:
-                    sign = 1.0
-                if geoms[1] == patches.other[p] and geoms[0] == patches.own[p]:
-                    sign = -1.0
-                if sign != 0.0:
-                    frames.owner[w, r] = p
-                    frame = contacts.frame[c]
-                    normal += sign * wp.vec3(frame[0, 0], frame[0, 1], frame[0, 2])
-                    middle += contacts.pos[c]
-                    count += 1
+        normal, middle, count = touch(patches, contacts, frames, w, p, nefc)
         frames.touching[w, p] = count
         for i in range(3):
             if count == 0:

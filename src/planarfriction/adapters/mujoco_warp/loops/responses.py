@@ -1,8 +1,7 @@
 """Response of MuJoCo Warp's step to wrenches on patches, for a fixed set of active constraints, as kernels.
 
-As `planarfriction.adapters.mujoco.loops.responses`, with accelerations that are exact for these constraints:
-`H a = f + Jp' W_0 + Jc' (D a_ref + c)`, and in double precision, as stiff contacts next to inertia need. One thread a
-world; worlds that are `done` are left alone.
+As in MuJoCo's adapter, in double precision, as stiff contacts next to inertia need, and with accelerations that are
+exact for these constraints: `H a = f + Jp' W_0 + Jc' (D a_ref + c)`. One thread a world, unless it is `done`.
 """
 
 # No `from __future__ import annotations` here: Warp reads the types themselves.
@@ -46,7 +45,7 @@ class Dynamics:
 
 @wp.struct
 class Scratch:
-    """What kernels of a step hand on."""
+    """Arrays that the kernels of a step hand on."""
 
     done: wp.array(dtype=int)
     active: wp.array2d(dtype=int)
@@ -229,6 +228,54 @@ def gain(own: Dynamics, s: Scratch, w: int, dt: wp.float64):
     solve(s.stiff, w, s.gains)
 
 
+@wp.func
+def write_twists(
+    frames: Frames, s: Scratch, out: Problem, w: int, n: int, dt: wp.float64, qvel: wp.array2d(dtype=float)
+):
+    """Write the twists at the end of the step and their response."""
+    for c in range(n):
+        v = wp.float64(0.0)
+        for e in range(n):
+            out.response[w, c, e] = 0.0
+        for i in range(s.stiff.shape[1]):
+            share = wp.float64(frames.jacobian[w, c, i])
+            if share != wp.float64(0.0):
+                v += share * (wp.float64(qvel[w, i]) + dt * s.gains[w, i, n])
+                for e in range(n):
+                    out.response[w, c, e] = out.response[w, c, e] + float(dt * share * s.gains[w, i, e])
+        out.twist[w, c / 3, c % 3] = float(v)
+
+
+@wp.func
+def write_loads(
+    patches: Patches, own: Dynamics, frames: Frames, s: Scratch, out: Problem, w: int, nefc: int, first_pass: int
+):
+    """Write the loads at the end of the step, their response, and their moments as the first pass finds them."""
+    n = 3 * patches.count
+    for p in range(patches.count):
+        load, moments = wp.float64(0.0), wp.vec2()
+        for e in range(n):
+            out.load_response[w, p, e] = 0.0
+        for r in range(nefc):
+            if frames.owner[w, r] == p and s.active[w, r] == 1:
+                weight = wp.float64(own.stiffness[w, r])
+                force = -weight * gap_of(own, s.acceleration, w, r)
+                load, moments = load + force, moments + float(force) * frames.lever[w, r]
+                for i in range(count_of(own, w, r, s.stiff.shape[1])):
+                    share = weight * number_of(own, w, r, i)
+                    if share != wp.float64(0.0):
+                        j = column_of(own, w, r, i)
+                        for e in range(n):
+                            out.load_response[w, p, e] = out.load_response[w, p, e] - float(share * s.answers[w, j, e])
+        out.load[w, p] = wp.max(float(load), 0.0)
+        if first_pass != 0:
+            s.pressed[w, p] = patches.point[p]
+            if patches.follows[p] != 0 and load > wp.float64(0.0):
+                s.pressed[w, p] = moments / float(load)
+        out.moments[w, p, 0] = s.pressed[w, p][1] * out.load[w, p]
+        out.moments[w, p, 1] = -s.pressed[w, p][0] * out.load[w, p]
+
+
 @wp.kernel(enable_backward=False)
 def respond(
     patches: Patches,
@@ -259,46 +306,11 @@ def respond(
     dt = wp.float64(timestep[w % timestep.shape[0]])
     accelerate(own, contacts, frames, s, w, nefc, smooth)
     gain(own, s, w, dt)
-    nv = s.stiff.shape[1]
     n = 3 * patches.count
-    for i in range(nv):
+    for i in range(s.stiff.shape[1]):
         s.acceleration[w, i] = s.answers[w, i, n]
-    for c in range(n):
-        v = wp.float64(0.0)
-        for e in range(n):
-            out.response[w, c, e] = 0.0
-        for i in range(nv):
-            share = wp.float64(frames.jacobian[w, c, i])
-            if share != wp.float64(0.0):
-                v += share * (wp.float64(qvel[w, i]) + dt * s.gains[w, i, n])
-                for e in range(n):
-                    out.response[w, c, e] = out.response[w, c, e] + float(dt * share * s.gains[w, i, e])
-        out.twist[w, c / 3, c % 3] = float(v)
-    for p in range(patches.count):
-        load = wp.float64(0.0)
-        moments = wp.vec2()
-        for e in range(n):
-            out.load_response[w, p, e] = 0.0
-        for r in range(nefc):
-            if frames.owner[w, r] == p and s.active[w, r] == 1:
-                weight = wp.float64(own.stiffness[w, r])
-                force = -weight * gap_of(own, s.acceleration, w, r)
-                load += force
-                moments += float(force) * frames.lever[w, r]
-                for i in range(count_of(own, w, r, nv)):
-                    share = weight * number_of(own, w, r, i)
-                    if share != wp.float64(0.0):
-                        j = column_of(own, w, r, i)
-                        for e in range(n):
-                            out.load_response[w, p, e] = out.load_response[w, p, e] - float(share * s.answers[w, j, e])
-        out.load[w, p] = wp.max(float(load), 0.0)
-        if first_pass != 0:
-            s.pressed[w, p] = patches.point[p]
-            if patches.follows[p] != 0 and load > wp.float64(0.0):
-                s.pressed[w, p] = moments / float(load)
-        centre = s.pressed[w, p]
-        out.moments[w, p, 0] = centre[1] * out.load[w, p]
-        out.moments[w, p, 1] = -centre[0] * out.load[w, p]
+    write_twists(frames, s, out, w, n, dt, qvel)
+    write_loads(patches, own, frames, s, out, w, nefc, first_pass)
 
 
 @wp.kernel(enable_backward=False)
