@@ -19,30 +19,33 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 demo: $(VENV)/.package
 	$(BIN)/planarfriction run in-hand --model both --out out/ --plot
 
-# Two processes, each test file in one of them: results that the tests of a file share are computed once. Linear algebra
-# keeps to the processor of its process.
+# Two processes, each test file in one of them: results that the tests of a file share are computed once. They begin with
+# the files that compile longest. Linear algebra keeps to the processor of its process.
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
 test: $(VENV)/.test
-	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 # What compiled loops and BLAS may round differently elsewhere: surfaces, models, steps, solver, derivatives.
 NUMERIC := compiler derivatives kernels limit_surface models solvers test_coupling.py test_formulas.py
 
+# The share of these that compiles least and rounds most.
+QUICKEST := kernels limit_surface solvers test_coupling.py test_formulas.py
+
 test-generic: $(VENV)/.test
-	NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES= $(BIN)/python -m pytest -n 2 --dist loadfile $(NUMERIC:%=tests/%) $(ARGS)
+	NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES= $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(NUMERIC:%=tests/%) $(ARGS)
 
 # Loops whose indices are checked compile into their own machine code, of which the whole half takes an hour; pointers
 # have no bounds to check.
-BOUNDED := $(wildcard tests/kernels tests/test_coupling*.py)
+BOUNDED := tests/kernels tests/test_coupling_hard.py
 
 test-bounds: $(VENV)/.test
-	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -n 2 --dist loadfile $(BOUNDED) $(ARGS)
+	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(BOUNDED) $(ARGS)
 
 # The lowest versions that pyproject.toml promises, without the optional front ends.
 test-lowest: $(LOWEST)/.test
-	$(LOWEST)/bin/python -m pytest -n 2 --dist loadfile $(ARGS)
+	$(LOWEST)/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 MINUTES ?= 60
 

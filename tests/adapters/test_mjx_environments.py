@@ -53,6 +53,7 @@ def made():
     return m, d, adapter.Friction(m, patches), Friction(m, patches)
 
 
+@pytest.mark.slow
 def test_environments_with_friction_of_their_own_step_as_copies_in_mujoco(made):
     m, d, theirs, ours = made
     mx, steps = mjx.put_model(m), 40

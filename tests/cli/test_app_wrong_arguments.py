@@ -232,7 +232,12 @@ sys.exit(main(sys.argv[2:]))
         (1000, ["limit-surface", "--surface", "ellipsoid", "--out", "kept.png"], ["kept.png"]),
         (1000, ["limit-surface", "--surface", "ellipsoid", "--csv", "kept.csv"], ["kept.csv"]),
         (1000, ["run", "scene.toml", "--out", "."], ["scene-distributed.nc"]),
-        (5000, ["run", "scene.toml", "--out", ".", "--animate"], ["scene-motion-distributed.gif"]),
+        pytest.param(
+            5000,
+            ["run", "scene.toml", "--out", ".", "--animate"],
+            ["scene-motion-distributed.gif"],
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_a_full_disk_leaves_what_was_there(place, most, command, kept):

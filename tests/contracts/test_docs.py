@@ -26,7 +26,7 @@ OPTIONAL = ("torch", "jax", "warp", "mujoco", "mujoco.mjx", "mujoco_warp", "pydr
 """Packages behind an extra; `planarfriction.torch`, `planarfriction.adapters.mujoco` and so on carry their names."""
 RECIPES = ("pybullet", "genesis", "newton")
 """Hosts that a page has recipes for, and no extra of ours installs."""
-SLOW_PAGES = ("mujoco-warp.md",)
+SLOW_PAGES = ("mjx.md", "mujoco-warp.md")
 """Pages whose hosts compile for a minute."""
 FAMILIES = (families.LAWS, families.MODELS, families.SURFACES, families.SHAPES, families.SCENES)
 MODULES = {module.name for module in pkgutil.iter_modules(planarfriction.__path__)}

@@ -34,6 +34,7 @@ def test_a_drift_without_a_grain_is_straight_down(monkeypatch):
     assert abs(contacts.closed_drift(np.radians(40.0))) < 1e-6
 
 
+@pytest.mark.slow
 def test_the_staircase_of_a_line_has_steps_of_two_cells(result):
     jumps = result.numbers["jumps"]
     assert jumps["Line/sum"] == pytest.approx(2.0 / 21.0, rel=1e-9)  # a cell of 1/21 of the load turns its force round

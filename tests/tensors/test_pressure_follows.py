@@ -25,7 +25,7 @@ KINDS = {
     "published": (PATCH, "ReducedModelPublished", {}),
 }
 
-QUICK = "few cells with a metric", "one part"
+QUICK = ("few cells with a metric",)
 EACH = [pytest.param(kind, marks=() if kind in QUICK else pytest.mark.slow) for kind in KINDS]
 
 

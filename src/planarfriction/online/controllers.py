@@ -66,6 +66,7 @@ class GripController:
         Raises InvalidValueError for a measurement that does not fit the observer.
         """
         self.estimate = estimate = self.observer.update(measurement)
+        self.wrench = np.broadcast_to(np.asarray(measurement.wrench, float), (*self.grip.shape, 3))
         time, force = np.asarray(measurement.time, float), np.asarray(measurement.normal_force, float)
         dt = np.where(np.isfinite(self._time), np.nan_to_num(np.clip(time - self._time, 0.0, 0.1)), 0.0)
         self._time = np.fmax(self._time, time)
@@ -258,17 +259,8 @@ class Hinge(GripController):
         self.reserve, self.gain = validation.positive("reserve", reserve), validation.non_negative("gain", gain)
         self._force = np.zeros(self.grip.shape)
 
-    def update(self, measurement: Measurement) -> np.ndarray:
-        """Take a sample of the sensors; return the grip force `[...]` [N].
-
-        Raises InvalidValueError for a measurement that does not fit the observer.
-        """
-        fx, fy, _ = np.moveaxis(np.asarray(measurement.wrench, float), -1, 0)
-        force = np.hypot(fx, fy)
-        self._force = np.where(np.isfinite(force), self._force + (force - self._force) * DT / 0.05, self._force)
-        return super().update(measurement)
-
     def _grip(self, needed: np.ndarray, dt: np.ndarray) -> np.ndarray:
-        e = self.estimate
+        e, force = self.estimate, np.hypot(self.wrench[..., 0], self.wrench[..., 1])
+        self._force = np.where(np.isfinite(force), self._force + (force - self._force) * DT / 0.05, self._force)
         speed = np.hypot(self.velocity[..., 0], self.velocity[..., 1]) * (e.slip > 0.5)
         return self.reserve * self._force / e.mu_c + self.gain * speed
