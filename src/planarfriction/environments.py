@@ -67,7 +67,8 @@ def randomise(law: FrictionLaw, ranges: Mapping[str, Any], count: int, *, seed: 
     """
     validation.instance("law", law, FrictionLaw, "a friction law")
     validation.keys("ranges", ranges, (), PARAMETERS)
-    count, generator = validation.count("count", count), np.random.default_rng(validation.count("seed", seed, 0))
+    count = validation.count("count", count, at_most=validation.MOST_DRAWS)
+    generator = np.random.default_rng(validation.count("seed", seed, 0))
     drawn = {name: _drawn(name, given, count, generator) for name, given in ranges.items()}
     own = law.numbers
     if "mu_c" in drawn and "mu_s" not in drawn:

@@ -34,6 +34,9 @@ SI_UNITS = frozenset({"m", "s", "kg", "N", "rad", "Pa", "J", "W", "Hz"})
 MOST_NUMBERS = 30_000_000
 """Numbers of an array that is copied: 240 MB. A view of one number may be of any size."""
 
+MOST_DRAWS = MOST_NUMBERS // 10
+"""Largest number of draws of a set of parameters."""
+
 _MOST_AXES = 32
 """Axes that arrays of all front ends may have."""
 
@@ -269,6 +272,17 @@ def array(name: str, value: Any, shape: tuple[int | None, ...], *, largest: floa
     result = result.copy()
     _check_finite(name, result, largest)
     return result
+
+
+def filled(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """Return finite numbers of that shape from an array that broadcasts to it, or raise."""
+    result = numbers(name, value)
+    try:
+        return array(name, np.broadcast_to(result, shape), shape)
+    except ValueError as error:
+        if isinstance(error, InvalidValueError):
+            raise
+        raise InvalidValueError(name, f"have shape {list(shape)}", f"shape {list(result.shape)}") from None
 
 
 def positive_array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:

@@ -79,6 +79,10 @@ def test_wrong_settings_are_refused():
         Hold(observer, probability=0.7)
     with pytest.raises(InvalidValueError, match="goal must be finite and not zero"):
         SlideBy(observer, 0.0)
+    with pytest.raises(InvalidValueError, match=r"goal must have shape \[\], got shape \[0\]"):
+        TurnBy(observer, [])
+    with pytest.raises(InvalidValueError, match=r"measurement must be a Measurement, got 5\.0"):
+        Hinge(observer).update(5.0)
     with pytest.raises(InvalidValueError, match="duration must be"):
         TurnBy(observer, 1.0, duration=-1.0)
     with pytest.raises(InvalidValueError, match="reserve must be"):

@@ -86,3 +86,9 @@ def test_what_cannot_be_held_or_does_not_hold_is_refused_in_one_line():
         with pytest.raises(InvalidValueError) as error:
             attempt()
         assert message in str(error.value) and "\n" not in str(error.value), error.value
+
+
+def test_a_ramp_shorter_than_times_tell_apart_is_a_step():
+    model = pf.ReducedModel(pf.ContactPatch.disc(0.01, 9), pf.LuGre(mu_s=1.2), parts=1)
+    step, ramp = (dynamic_holding_load((1.0, 0.0, 0.001), model, ramp=ramp) for ramp in (0.0, 5e-324))
+    assert ramp == step

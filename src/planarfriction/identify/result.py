@@ -94,7 +94,9 @@ class Identification(ByValue):
         Raises InvalidValueError unless `count` is a count.
         """
         generator = np.random.default_rng(validation.count("seed", seed, 0))
-        normal = generator.standard_normal((validation.count("count", count), len(self.names)))
+        normal = generator.standard_normal(
+            (validation.count("count", count, at_most=validation.MOST_DRAWS), len(self.names))
+        )
         drawn = draws(self.names, self.values, self.standard_errors, self.correlations, normal)
         found = dict(zip(self.names, drawn.T.copy(), strict=True))
         result = {name: values for name, values in found.items() if name in NUMBERS}

@@ -174,8 +174,8 @@ class Slip(GripController):
         most: float = 60.0,
     ) -> None:
         super().__init__(observer, most=most)
-        self.goal = np.broadcast_to(validation.numbers("goal", goal), self.grip.shape).astype(float)
-        if not np.isfinite(self.goal).all() or not self.goal.all():
+        self.goal = validation.filled("goal", goal, self.grip.shape)
+        if not self.goal.all():
             raise InvalidValueError("goal", "be finite and not zero", goal)
         self.duration = validation.positive("duration", duration)
         self.acceleration = validation.positive("acceleration", acceleration)

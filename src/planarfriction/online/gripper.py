@@ -113,11 +113,7 @@ class Parts(ByValue):
 
     def _full(self, name: str, shape: tuple[int, ...]) -> np.ndarray:
         """Return a field for every part."""
-        value = validation.numbers(name, getattr(self, name))
-        try:
-            return np.broadcast_to(value, shape).astype(float)
-        except ValueError:
-            raise InvalidValueError(name, f"have shape {list(shape)}", f"shape {list(value.shape)}") from None
+        return validation.filled(name, getattr(self, name), shape)
 
     def __len__(self) -> int:
         return len(self.mass)
@@ -187,7 +183,7 @@ class Gripper:
         )
         self._patches = CoupledPatches([self.model])
         count = len(parts)
-        self.normal_force = np.broadcast_to(validation.numbers("grip", grip), (count,)).astype(float)
+        self.normal_force = validation.filled("grip", grip, (count,))
         if not (self.normal_force > 0.0).all():
             raise InvalidValueError("grip", "be > 0", float(self.normal_force.min()))
         self._bristles, self._lag, self._rate = self._patches.rest(count), np.zeros(count), np.zeros(count)

@@ -161,7 +161,7 @@ def _least_share(slips: Any) -> float:
 
 def _falling(high: float, low: float, ramp: float) -> Signal:
     """Return a normal force that falls from one value to another [N]."""
-    if ramp == 0.0:
+    if BEFORE + ramp == BEFORE:  # nothing, or less than numbers of times tell apart
         return Signal.sampled([0.0, BEFORE], [high, low])
     return Signal.sampled([0.0, BEFORE, BEFORE + ramp], [high, high, low], "linear")
 
