@@ -55,6 +55,10 @@ def _surface(name: str, value: Any) -> type[LimitSurface]:
     return value
 
 
+def _bristles(_: str, value: Any) -> ElastoPlastic | None:
+    return LuGre(elasto_plastic=value).elasto_plastic
+
+
 @described
 @dataclass(frozen=True)
 class FitOptions(Checked):
@@ -76,7 +80,7 @@ class FitOptions(Checked):
     """Number of starting points."""
     seed: int = checked(validation.count, 0, default=0)
     """Random seed that scatters the starting points."""
-    elasto_plastic: ElastoPlastic | float | None = ElastoPlastic(0.9)  # noqa: RUF009 (frozen)
+    elasto_plastic: ElastoPlastic | float | None = checked(_bristles, default=ElastoPlastic(0.9))
     """Kind of bristles, unless a whole law is given as start."""
     surface: type[LimitSurface] = checked(_surface, default=LimitSurfaceTablePublished)
     """Class of the limit surface of the model "reduced-published"."""
