@@ -25,4 +25,4 @@ def test_the_table_of_the_trials_is_written(tmp_path, capsys, monkeypatch):
 
 def test_too_few_parts_are_refused(capsys):
     assert main(["online", "trials", "--parts", "2"]) != 0
-    assert "count must be" in capsys.readouterr().err
+    assert "--parts must be" in capsys.readouterr().err

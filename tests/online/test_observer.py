@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba import njit
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
@@ -157,6 +158,13 @@ def test_a_batch_is_many_observers():
     assert together.slip.shape == (3,)
 
 
+@njit
+def updated(state, h, column):
+    kernels._measure(state, h, 0.7, 0.04, column)
+    kernels._spread(state, 3, 0.25, column)
+    kernels._reset(state, 1, 5.0, 0.5, column)
+
+
 def test_measurements_and_spreads_are_those_of_a_kalman_filter():
     rng = np.random.default_rng(0)
     n = kernels.N
@@ -165,12 +173,10 @@ def test_measurements_and_spreads_are_those_of_a_kalman_filter():
     state[kernels.ROOT : kernels.ROOT + n * n] = root.ravel()
     state[:n] = mean = rng.normal(size=n)
     covariance, h = root @ root.T, rng.normal(size=n)
-    kernels._measure.py_func(state, h, 0.7, 0.04, column)
+    updated(state, h, column)
     gain = covariance @ h / (h @ covariance @ h + 0.04)
     covariance = covariance - np.outer(gain, h @ covariance)
-    kernels._spread.py_func(state, 3, 0.25, column)
     covariance[3, 3] += 0.25
-    kernels._reset.py_func(state, 1, 5.0, 0.5, column)
     covariance[1], covariance[:, 1] = 0.0, 0.0
     covariance[1, 1] = 0.25
     found = state[kernels.ROOT : kernels.ROOT + n * n].reshape(n, n)

@@ -86,7 +86,7 @@ def app() -> None:
     "--parts",
     metavar="COUNT|auto",
     shell_complete=complete_parts,
-    help=f"Number of parts of the reduced model; auto: {AUTO_PARTS}. Default: 1, or the file's.",
+    help=f"Number of parts of the reduced model; auto: {AUTO_PARTS}. Default: few cells, or the file's.",
 )
 @patch_option("Default: the scene's (mostly Circle), or the file's.")
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")

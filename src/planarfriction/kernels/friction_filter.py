@@ -138,12 +138,9 @@ def _measure(s, h, innovation, variance, column):
 
 
 @kernel
-def _spread(s, i, variance, column):
-    """Add a variance to unknown i."""
-    for k in range(N):
-        column[k] = 0.0
-    column[i] = math.sqrt(variance)
-    for j in range(i, N):
+def _take_in(s, first, column):
+    """Rotate a column, zero above its row `first`, into the root: the covariance grows by its outer product."""
+    for j in range(first, N):
         a, b = s[ROOT + N * j + j], column[j]
         size = math.sqrt(a * a + b * b)
         if size > 0.0:
@@ -151,6 +148,15 @@ def _spread(s, i, variance, column):
             for k in range(j, N):
                 a, b = s[ROOT + N * k + j], column[k]
                 s[ROOT + N * k + j], column[k] = cosine * a + sine * b, cosine * b - sine * a
+
+
+@kernel
+def _spread(s, i, variance, column):
+    """Add a variance to unknown i."""
+    for k in range(N):
+        column[k] = 0.0
+    column[i] = math.sqrt(variance)
+    _take_in(s, i, column)
 
 
 @kernel
@@ -163,14 +169,7 @@ def _reset(s, i, value, deviation, column):
     for k in range(i + 1, N):
         s[ROOT + N * k + i] = 0.0
     s[i], s[ROOT + N * i + i] = value, deviation
-    for j in range(i + 1, N):  # what the others had in that column goes on
-        a, b = s[ROOT + N * j + j], column[j]
-        size = math.sqrt(a * a + b * b)
-        if size > 0.0:
-            cosine, sine = a / size, b / size
-            for k in range(j, N):
-                a, b = s[ROOT + N * k + j], column[k]
-                s[ROOT + N * k + j], column[k] = cosine * a + sine * b, cosine * b - sine * a
+    _take_in(s, i + 1, column)  # what the others had in that column goes on
 
 
 @kernel
