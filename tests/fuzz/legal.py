@@ -189,7 +189,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
         for name in ("FrictionObserver", "Hold", "Hinge", "SlideBy", "TurnBy")
     },
     **{
-        f"online.{name}": {"observer": Fresh(lambda: objects()["FrictionObserver"]), "goal": 0.02, "feed_forward": None}
+        f"online.{name}": {"observer": Fresh(lambda: objects()["FrictionObserver"]), "goal": 0.02}
         for name in ("Hold", "Hinge", "SlideBy", "TurnBy")
     },
     "PressureMaps": {"values": np.ones((2, 3))},

@@ -152,8 +152,7 @@ class Slip(GripController):
     While the part slips, a grip f accelerates it by `A (1 - f/f_b)`, A that of its load alone and `f_b` the grip that
     balances it. So `f = f_b (1 - a/A)`, `a = a_d + k_v (v_d - v) + k_x (x_d - x)`, with the place and the speed of the
     part when the grip acts. `f_b` is that of the first slip, then follows `f_b' = f_b k_i (v - v_c)`, `v_c = v_d + 2
-    (x_d - x)`; `feed_forward`, a function of the time since then, replaces it by a plan. A part that has stuck is
-    released slowly; at the goal it is caught.
+    (x_d - x)`. A part that has stuck is released slowly; at the goal it is caught.
     """
 
     axis: int
@@ -170,7 +169,6 @@ class Slip(GripController):
         acceleration: float,
         adapt: float,
         delay: float = 0.02,
-        feed_forward: Any = None,
         most: float = 60.0,
     ) -> None:
         super().__init__(observer, most=most)
@@ -180,7 +178,6 @@ class Slip(GripController):
         self.duration = validation.positive("duration", duration)
         self.acceleration = validation.positive("acceleration", acceleration)
         self.adapt, self.delay = validation.non_negative("adapt", adapt), validation.non_negative("delay", delay)
-        self.feed_forward = feed_forward
         shape = self.grip.shape
         self.balance, self._began, self._since = np.full(shape, math.nan), np.full(shape, math.nan), np.zeros(shape)
         self.caught = np.zeros(shape, bool)
@@ -195,10 +192,7 @@ class Slip(GripController):
         self._began = np.where(begins, self._time, self._began)
         self.balance = np.where(begins, 1.05 * force, self.balance)
         now = self._time + self.delay
-        if self.feed_forward is not None:
-            ahead = np.asarray(self.feed_forward(np.nan_to_num(now - self._began)), float)
-        else:
-            ahead = self.balance
+        ahead = self.balance
         place, speed, push = trapezoid(now - self._began, np.abs(self.goal), self.duration)
         there = x + v * self.delay
         self.caught = self.caught | (there + 0.5 * v * v / self._braking() >= np.abs(self.goal) * (1.0 - 1e-3))
