@@ -87,3 +87,17 @@ def test_wrong_settings_are_refused():
         TurnBy(observer, 1.0, duration=-1.0)
     with pytest.raises(InvalidValueError, match="reserve must be"):
         Hinge(observer, reserve=0.0)
+
+
+@pytest.mark.parametrize("speed, place", [(0.0, 0.0), (0.02, 0.004), (0.005, 0.006)])
+def test_the_grip_of_a_slip_is_what_balances_less_what_accelerates(speed, place):
+    observer = FrictionObserver(known_model(), batch=1)
+    slide = SlideBy(observer, -0.02)
+    sample = Measurement([1.0], [[0.0, 1.0, 0.0]], [4.0], [[0.0, -speed, 0.0]])
+    slide.estimate = observer.update(sample)._replace(slip=np.ones(1))
+    slide.balance[:], slide._began[:], slide._time[:] = 4.0, 0.5, 1.0
+    slide.velocity, slide.slid = np.array([[0.0, -speed, 0.0]]), np.array([[0.0, -place, 0.0]])
+    wished, wished_speed, push = trapezoid(1.0 + slide.delay - 0.5, 0.02, 2.0)
+    a = push + 8.0 * (wished_speed - speed) + 16.0 * (wished - place - speed * slide.delay)
+    assert abs(a) < 0.25 * slide.acceleration
+    assert slide._grip(np.ones(1), np.zeros(1)) == pytest.approx(4.0 * (1.0 - a / slide.acceleration))
