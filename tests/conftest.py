@@ -5,7 +5,10 @@ from __future__ import annotations
 import os
 import signal
 
+import pytest
 from hypothesis import settings
+
+from planarfriction import families
 
 os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")  # most of what its tests take is compilation
 
@@ -19,3 +22,11 @@ def pytest_configure(config) -> None:
     if config.getoption("--hypothesis-profile") is None:
         slow = "slow" in config.getoption("markexpr").replace("not slow", "")
         settings.load_profile("random" if slow else "repeatable")
+
+
+@pytest.fixture(autouse=True)
+def members(monkeypatch):
+    """Members that a test registers are forgotten after it: the next test of the process knows the library's own."""
+    for family in vars(families).values():
+        if isinstance(family, families.Family):
+            monkeypatch.setattr(family, "_members", dict(family._members))

@@ -47,10 +47,8 @@ class Coarse(pf.DistributedModel):
 
 
 @pytest.fixture
-def own(monkeypatch):
-    """Members of one's own, forgotten again after the test."""
-    for family in ALL:
-        monkeypatch.setattr(family, "_members", dict(family._members))
+def own():
+    """Register members of one's own."""
     pf.laws.register("bronze", Bronze, "dry bronze")
     pf.models.register("coarse", Coarse)
     pf.patch.register("tile", lambda width, cells=3: pf.ContactPatch.rectangle(width, cells=cells, name="tile"))

@@ -465,7 +465,6 @@ def test_bench_prints_a_table(capsys, measured):
 def test_an_own_shape_without_parameters_keeps_the_names_of_patches(monkeypatch):
     from planarfriction.families import SHAPES
 
-    monkeypatch.setattr(SHAPES, "_members", dict(SHAPES._members))
     SHAPES.register("thumb", lambda: pf.ContactPatch.disc(0.01))
     assert find_patch("disc", cell_size=None).name == "disc"
 
