@@ -9,7 +9,8 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.derivatives import parameter_names, parameters_of, rollout_vjp
-from tests.support.c_libraries import KINDS, LAW, MODELS, VECTOR, library, run, run_steady, samples
+from tests.support.c_libraries import DISC, KINDS, LAW, MODELS, VECTOR, library, run, run_steady, samples
+from tests.support.rate_laws import BoucWen
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
@@ -156,3 +157,7 @@ def test_models_without_source(tmp_path):
         pf.export_c(soft, tmp_path)
     with pytest.raises(pf.FrictionError, match="model must be one of DistributedModel"):
         pf.export_c(object(), tmp_path)
+    for kind in (pf.DistributedModel, pf.ReducedModel):
+        with pytest.raises(pf.FrictionError, match=r"with a law of LuGre bristles, got \w+, BoucWen"):
+            pf.export_c(kind(DISC, BoucWen()), tmp_path)
+    assert not list(tmp_path.iterdir())

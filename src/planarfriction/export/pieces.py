@@ -20,6 +20,7 @@ from planarfriction.kernels.reduced_contact import ReducedContact, ReducedPatch
 from planarfriction.kernels.rules import ratio
 from planarfriction.kernels.surfaces import CELLS
 from planarfriction.kernels.vectors import norm, times
+from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, MomentModel, ReducedModel, ReducedModelPublished
 
 FIXED = "gamma", "elasto_plastic", "creep_speed"
@@ -56,15 +57,15 @@ def pieces_of(model: Any, *, fixed: bool = True) -> Pieces:
     Raises InvalidValueError for models without straight-line source: laws of the user's own, other patches whose shape
     depends on the load, friction that differs from cell to cell in other ways than by a metric.
     """
-    whole = model.reduction if isinstance(model, ReducedModel) else model
+    whole, law = model.reduction if isinstance(model, ReducedModel) else model, getattr(model, "law", None)
     for kind, taken_apart in _KINDS.items():
-        if type(whole) is kind and isinstance(getattr(model.law, "numbers", None), LawNumbers):
+        if type(whole) is kind and isinstance(getattr(law, "numbers", None), LawNumbers) and not is_rate_law(law):
             if whole.patch.depends_on_load and (fixed or kind is not DistributedModel):
                 rule = "have a patch whose shape does not depend on the load" + ("" if fixed else ", or cells")
                 raise InvalidValueError("model", rule, model.patch.name or "a patch that does")
             return taken_apart(whole)
     names = ", ".join(kind.__name__ for kind in (*_KINDS, ReducedModel))
-    given = f"{type(model).__name__}, {type(getattr(model, 'law', None)).__name__}"
+    given = f"{type(model).__name__}, {type(law).__name__}"
     raise InvalidValueError("model", f"be one of {names} with a law of LuGre bristles", given)
 
 
