@@ -18,7 +18,7 @@ from planarfriction.errors import FileError
 from planarfriction_studies.referee import truths
 from planarfriction_studies.referee.case import FOLDER, all_cases, read_case
 from planarfriction_studies.referee.export import export_case
-from planarfriction_studies.referee.run import Apart, judge, run
+from planarfriction_studies.referee.run import Apart, Kept, judge, run
 
 CASES = all_cases()
 TRUTHS = {
@@ -247,10 +247,13 @@ class Crashing(Fake):
 
 
 def test_a_crash_is_one_failure():
-    verdicts = []
+    kept, cases, engines = Kept(), {name: CASES[name] for name in ("disc", "stop")}, [Crashing(0.5)]
     with Apart() as apart:
-        run({name: CASES[name] for name in ("disc", "stop")}, [Crashing(0.5)], verdicts, judged=apart.judge)
-    assert [(each.mark, each.reason) for each in verdicts] == [("fails", "the engine ended the process"), ("ok", "")]
+        run(cases, engines, kept, judged=apart.judge)
+    assert [(each.mark, each.reason) for each in kept.of(cases, engines)] == [
+        ("fails", "the engine ended the process"),
+        ("ok", ""),
+    ]
 
 
 def test_the_worst_time_step_counts():
@@ -262,15 +265,39 @@ def test_the_worst_time_step_counts():
     assert verdict.dt == 4e-3 and verdict.error / verdict.allowed == pytest.approx(4.0)
 
 
-def test_what_is_done_is_kept():
-    def stop(words):
-        if len(verdicts) == 1:
+def test_what_is_done_is_kept(tmp_path):
+    def stop(done, of, words):
+        assert of == 2
+        if done == 1 and len(judged) == 1:
             raise KeyboardInterrupt
 
-    verdicts = []
+    def judging(case, engine, steps):
+        judged.append(engine.name)
+        return judge(case, engine, steps)
+
+    judged, file = [], tmp_path / "referee.json"
+    cases, engines = {"stop": CASES["stop"]}, [Fake(0.0), Fake(2.0, name="other")]
     with pytest.raises(KeyboardInterrupt):
-        run({"stop": CASES["stop"]}, [Fake(0.0), Fake(2.0)], verdicts, progress=stop)
-    assert [each.mark for each in verdicts] == ["ok"]
+        run(cases, engines, Kept(file), judged=judging, progress=stop)
+    assert [row["mark"] for row in json.loads(file.read_text())] == ["ok"]
+    for _ in range(2):
+        run(cases, engines, Kept(file), judged=judging)
+        assert judged == ["fake", "other"]
+    # another time step, another case, other settings: done again, in place of what was there
+    for change in ({"steps": (1e-3,)}, {"cases": {"stop": replace(CASES["stop"], time=0.7)}}):
+        run(**{"cases": cases, "engines": engines[:1], "kept": Kept(file), "judged": judging} | change)
+    run(cases, [Fake(0.0, settings="others")], Kept(file), judged=judging)
+    assert judged == ["fake", "other", *["fake"] * 3]
+    assert [each.mark for each in Kept(file).of(cases, engines)] == ["ok", "off"]
+
+
+def test_a_file_of_something_else_stays(tmp_path):
+    for number, text in enumerate(["no JSON", "3", '[{"case": "stop"}]', '["stop"]']):
+        file = tmp_path / f"{number}.json"
+        file.write_text(text)
+        with pytest.raises(FileError, match="has no verdicts"):
+            Kept(file)
+        assert file.read_text() == text
 
 
 def test_each_quantity():

@@ -17,6 +17,7 @@ from planarfriction.cli.options import FILE
 
     Every engine that is installed runs every case at its defaults and at good settings, this library's adapters among
     them. Marks: ok within what is allowed, off up to ten times that, fails beyond it; - without words for the case.
+    With --json, each result is written when it is there, and the same command goes on from the file.
 
     \b
     Examples:
@@ -38,7 +39,12 @@ from planarfriction.cli.options import FILE
 @click.option("--step", type=float, help="Time step in s. Default: those of each case.")
 @click.option("--quick", is_flag=True, help="The first two engines.")
 @click.option("--list", "list_only", is_flag=True, help="List cases and engines.")
-@click.option("--json", "file", type=FILE, help="File for a JSON list of case, engine, error, allowed, cost and more.")
+@click.option(
+    "--json",
+    "file",
+    type=FILE,
+    help="File for a JSON list of case, engine, error, allowed, cost and more; what it has is kept.",
+)
 @click.option("--out", "folder", type=FILE, help="Folder for referee.json and referee.html, with a picture per case.")
 @click.pass_context
 def referee(
@@ -56,10 +62,10 @@ def referee(
         return 0
     from planarfriction import validation
     from planarfriction.cli import INTERRUPTED
-    from planarfriction.cli.console import note, print_table, work_progress
+    from planarfriction.cli.console import count_progress, note, print_table
     from planarfriction.writing import check_writable, make_folder
     from planarfriction_studies.referee import report
-    from planarfriction_studies.referee.run import Apart, Verdict, run
+    from planarfriction_studies.referee.run import Apart, Kept, run
 
     chosen = _cases(cases)
     left_out: list[str] = []
@@ -73,18 +79,21 @@ def referee(
         check_writable(file)
     if folder is not None:
         make_folder(folder)
-    verdicts: list[Verdict] = []
+    kept = Kept(file)
     code = 0
     try:
-        with Apart() as apart, work_progress("referee") as progress:
-            run(chosen, found, verdicts, steps=steps, judged=apart.judge, progress=progress)
+        with Apart() as apart, count_progress("referee") as progress:
+            run(chosen, found, kept, steps=steps, judged=apart.judge, progress=progress)
     except KeyboardInterrupt:
-        note(f"interrupted: {len(verdicts)} of {len(chosen) * len(found)} results are finished")
         code = INTERRUPTED
+    verdicts = kept.of(chosen, found)
+    if code:
+        goes_on = "" if file is None else ": the same command goes on from there"
+        note(f"interrupted: {len(verdicts)} of {len(chosen) * len(found)} results are finished{goes_on}")
     print_table("Friction against the truth: error over what is allowed", *report.table(verdicts))
     for text in left_out:
         note(f"left out: {text}")
-    for path in report.write(verdicts, chosen, found, file, folder):
+    for path in report.write(verdicts, chosen, found, folder):
         note(f"wrote {path}")
     return code
 

@@ -85,25 +85,17 @@ def _processor() -> str:
 
 
 def write(
-    verdicts: Sequence[Verdict],
-    cases: Mapping[str, Case],
-    engines: Sequence[Engine],
-    file: Path | None = None,
-    folder: Path | None = None,
+    verdicts: Sequence[Verdict], cases: Mapping[str, Case], engines: Sequence[Engine], folder: Path | None
 ) -> list[Path]:
-    """Write a JSON list to a file; and to a folder JSON with what was run, a page, and pictures. Return what is new."""
-    written = []
-    if file is not None:
-        write_text(file, json.dumps(to_rows(verdicts), indent=1) + "\n")
-        written.append(file)
-    if folder is not None:
-        run = stated(engines)
-        write_text(folder / "referee.json", json.dumps({**run, "verdicts": to_rows(verdicts)}, indent=1) + "\n")
-        for case in cases:
-            picture(case, verdicts).savefig(folder / f"{case}.svg")
-        write_text(folder / "referee.html", page(verdicts, cases, run))
-        written += [folder / "referee.json", folder / "referee.html"]
-    return written
+    """Write JSON with what was run, a page, and pictures to a folder, if there is one. Return what is new."""
+    if folder is None:
+        return []
+    run = stated(engines)
+    write_text(folder / "referee.json", json.dumps({**run, "verdicts": to_rows(verdicts)}, indent=1) + "\n")
+    for case in cases:
+        picture(case, verdicts).savefig(folder / f"{case}.svg")
+    write_text(folder / "referee.html", page(verdicts, cases, run))
+    return [folder / "referee.json", folder / "referee.html"]
 
 
 def page(verdicts: Sequence[Verdict], cases: Mapping[str, Case], run: Mapping[str, Any]) -> str:

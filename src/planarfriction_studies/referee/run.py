@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import hashlib
+import itertools
+import json
 import multiprocessing
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from planarfriction.errors import FileError
+from planarfriction.reading import read_text
+from planarfriction.writing import write_text
 from planarfriction_studies.referee.case import QUANTITIES, Case, Path3
 from planarfriction_studies.referee.engines import Engine, World
 
@@ -42,6 +50,8 @@ class Verdict:
     """Median processor time of a step of the engine [s]."""
     reason: str = ""
     """Reason of no result."""
+    fingerprint: str = ""
+    """Hash of the case, the settings, the versions and the time steps: a verdict with another one is not reused."""
 
 
 def trace(case: Case, world: World, dt: float) -> tuple[Path3, float]:
@@ -126,20 +136,53 @@ class Apart:
             return no_result("fails", case, engine, "the engine ended the process")
 
 
+class Kept:
+    """Verdicts by case and engine, in a JSON file that each new one is written to."""
+
+    def __init__(self, file: Path | None = None) -> None:
+        self.file = file
+        self.verdicts: dict[tuple[str, str], Verdict] = {}
+        if file is None or not file.exists():
+            return
+        try:
+            rows = [Verdict(**row) for row in json.loads(read_text(file, "verdicts of the referee"))]
+        except (TypeError, ValueError):
+            raise FileError(f"{file}: has no verdicts of the referee: name another file, or remove it") from None
+        self.verdicts = {(each.case, each.engine): each for each in rows}
+
+    def add(self, verdict: Verdict) -> None:
+        """Keep a verdict, in place of an earlier one."""
+        self.verdicts[verdict.case, verdict.engine] = verdict
+        if self.file is not None:
+            write_text(self.file, json.dumps(to_rows([*self.verdicts.values()]), indent=1) + "\n")
+
+    def of(self, cases: Mapping[str, Case], engines: Sequence[Engine]) -> list[Verdict]:
+        """Return the verdicts on these engines in these cases."""
+        keys = ((case, engine.name) for engine in engines for case in cases)
+        return [self.verdicts[key] for key in keys if key in self.verdicts]
+
+
 def run(
     cases: Mapping[str, Case],
     engines: Sequence[Engine],
-    verdicts: list[Verdict],
+    kept: Kept,
     *,
     steps: Sequence[float] | None = None,
     judged: Callable[..., Verdict] = judge,
-    progress: Callable[[str], None] = lambda words: None,
+    progress: Callable[[int, int, str], None] = lambda done, of, words: None,
 ) -> None:
-    """Judge all engines in all cases; verdicts are appended one by one, so that an interrupt keeps what is done."""
-    for engine in engines:
-        for case in cases.values():
-            progress(f"{engine.name}, {case.name}")
-            verdicts.append(judged(case, engine, steps))
+    """Judge all engines in all cases, but for what is kept; each verdict is kept at once, for a run that is ended."""
+    pairs = list(itertools.product(engines, cases.values()))
+    for done, (engine, case) in enumerate(pairs):
+        progress(done, len(pairs), f"{engine.name}, {case.name}")
+        own, known = _fingerprint(case, engine, steps), kept.verdicts.get((case.name, engine.name))
+        if known is None or known.fingerprint != own:
+            kept.add(replace(judged(case, engine, steps), fingerprint=own))
+
+
+def _fingerprint(case: Case, engine: Engine, steps: Sequence[float] | None) -> str:
+    versions = [metadata.version(package) for package in ("planarfriction", engine.package)]
+    return hashlib.sha256(repr((case, engine.settings, versions, steps)).encode()).hexdigest()[:16]
 
 
 def to_rows(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
