@@ -14,7 +14,7 @@ from planarfriction.export.c_source import TYPES, Writer, used_by
 from planarfriction.export.trace import Block, Branch, Operation
 
 CELLS = 40
-"""Cells of a block: those of the default model; 3 kB of stack."""
+"""Largest number of cells of a block: 3 kB of stack."""
 
 PASSES = 4
 """Passes over a block: from three on they take the same time, half of that of one."""
@@ -66,8 +66,8 @@ def passes_of(writer: Writer, block: Block, count: int, places: Sequence[str], s
             lines += [f"    {place} = {result};" for place, result in zip(places, results, strict=False)]
             lines += [f"    row[{j}][i] = {share} * {result};" for j, result in enumerate(results[len(places) :])]
         texts.append("\n".join(f"    {line}" for line in lines))
-    cells = min(count, CELLS)
-    return Passes(cells, -(-count // cells), rows, "\n".join(shared), texts)
+    blocks = -(-count // CELLS)
+    return Passes(-(-count // blocks), blocks, rows, "\n".join(shared), texts)
 
 
 def _names(operation: Operation) -> Iterator[str]:

@@ -26,7 +26,7 @@ class ReducedModel(FrictionPytree):
             law: FrictionLaw,
             normal_force: float | None = None,
             *,
-            cells: int = 40,
+            cells: int = 56,
             parts: int | str | None = None,
             segments: int = 24,
             speeds: int = 16,

@@ -37,7 +37,7 @@ class ReducedModel(FrictionModel):
     """
 
     _: KW_ONLY
-    cells: int = 40
+    cells: int = 56
     """Number of cells that have bristles, twice as many if the shape of the patch depends on the load."""
     parts: Any = None
     """Number of compact parts with moments of their own, or "auto" (4 to 8); None: bristles on a few cells."""

@@ -49,7 +49,7 @@ class MomentModel(ReducedModel):
         law: FrictionLaw,
         normal_force: float | None = None,
         *,
-        cells: int = 40,
+        cells: int = 56,
         parts: int | str = 1,
         segments: int = 24,
         speeds: int = 16,

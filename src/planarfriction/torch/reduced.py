@@ -30,7 +30,7 @@ class ReducedModel(FrictionModule):
             law: FrictionLaw,
             normal_force: float | None = None,
             *,
-            cells: int = 40,
+            cells: int = 56,
             parts: int | str | None = None,
             segments: int = 24,
             speeds: int = 16,

@@ -116,7 +116,7 @@ class Family(NamedTuple):
 
 FAMILIES = (
     Family("published reduced model", {"published": ""}, looks.REDUCED, "^"),
-    Family("ReducedModel, 40 cells", {"reduced": ""}, looks.FEW, "s"),
+    Family("ReducedModel, by default", {"reduced": ""}, looks.FEW, "s"),
     Family("ReducedModel, its parts", {"one part": "1", **{f"{n} parts": f"{n}" for n in (4, 6, 16)}}, looks.MOMENTS,
            "o", (4, -11)),
     Family("distributed, its cells", {"degree 3": "28", "degree 5": "45", "full": "all"}, looks.DISTRIBUTED, "D"),
