@@ -172,6 +172,25 @@ def test_a_damaged_chunk_is_found_by_who_reads_it(zarr, tmp_path):
         stored.x.load()
 
 
+def test_a_folder_in_the_place_of_a_chunk_is_no_chunk(zarr, tmp_path):
+    path = tmp_path / "all.zarr"
+    pf.sweep(grip, VALUES, out=path)
+    chunk = path / "x" / "c" / "1" / "0" / "0"
+    chunk.unlink()
+    chunk.mkdir()
+    with pytest.raises(pf.FrictionError, match=r"all\.zarr: cannot be written: Is a directory"):
+        pf.sweep(grip, VALUES, out=path)
+
+
+def test_axes_that_cannot_be_decompressed_are_told_in_one_line(zarr, tmp_path):
+    path = tmp_path / "all.zarr"
+    pf.sweep(grip, VALUES, out=path)
+    (path / "mass" / "c" / "0").write_bytes(b"no compressed numbers")
+    with pytest.raises(pf.FrictionError, match=r"all\.zarr: no zarr store of a sweep, and none can be made") as caught:
+        pf.sweep(grip, VALUES, out=path)
+    assert "\n" not in str(caught.value)
+
+
 def test_another_grid_needs_another_store(zarr, tmp_path):
     path = tmp_path / "all.zarr"
     pf.sweep(grip, VALUES, out=path, measure=end)

@@ -227,7 +227,8 @@ class FrictionModel(ByValue):
             shapes = ", ".join(str(list(v.shape)) for v in (state, twist, *arrays.values()))
             raise InvalidValueError("batch axes", "broadcast", f"shapes {shapes}") from None
         if math.prod(batch) > validation.MOST_NUMBERS:
-            raise InvalidValueError("batch axes", f"hold at most {validation.MOST_NUMBERS} contacts", list(batch))
+            got = f"{list(batch)} of {', '.join(('state', 'twist', *arrays))}"
+            raise InvalidValueError("batch axes", f"hold at most {validation.MOST_NUMBERS} contacts", got)
         for name, value in {"state": state, "twist": twist, **arrays}.items():
             validation.within_range(name, value.min(initial=0.0), value.max(initial=0.0))
         for name, value in arrays.items():

@@ -56,7 +56,7 @@ def grid_of(values: Any) -> Grid:
         raise InvalidValueError("values", "be a mapping from names to lists of values, not empty", values)
     labels, behind = {}, {}
     for name, given in values.items():
-        validation.text("name of a swept quantity", name)
+        validation.text("name of a swept quantity in values", name)
         behind[name] = list(given.values()) if isinstance(given, Mapping) else _scalars(name, given)
         labels[name] = _scalars(name, list(given)) if isinstance(given, Mapping) else behind[name]
     result = Grid(labels, behind)

@@ -83,7 +83,7 @@ class ZarrBookkeeper(Bookkeeper):
             _lock(self._journal, path)
             with zarr.config.set(_ALL_CHUNKS):
                 self._begin()
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:  # the last from decompression
             self.close()
             if isinstance(error, FileError):
                 raise
@@ -186,7 +186,7 @@ class ZarrBookkeeper(Bookkeeper):
         run, record = self._listed.get(index, ("", None))
         if run != key or record is None or record.status == FAILED:
             return None
-        if not all(map(os.path.exists, self._chunks(index))):
+        if not all(map(os.path.isfile, self._chunks(index))):
             self.damaged += 1
             return None
         return record
