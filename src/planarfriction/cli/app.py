@@ -11,6 +11,7 @@ from click.shell_completion import CompletionItem
 
 from planarfriction import __version__
 from planarfriction.cli.commands import Commands
+from planarfriction.cli.doctor import doctor
 from planarfriction.cli.identify_plan import FitOrPlan, complete_log
 from planarfriction.cli.online import online
 from planarfriction.cli.options import FILE, complete_scene, patch_option, width_option
@@ -230,5 +231,6 @@ def warm() -> None:
     print_table("Compiled or read from the cache", ["part", "time [s]"], rows)
 
 
+app.add_command(doctor)
 app.add_command(online)
 app.add_command(sweep)

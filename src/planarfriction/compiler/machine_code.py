@@ -25,6 +25,7 @@ import numpy as np
 from numba.core import config
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
+from numba.core.registry import cpu_target
 from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 from numba.misc.appdirs import AppDirs
@@ -83,6 +84,16 @@ def kept(dispatcher: Any, sources: Sources) -> Any:
     return dispatcher
 
 
+def folders(sources: Sources) -> Iterator[Path]:
+    """Yield the folders for machine code of these sources in the order in which they are read and written."""
+    if config.CACHE_DIR:
+        places = [Path(config.CACHE_DIR)]
+    else:
+        user = Path(AppDirs("planarfriction", appauthor=False).user_cache_dir)
+        places = [sources.root / "__pycache__", *([user] if user.is_absolute() else [])]
+    return (place / f"planarfriction-{sources.digest}" for place in places)
+
+
 def _digest_of(file: Path) -> str | None:
     try:
         return hashlib.sha256(file.read_bytes()).hexdigest()
@@ -104,16 +115,7 @@ class MachineCode(NullCache):
     @property
     def cache_path(self) -> str:
         """Folder that is tried first."""
-        return str(next(self._folders()))
-
-    def _folders(self) -> Iterator[Path]:
-        """Yield the folders for machine code in the order in which they are read and written."""
-        if config.CACHE_DIR:
-            places = [Path(config.CACHE_DIR)]
-        else:
-            user = Path(AppDirs("planarfriction", appauthor=False).user_cache_dir)
-            places = [self._sources.root / "__pycache__", *([user] if user.is_absolute() else [])]
-        return (place / f"planarfriction-{self._sources.digest}" for place in places)
+        return str(next(folders(self._sources)))
 
     def _file(self, arguments: tuple, codegen: Any) -> tuple[str, bytes]:
         """Return the name of the file for a signature, and the origin of its machine code."""
@@ -127,7 +129,7 @@ class MachineCode(NullCache):
         target_context.refresh()
         arguments, _ = normalize_signature(sig)
         name, origin = self._file(arguments, target_context.codegen())
-        for path in (folder / name for folder in self._folders()):
+        for path in (folder / name for folder in folders(self._sources)):
             try:
                 return _unpacked(path.read_bytes(), origin, arguments, target_context)
             except (FileNotFoundError, NotADirectoryError):
@@ -143,7 +145,7 @@ class MachineCode(NullCache):
             return
         name, origin = self._file(normalize_signature(sig)[0], data.codegen)
         content = dumps(data._reduce())
-        for folder in self._folders():
+        for folder in folders(self._sources):
             try:
                 _make(folder)
                 with replacing(folder / name) as file:
@@ -167,7 +169,23 @@ class MachineCode(NullCache):
 
 
 def _seal(origin: bytes, content: bytes) -> bytes:
-    return hashlib.sha256(origin).digest() + zlib.crc32(content).to_bytes(4)
+    return hashlib.sha256(origin).digest() + _checksum(content)
+
+
+def _checksum(content: bytes) -> bytes:
+    return zlib.crc32(content).to_bytes(4)
+
+
+def target() -> tuple[str, set[str]]:
+    """Return the processor that code is compiled for and its features, by LLVM's names."""
+    _, name, features = cpu_target.target_context.codegen().magic_tuple()
+    return name, {feature[1:] for feature in features.split(",") if feature.startswith("+")}
+
+
+def whole(file: Path) -> bool:
+    """Return True if the content of a file of machine code is what its checksum says."""
+    read = file.read_bytes()
+    return read[:_SEAL].endswith(_checksum(read[_SEAL:]))
 
 
 def _unpacked(file: bytes, origin: bytes, arguments: tuple, target_context: Any) -> CompileResult:
