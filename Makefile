@@ -3,18 +3,21 @@
 # make test-bounds: tests of compiled loops once more, with every index checked; BOUNDED=tests/limit_surface: other ones.
 # make test-lowest: the tests with the lowest versions of everything.
 # make fuzz MINUTES=60: attacks with random examples, an hour long; ATTACKS=coupling: those alone whose name begins so.
+# make dist: wheel and source distribution in dist, checked; TAG=v1.2.3: that of a release, which has to be the version.
+# make dist-install: that wheel in empty environments; PYTHONS="3.11 3.14": Pythons, or their paths.
 # make docs: the site, in build/docs; scripts of its gallery run once, and again when they have changed.
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 LOWEST := .venv-lowest
+TOOLS := .venv-tools
 
 # The package is installed in place, so that sources count at once and compiled kernels, which are kept beside them,
 # survive from run to run. What is installed changes with pyproject.toml only.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-generic test-bounds test-lowest fuzz docs lint bench clean
+.PHONY: demo test test-generic test-bounds test-lowest fuzz docs lint bench dist dist-install clean
 
 demo: $(VENV)/.package
 	$(BIN)/planarfriction run in-hand --model both --out out/ --plot
@@ -64,8 +67,23 @@ lint: $(VENV)/.dev
 bench: $(VENV)/.package
 	$(BIN)/planarfriction bench $(ARGS)
 
+# From what is committed: no cache and no file of an earlier build gets in.
+dist: $(TOOLS)/.ready
+	rm -rf build/source build/direct dist
+	mkdir -p build/source
+	git archive HEAD | tar -x -C build/source
+	$(TOOLS)/bin/python -m build --outdir dist build/source
+	$(TOOLS)/bin/python -m build --wheel --outdir build/direct build/source
+	$(TOOLS)/bin/twine check --strict dist/*
+	$(TOOLS)/bin/python .ci/check_dist.py dist build/direct $(TAG)
+
+PYTHONS ?= 3.11 3.12 3.13 3.14
+
+dist-install: dist
+	.ci/install_dist $(TOOLS)/bin/uv $(PYTHONS)
+
 clean:
-	rm -rf $(VENV) $(LOWEST) out build dist docs/api docs/gallery docs/notebooks .pytest_cache .ruff_cache .hypothesis .import_linter_cache src/*.egg-info
+	rm -rf $(VENV) $(LOWEST) $(TOOLS) out build dist docs/api docs/gallery docs/notebooks .pytest_cache .ruff_cache .hypothesis .import_linter_cache src/*.egg-info
 	find src tests examples -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
@@ -86,6 +104,11 @@ $(LOWEST)/.test: pyproject.toml
 	$(PYTHON) -m venv --clear $(LOWEST)
 	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check uv
 	$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST) --resolution lowest-direct --editable '.[test]'
+	touch $@
+
+$(TOOLS)/.ready:
+	$(PYTHON) -m venv --clear $(TOOLS)
+	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check build twine uv
 	touch $@
 
 $(VENV)/.dev: $(VENV)/.test

@@ -6,14 +6,10 @@ import os
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-
-MAX_WHEEL = 2.5e6
-"""Size [bytes] above which the studies with their data become a distribution of their own."""
+from tests.support.repository import ROOT, script
 
 LOG = """
 import numpy as np
@@ -52,7 +48,7 @@ def test_wheel_in_an_empty_environment(tmp_path):
     python = tmp_path / "empty" / "bin" / "python"
     run(python, "-m", "pip", "install", *tmp_path.glob("*.whl"))
     (wheel,) = tmp_path.glob("*.whl")
-    assert wheel.stat().st_size < MAX_WHEEL
+    assert wheel.stat().st_size < script(".ci/check_dist.py").MAX_WHEEL
     run(python, "-c", LOG)
     command = python.with_name("planarfriction")
     assert "times faster than real time" in run(command, "run", "in-hand")

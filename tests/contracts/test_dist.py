@@ -1,0 +1,71 @@
+"""What `make dist` refuses: files that are missing or too many, another version, a wheel that grows."""
+
+from __future__ import annotations
+
+import io
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from tests.support.repository import ROOT, script
+
+check = script(".ci/check_dist.py")
+CODE = {"planarfriction/__init__.py", "planarfriction/py.typed"}
+
+
+def wheel(folder: Path, names: set[str], content: bytes = b"") -> Path:
+    """Write a wheel with these files and all licences."""
+    folder.mkdir()
+    path = folder / "planarfriction-1.2.3-py3-none-any.whl"
+    licences = {f"planarfriction-1.2.3.dist-info/licenses/{name}" for name in check.LICENCES}
+    with zipfile.ZipFile(path, "w") as archive:
+        for name in sorted(names | licences):
+            archive.writestr(name, content)
+    return path
+
+
+def source(folder: Path, names: set[str]) -> Path:
+    """Write a source distribution with these files."""
+    path = folder / "planarfriction-1.2.3.tar.gz"
+    with tarfile.open(path, "w:gz") as archive:
+        for name in sorted(names | {"PKG-INFO", "setup.cfg", "src/planarfriction.egg-info/SOURCES.txt"}):
+            archive.addfile(tarfile.TarInfo(f"planarfriction-1.2.3/{name}"), io.BytesIO())
+    return path
+
+
+def faults(folder: Path, *, code: set[str] = CODE, beside: set[str] = frozenset(), **options) -> list[str]:
+    """What is found wrong with a release that has these files."""
+    sent = source(folder, {f"src/{name}" for name in code} | check.BESIDE | beside)
+    return check.faults(sent, wheel(folder / "a", code), wheel(folder / "b", code), CODE, **options)
+
+
+def test_a_release_has_the_tracked_files_and_its_tag(tmp_path):
+    assert faults(tmp_path, tag="v1.2.3") == []
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"code": CODE - {"planarfriction/py.typed"}}, "missing from the wheel: planarfriction/py.typed"),
+        ({"code": CODE | {"tests/test_a.py"}}, "in the wheel only: tests/test_a.py"),
+        ({"beside": {"tests/test_a.py"}}, "in the source distribution only: tests/test_a.py"),
+        ({"tag": "v1.2.4"}, "the tag v1.2.4 is not the version of planarfriction-1.2.3-py3-none-any.whl"),
+    ],
+)
+def test_what_does_not_belong_is_named(tmp_path, options, words):
+    assert words in faults(tmp_path, **options)
+
+
+def test_wheels_that_differ_or_grow_are_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(check, "MAX_WHEEL", 100.0)
+    sent = source(tmp_path, {f"src/{name}" for name in CODE} | check.BESIDE)
+    found = check.faults(sent, wheel(tmp_path / "a", CODE), wheel(tmp_path / "b", CODE, b"more"), CODE)
+    assert any(line.startswith("not the same in a wheel") and "py.typed" in line for line in found)
+    assert any(line.startswith("the wheel has ") for line in found)
+
+
+def test_this_repository_has_what_a_release_needs():
+    assert {"planarfriction/__init__.py", "planarfriction/py.typed"} <= check.tracked()
+    assert all((ROOT / name).is_file() for name in check.BESIDE)
