@@ -69,7 +69,7 @@ def randomise(law: FrictionLaw, ranges: Mapping[str, Any], count: int, *, seed: 
     validation.keys("ranges", ranges, (), PARAMETERS)
     count = validation.count("count", count, at_most=validation.MOST_DRAWS)
     generator = np.random.default_rng(validation.count("seed", seed, 0))
-    drawn = {name: _drawn(name, given, count, generator) for name, given in ranges.items()}
+    drawn: dict[str, Any] = {name: _drawn(name, given, count, generator) for name, given in ranges.items()}
     own = law.numbers
     if "mu_c" in drawn and "mu_s" not in drawn:
         drawn["mu_s"] = drawn["mu_c"] * (own.mu_s / own.mu_c)

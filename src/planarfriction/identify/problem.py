@@ -55,7 +55,7 @@ def _surface(name: str, value: Any) -> type[LimitSurface]:
     return value
 
 
-def _bristles(_: str, value: Any) -> ElastoPlastic | None:
+def _bristles(_: str, value: Any) -> ElastoPlastic | float | None:
     return LuGre(elasto_plastic=value).elasto_plastic
 
 

@@ -92,9 +92,9 @@ class CoupledPatches:
     def results(self) -> Any:
         """Return a `CoupledStep` of Warp's arrays, which `step` can write."""
         k = len(self.models)
-        state, wrench, twist, load = self.rest(), self._zeros(k, 3), self._zeros(k, 3), self._zeros(k)
         rounds, converged = (wp.zeros(self.worlds, dtype=wp.int32, device=self.device) for _ in range(2))
-        return CoupledStep(state, wrench, twist, load, rounds, self._zeros(), converged)
+        own: list[Any] = [self.rest(), *(self._zeros(*shape) for shape in ((k, 3), (k, 3), (k,)))]
+        return CoupledStep(*own, rounds, self._zeros(), converged)  # pyright: ignore
 
     def step(
         self,
