@@ -77,7 +77,7 @@ def test_wrong_models(call, message):
 
 @every_model
 def test_huge_numbers_and_batches_are_refused_before_allocation(model):
-    with pytest.raises(InvalidValueError, match="batch axes must hold at most"):
+    with pytest.raises(InvalidValueError, match=r"batch axes must hold .* of state, twist, normal_force, dt$"):
         model.step(model.rest(), (1, 0, 0), np.broadcast_to(1.0, (10**5, 10**5)), 1e-3)
     with pytest.raises(InvalidValueError, match="normal_force must be an array of numbers along at most 16 axes"):
         model.step(model.rest(), (1, 0, 0), np.ones((1,) * 40), 1e-3)

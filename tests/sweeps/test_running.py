@@ -113,6 +113,7 @@ def test_values_of_any_kind_have_labels():
     ("arguments", "words"),
     [
         ({"values": {}}, "values must be a mapping from names to lists of values"),
+        ({"values": {"": [1.0]}}, "name of a swept quantity in values must be a text that is not empty"),
         ({"values": {"grip": 1.0}}, "grip must be a list of numbers, texts or booleans"),
         ({"values": {"grip": []}}, "grip must have at least one value"),
         ({"values": {"grip": [1.0, 1.0]}}, "grip must have each value once, got 1.0 2 times"),
