@@ -440,7 +440,7 @@ LINES = [Line("import", 0.1, "s", None, None, None), Line("table.build", 0.004, 
 def measured(monkeypatch) -> list:
     calls = []
 
-    def run(names, *, full, progress):
+    def run(names, *, full, rounds, progress):
         calls.append((names, full))
         progress("import")
         return LINES

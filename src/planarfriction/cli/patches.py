@@ -9,7 +9,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import planarfriction as pf
-from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import PUBLISHED_PATCHES, SHAPES
 
@@ -44,6 +43,8 @@ def find_patch(text: str | None, *, cell_size: float | None, width: float = WIDT
             raise InvalidValueError("--cell-size", "be given only for a pressure map", given)
         return make()
     if not (Path(text).suffix or (text and os.path.exists(text))):
+        from planarfriction import validation  # loads NumPy
+
         validation.choice("patch", text, [*patch_names(), "a pressure map file"])
     return pressure_map(text, cell_size)
 

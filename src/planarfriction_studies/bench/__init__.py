@@ -1,7 +1,7 @@
 """`planarfriction bench`: what things cost, each beside a baseline measured in the same run, without compile time.
 
-`running` lists the benchmarks and runs them; the modules beside it measure: `whole_runs`, `steps`, `gradients`,
-`workflows`, and inside simulators `simulator_costs`.
+`running` lists the benchmarks and runs them, and `comparison` compares two runs; the modules beside them measure:
+`whole_runs`, `steps`, `gradients`, `workflows`, and inside simulators `simulator_costs`.
 The scenes of simulators, a disc whose way to rest is known, and solvers to compare with serve the experiments, too.
 """
 

@@ -29,6 +29,8 @@ class Measurement:
     """Median of the baseline, same unit."""
     ratio: float | None
     """Ratio of baseline over value, above 1 where the baseline is dearer, unless `baseline` says otherwise."""
+    ratios: tuple[float, ...] = ()
+    """Ratios of all rounds, if there was more than one; the others are those of the round in the middle."""
 
 
 def line(value: float, unit: str, baseline: str, baseline_value: float, ratio: float | None = None) -> Measurement:

@@ -86,19 +86,28 @@ BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
 
 
 def run(
-    names: Sequence[str] | None = None, *, full: bool = False, progress: Callable[[str], None] | None = None
+    names: Sequence[str] | None = None,
+    *,
+    full: bool = False,
+    rounds: int = 1,
+    progress: Callable[[str], None] | None = None,
 ) -> list[Measurement]:
     """Measure the benchmarks `names` (all by default); `full` also runs the baselines that take minutes.
 
+    With several `rounds` each benchmark gives the round whose ratio is in the middle, and the ratios of all.
+
     Raises `InvalidValueError` for an unknown name.
     """
+    rounds = validation.count("rounds", rounds)
     chosen = list(BENCHMARKS) if names is None else [validation.choice("name", name, BENCHMARKS) for name in names]
     results = []
     for name in chosen:
         if progress is not None:
             progress(name)
         try:
-            results.append(dataclasses.replace(BENCHMARKS[name](full), name=name))
+            found = sorted((BENCHMARKS[name](full) for _ in range(rounds)), key=lambda each: each.ratio or 0.0)
+            ratios = tuple(each.ratio for each in found if each.ratio is not None) if rounds > 1 else ()
+            results.append(dataclasses.replace(found[len(found) // 2], name=name, ratios=ratios))
         except MissingExtraError as missing:
             results.append(Measurement(name, None, "", f"left out: {missing}", None, None))
     return results

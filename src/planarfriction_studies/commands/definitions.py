@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 # ---------------------------------------------------------------------- bench
 
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""Variables by which libraries of linear algebra, and PyTorch, learn how many threads to use."""
+
 
 @click.command(
     short_help="Measure the speed of this installation.",
@@ -26,30 +29,58 @@ if TYPE_CHECKING:
       planarfriction bench
       planarfriction bench --only in_hand.reduced --json
       planarfriction bench --full
+      planarfriction bench --json > old.json
+      planarfriction bench --compare old.json --only sweep
+
+    --compare measures again and prints how far the ratios to the baselines have moved since, which depends less on the
+    machine than the times do. NumPy, SciPy and PyTorch get one thread unless OMP_NUM_THREADS says otherwise.
     """,
 )
 @click.option("--only", metavar="NAME", multiple=True, help="Only this benchmark; may be repeated.")
 @click.option("--full", is_flag=True, help="Include the baselines that take minutes.")
+@click.option("--rounds", type=int, help="Rounds of each benchmark. Default: 1, with --compare 3.")
+@click.option("--compare", "old", type=FILE, help="Earlier run to compare with, as --json prints it.")
+@click.option("--force", is_flag=True, help="Compare although other programs use the machine.")
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON list and nothing else on stdout.")
-def bench(only: tuple[str, ...], full: bool, as_json: bool) -> None:
+def bench(only: tuple[str, ...], full: bool, rounds: int | None, old: Path | None, force: bool, as_json: bool) -> None:
     """Measure (the help above is what users see)."""
     import dataclasses
     import json
+    import os
 
     from planarfriction.cli.console import print_table, work_progress
-    from planarfriction_studies import bench as benchmarks
 
+    for name in THREADS:  # read when these libraries load, which is below
+        os.environ.setdefault(name, os.environ.get("OMP_NUM_THREADS", "1"))
+    from planarfriction_studies import bench as benchmarks
+    from planarfriction_studies.bench import comparison
+
+    then = None if old is None else comparison.read_run(old)
+    if then is not None and not force:
+        comparison.check_idle()
     with work_progress("measuring") as progress:
-        lines = benchmarks.run(list(only) or None, full=full, progress=progress)
+        rounds = rounds if rounds is not None else 1 if then is None else comparison.ROUNDS
+        names = list(only) or (None if then is None else [name for name in benchmarks.BENCHMARKS if name in then])
+        lines = benchmarks.run(names, full=full, rounds=rounds, progress=progress)
     if as_json:
         print(json.dumps([dataclasses.asdict(line) for line in lines], indent=2))
-        return
-    shown = lambda value: "" if value is None else f"{value:.4g}"  # noqa: E731
-    rows = [
-        [each.name, shown(each.value), each.unit, each.baseline or "", shown(each.baseline_value), shown(each.ratio)]
-        for each in lines
-    ]
-    print_table("Benchmarks", ["name", "value", "unit", "baseline", "of the baseline", "ratio"], rows)
+    elif then is not None:
+        headings = ["name", "then", "now", "ratio then", "ratio now", "change", "spread", ""]
+        print_table("Ratios to the baselines", headings, comparison.rows(comparison.changes(lines, then)))
+    else:
+        shown = lambda value: "" if value is None else f"{value:.4g}"  # noqa: E731
+        rows = [
+            [
+                each.name,
+                shown(each.value),
+                each.unit,
+                each.baseline or "",
+                shown(each.baseline_value),
+                shown(each.ratio),
+            ]
+            for each in lines
+        ]
+        print_table("Benchmarks", ["name", "value", "unit", "baseline", "of the baseline", "ratio"], rows)
 
 
 # ---------------------------------------------------------------------- measured
