@@ -40,6 +40,7 @@ def one_line(act, *arguments) -> str:
 # ---------------------------------------------------------------------- what is no file
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes and devices of POSIX")
 @pytest.mark.parametrize("name", READERS)
 def test_what_is_no_file_is_said_at_once(tmp_path, name):
     path = tmp_path / name

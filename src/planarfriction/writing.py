@@ -12,11 +12,15 @@ import os
 import secrets
 import shutil
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 from planarfriction import validation
 from planarfriction.errors import FileError, FrictionError
+
+_PATIENCE = (0.01, 0.03, 0.1, 0.3) if os.name == "nt" else ()
+"""Pauses [s] between tries to replace a file: Windows refuses while another program has it open, if only to scan it."""
 
 
 @contextlib.contextmanager
@@ -47,7 +51,7 @@ def put(path: str, content: bytes) -> None:
         try:
             with open(part, "xb", buffering=0) as file:
                 write_all(file, content)
-            os.replace(part, path)
+            _take_place(part, path)
         except BaseException:
             with contextlib.suppress(OSError):
                 os.unlink(part)
@@ -118,6 +122,8 @@ def making_folder(path: Path) -> Iterator[Path]:
         part.mkdir()
         try:
             yield part
+            with contextlib.suppress(OSError):
+                path.rmdir()  # an empty one, which Windows does not replace
             part.rename(path)
         except OSError as error:
             if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
@@ -135,11 +141,21 @@ def _replace(target: Path, content: memoryview) -> None:
             os.fsync(file.fileno())
         with contextlib.suppress(FileNotFoundError):
             shutil.copymode(target, part)
-        part.replace(target)
+        _take_place(part, target)
     except BaseException:
         with contextlib.suppress(OSError):
             part.unlink()
         raise
+
+
+def _take_place(part: str | Path, target: str | Path) -> None:
+    """Let the file `part` take the place of `target`."""
+    for pause in _PATIENCE:
+        try:
+            return os.replace(part, target)
+        except PermissionError:
+            time.sleep(pause)
+    os.replace(part, target)
 
 
 def _part(target: Path) -> Path:

@@ -11,6 +11,8 @@ import pytest
 import planarfriction as pf
 from planarfriction.cli import main
 
+pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes and devices of POSIX")
+
 SCENE = """
 t_end = 0.01
 [body]

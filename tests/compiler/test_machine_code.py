@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import os
-import resource
 import shutil
 import signal
 import sys
@@ -22,6 +21,8 @@ from numba.core.registry import cpu_target
 from planarfriction import compiler
 from planarfriction.compiler import machine_code
 from planarfriction.compiler.interrupts import heard_between_passes
+
+resource = pytest.importorskip("resource")  # not on Windows
 
 FORMULA = """
 def grow(x):

@@ -231,6 +231,7 @@ def test_additions_that_no_file_can_hold_get_one_line(tmp_path):
         Solution.load(tmp_path / "run.nc")
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes and devices of POSIX")
 @pytest.mark.parametrize("name", ["pipe.nc", "/dev/zero", "a\0b", "\udcff.nc"])
 def test_what_is_no_file_is_no_solution(tmp_path, name):
     if name == "pipe.nc":

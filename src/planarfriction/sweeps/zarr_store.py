@@ -31,6 +31,9 @@ _JOURNAL = "runs.jsonl"
 _ALL_CHUNKS = {"array.write_empty_chunks": True}
 """Setting of zarr under which a chunk that is not there has been lost: by default one without values is not written."""
 
+_LOCKED_BYTE = 2**30
+"""Place in the journal that is locked where only parts of a file can be."""
+
 _LOCKED: weakref.WeakSet[io.FileIO] = weakref.WeakSet()
 """Locked journals of this process. A process forked from it closes them: it may live longer, and keep the lock."""
 
@@ -46,10 +49,16 @@ def _lock(journal: io.FileIO, path: Path) -> None:
     try:
         import fcntl
     except ImportError:  # on Windows
-        return
+        fcntl = None
+        import msvcrt
     try:
-        fcntl.flock(journal, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+        if fcntl is not None:
+            fcntl.flock(journal, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        else:  # a byte far behind the end, as nobody can read what is locked
+            journal.seek(_LOCKED_BYTE)
+            msvcrt.locking(journal.fileno(), msvcrt.LK_NBLCK, 1)
+            journal.seek(0, io.SEEK_END)
+    except (BlockingIOError, PermissionError):
         raise FileError(f"{path}: another sweep is writing to it: wait for its end, or name another path") from None
     except OSError:  # a file system without locks
         return

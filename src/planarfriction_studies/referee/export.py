@@ -24,7 +24,7 @@ def export_case(case: Case, folder: Path) -> None:
     `NAME.toml` is the case, `NAME.xml` MJCF of bodies, pairs and friction, `NAME-forces.csv` the forces on its bodies
     as if they never turned, with the part of gravity of inclines, and `NAME-truth.csv` the truths.
     """
-    write_text(folder / f"{case.name}.toml", (FOLDER / f"{case.name}.toml").read_text())
+    write_text(folder / f"{case.name}.toml", (FOLDER / f"{case.name}.toml").read_text(encoding="utf-8"))
     write_text(folder / f"{case.name}.xml", mjcf(case, case.steps[0]))
     positions = np.array([body.position for body in case.moving])
     rotations = np.tile(np.eye(3), (len(positions), 1, 1))
