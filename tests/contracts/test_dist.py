@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import io
+import re
 import tarfile
+import tomllib
 import zipfile
 from pathlib import Path
 
 import pytest
 
+import planarfriction
 from tests.support.repository import ROOT, script
 
 check = script(".ci/check_dist.py")
@@ -64,6 +67,27 @@ def test_wheels_that_differ_or_grow_are_named(tmp_path, monkeypatch):
     found = check.faults(sent, wheel(tmp_path / "a", CODE), wheel(tmp_path / "b", CODE, b"more"), CODE)
     assert any(line.startswith("not the same in a wheel") and "py.typed" in line for line in found)
     assert any(line.startswith("the wheel has ") for line in found)
+
+
+def test_the_version_is_the_same_everywhere():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["version"] == planarfriction.__version__
+    assert f"\nversion: {planarfriction.__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    newest = re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert newest and newest[1] == planarfriction.__version__
+
+
+def test_the_conda_recipe_needs_what_the_project_needs():
+    yaml = pytest.importorskip("yaml")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    recipe = yaml.safe_load((ROOT / "recipe" / "recipe.yaml").read_text(encoding="utf-8"))
+    called = {"lazy_loader": "lazy-loader", "matplotlib": "matplotlib-base"}  # there
+    needs = [each.partition(">=") for each in project["dependencies"]]
+    wanted = [f"{called.get(name, name)} >={version}" for name, _, version in needs]
+    assert recipe["requirements"]["run"] == [f"python {project['requires-python']}", *wanted]
+    assert recipe["context"]["version"] == project["version"]
+    assert recipe["about"]["license_file"] == project["license-files"]
+    assert recipe["build"]["python"]["entry_points"] == [f"{a} = {b}" for a, b in project["scripts"].items()]
 
 
 def test_this_repository_has_what_a_release_needs():
