@@ -21,7 +21,7 @@ from planarfriction.errors import FileError
 from planarfriction.reading import read_text
 from planarfriction.writing import write_text
 from planarfriction_studies.referee.case import QUANTITIES, Case, Path3
-from planarfriction_studies.referee.engines import Engine, World
+from planarfriction_studies.referee.engines import Engine
 
 MARKS = {"ok": "within what is allowed", "off": "up to ten times that", "fails": "beyond, or no result"}
 
@@ -48,15 +48,21 @@ class Verdict:
     """Time step of the worst one [s]."""
     cost: float | None
     """Median processor time of a step of the engine [s]."""
+    start: float | None = None
+    """Processor time to build the case and make the first step, in which engines compile [s]."""
     reason: str = ""
     """Reason of no result."""
     fingerprint: str = ""
     """Hash of the case, the settings, the versions and the time steps: a verdict with another one is not reused."""
 
 
-def trace(case: Case, world: World, dt: float) -> tuple[Path3, float]:
-    """Run a case; return the path of its bodies and the median time of a step [s]."""
-    for _ in range(round(case.settle / dt)):
+def trace(case: Case, engine: Engine, dt: float) -> tuple[Path3, float, float]:
+    """Run a case; return the path of its bodies, the median time of a step, and the time until the first one [s]."""
+    begin = time.process_time()
+    world = engine.build(case, dt)
+    world.step(case.wrenches(None, *world.poses()))
+    built = time.process_time() - begin
+    for _ in range(1, round(case.settle / dt)):
         world.step(case.wrenches(None, *world.poses()))
     for i, body in enumerate(case.moving):
         if any(body.velocity):
@@ -71,7 +77,7 @@ def trace(case: Case, world: World, dt: float) -> tuple[Path3, float]:
         poses.append(world.poses())
     positions, rotations = (np.array(each) for each in zip(*poses, strict=True))
     turns = np.unwrap(np.arctan2(rotations[..., 1, 0], rotations[..., 0, 0]), axis=0)
-    return Path3(dt * np.arange(steps + 1), positions, turns), float(np.median(costs))
+    return Path3(dt * np.arange(steps + 1), positions, turns), float(np.median(costs)), built
 
 
 def judge(case: Case, engine: Engine, steps: Sequence[float] | None = None) -> Verdict:
@@ -86,12 +92,12 @@ def no_result(mark: str, case: Case, engine: Engine, reason: str, dt: float = 0.
     """Return a verdict without numbers, for a reason in one line."""
     truth, words = case.truths[0], " ".join(reason.split())[:200]
     unit = QUANTITIES[truth.quantity]
-    return Verdict(case.name, engine.name, mark, None, truth.allowed, unit, "", dt, None, words)
+    return Verdict(case.name, engine.name, mark, None, truth.allowed, unit, "", dt, None, reason=words)
 
 
 def _judge(case: Case, engine: Engine, dt: float) -> Verdict:
     try:
-        path, cost = trace(case, engine.build(case, dt), dt)
+        path, cost, start = trace(case, engine, dt)
     except Exception as error:  # an engine may raise anything
         return no_result("fails", case, engine, f"{type(error).__name__}: {error}", dt)
     if not (np.isfinite(path.positions).all() and np.isfinite(path.turns).all()):
@@ -101,7 +107,7 @@ def _judge(case: Case, engine: Engine, dt: float) -> Verdict:
     share = error / truth.allowed
     mark = "ok" if share <= 1.0 else "off" if share <= _FAILS else "fails"
     what, unit = f"{truth.quantity} of {truth.body}", QUANTITIES[truth.quantity]
-    return Verdict(case.name, engine.name, mark, error, truth.allowed, unit, what, dt, cost)
+    return Verdict(case.name, engine.name, mark, error, truth.allowed, unit, what, dt, cost, start)
 
 
 class Apart:

@@ -11,7 +11,9 @@ import numpy as np
 
 from planarfriction_studies.referee.case import Case
 
-MODULES = {"mujoco": "mujoco", "drake": "pydrake", "pybullet": "pybullet"}
+MODULES = {
+    "mujoco": "mujoco", "mjx": "jax", "mujoco_warp": "mujoco_warp", "drake": "pydrake", "pybullet": "pybullet",
+}  # fmt: skip
 """Modules of this package, and the Python package that each needs."""
 
 

@@ -33,12 +33,21 @@ class Mujoco:
 
     def build(self, case: Case, dt: float) -> MujocoWorld:
         """Build the MJCF of a case."""
+        m, own = self.compiled(case, dt)
+        if not own:
+            return MujocoWorld(case, m)
+        from planarfriction.adapters.mujoco import Friction
+
+        return MujocoWorld(case, m, Friction(m, own))
+
+    def compiled(self, case: Case, dt: float) -> tuple[Any, list[Any]]:
+        """Return the model of a case, and its patches, for which it is prepared; none for MuJoCo's own friction."""
         import mujoco
 
         text = mjcf(case, dt, self.options, self.contact, self.integrator)
         if self.kind is None:
-            return MujocoWorld(case, mujoco.MjModel.from_xml_string(text))
-        from planarfriction.adapters.mujoco import Friction, PatchContact, prepare
+            return mujoco.MjModel.from_xml_string(text), []
+        from planarfriction.adapters.mujoco import PatchContact, prepare
 
         spec = mujoco.MjSpec.from_string(text)
         own = [
@@ -46,8 +55,7 @@ class Mujoco:
             for i, contact in enumerate(case.contacts)
         ]
         prepare(spec, own)
-        m = spec.compile()
-        return MujocoWorld(case, m, Friction(m, own))
+        return spec.compile(), own
 
 
 class MujocoWorld:
@@ -82,15 +90,16 @@ class MujocoWorld:
         self.d.qvel[at + 3 : at + 6] = rotation.T @ velocity[3:]
 
 
-_ELLIPTIC = 'cone="elliptic" impratio="10"'
+ELLIPTIC = 'cone="elliptic" impratio="10"'
+"""Options of MuJoCo that are advised against slip."""
 
 ENGINES = [
     Mujoco("MuJoCo", "as it comes: pyramidal cone, impratio 1, condim 3, Euler"),
-    Mujoco("MuJoCo, elliptic", "elliptic cone, impratio 10, condim 3, implicitfast", _ELLIPTIC,
+    Mujoco("MuJoCo, elliptic", "elliptic cone, impratio 10, condim 3, implicitfast", ELLIPTIC,
            integrator="implicitfast"),
     Mujoco(
         "MuJoCo, noslip", "elliptic cone, impratio 10, condim 3, implicitfast, noslip_iterations 10",
-        f'{_ELLIPTIC} noslip_iterations="10"', integrator="implicitfast",
+        f'{ELLIPTIC} noslip_iterations="10"', integrator="implicitfast",
     ),
     Mujoco(
         "MuJoCo, stiff", "elliptic cone, impratio 100, noslip_iterations 10, solref 0.004 1, condim 3, implicitfast",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from planarfriction.laws import LuGre
 from planarfriction.models import DistributedModel, FrictionModel, ReducedModel
 from planarfriction.patch import ContactPatch, friction_metric
@@ -13,7 +15,7 @@ SIGMA_0 = 1e6
 SIGMA_1 = 800.0
 """Damping of bristles [s/m], which sliding at a constant velocity does not see."""
 
-MODELS = {"reduced": ReducedModel, "distributed": DistributedModel}
+MODELS = {"reduced": ReducedModel, "one part": partial(ReducedModel, parts=1), "distributed": DistributedModel}
 
 
 def model(contact: Contact, kind: str) -> FrictionModel:
