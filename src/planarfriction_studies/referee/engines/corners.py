@@ -8,6 +8,9 @@ import numpy as np
 
 from planarfriction_studies.referee.case import Case, Shape
 
+ROUND = ("capsule", "sphere")
+"""Shapes that touch in a line or in a point: they need no spheres."""
+
 RADIUS = 1e-3
 """Radius of the spheres [m]."""
 
@@ -21,7 +24,7 @@ _RIM = 8
 def feet(case: Case, shape: Shape) -> np.ndarray:
     """Return the middles `[n, 3]` in the body of spheres of the patches that a shape has; none for what is round."""
     points = []
-    for contact in case.contacts if shape.kind != "capsule" else ():
+    for contact in case.contacts if shape.kind not in ROUND else ():
         if contact.pair[1] != shape.name:
             continue
         if len(contact.patch) == 1:
