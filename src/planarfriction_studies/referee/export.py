@@ -1,4 +1,4 @@
-"""Cases for engines that know nothing of this library: TOML, MJCF, and CSV of forces and truths."""
+"""Cases for engines that know nothing of this library: TOML, MJCF, SDF, and CSV of forces and truths."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 from planarfriction.writing import write_text
 from planarfriction_studies.referee.case import FOLDER, QUANTITIES, Case
 from planarfriction_studies.referee.mjcf import mjcf
+from planarfriction_studies.referee.sdf import sdf
 
 SAMPLES = 1e-3
 """Time between rows of the forces [s]."""
@@ -21,11 +22,14 @@ SAMPLES = 1e-3
 def export_case(case: Case, folder: Path) -> None:
     """Write the files of a case of the package to a folder.
 
-    `NAME.toml` is the case, `NAME.xml` MJCF of bodies, pairs and friction, `NAME-forces.csv` the forces on its bodies
+    `NAME.toml` is the case, `NAME.xml` MJCF of bodies, pairs and friction, `NAME.sdf` the same in SDF if that has words
+    for its friction, `NAME-forces.csv` the forces on its bodies
     as if they never turned, with the part of gravity of inclines, and `NAME-truth.csv` the truths.
     """
     write_text(folder / f"{case.name}.toml", (FOLDER / f"{case.name}.toml").read_text(encoding="utf-8"))
     write_text(folder / f"{case.name}.xml", mjcf(case, case.steps[0]))
+    if (text := sdf(case, case.steps[0])) is not None:
+        write_text(folder / f"{case.name}.sdf", text)
     positions = np.array([body.position for body in case.moving])
     rotations = np.tile(np.eye(3), (len(positions), 1, 1))
     rows = [
