@@ -1,4 +1,4 @@
-"""Put a run of the referee into docs/referee.md: `python docs/make_referee.py [FOLDER]`.
+"""Put a run of the referee into README and the pages that show it: `python docs/make_referee.py [FOLDER]`.
 
 FOLDER is that of `planarfriction referee --out`; without it, the tables are made again from docs/referee.json.
 """
@@ -14,12 +14,24 @@ from pathlib import Path
 from typing import Any
 
 from planarfriction_studies.referee.case import QUANTITIES, all_cases
-from planarfriction_studies.referee.report import table
+from planarfriction_studies.referee.report import shown, simulators, table
 from planarfriction_studies.referee.run import Verdict
 
 DOCS = Path(__file__).parent
-KEPT, PAGE = DOCS / "referee.json", DOCS / "referee.md"
-MARK = re.compile(r"<!-- referee: (?P<name>\w+) -->\n\n(?:(?:[^\n#<].*\n)+\n)?")
+KEPT, PAGES = DOCS / "referee.json", [DOCS.parent / "README.md", DOCS / "referee.md", DOCS / "simulators.md"]
+MARK = re.compile(r"<!-- referee: (?P<name>[\w ]+) -->\n\n(?:(?:[^\n#<].*\n)+\n)?")
+
+MISSING = "Not in this run.\n"
+
+ROWS = {
+    "off_centre": "Creep of a [block held off-centre](docs/simulators.md) by two box pads",
+    "disc": "Largest error in where [discs that slide and spin](docs/simulators.md) come to rest",
+    "in_hand": "Largest error in where a [plate that slips 23 mm in the hand](docs/simulators.md) ends",
+}
+"""Case -> its row of README."""
+
+OWN, PATCHES = ("MuJoCo, elliptic", "MuJoCo, noslip"), "MuJoCo, patches"
+"""Engines of these rows."""
 
 
 def tables(stored: dict[str, Any]) -> dict[str, str]:
@@ -27,7 +39,8 @@ def tables(stored: dict[str, Any]) -> dict[str, str]:
     verdicts = [Verdict(**row) for row in stored["verdicts"]]
     headings, rows = table(verdicts)
     versions = ", ".join(f"{name} {version}" for name, version in stored["versions"].items())
-    return {
+    views = {name: markdown(*view) for name, view in simulators(verdicts).items()}
+    return views | {
         "run": f"Run on {stored['date']}: {stored['machine']}; {versions}.\n",
         "results": markdown(headings, rows),
         "settings": markdown(["engine", "settings"], list(stored["settings"].items())),
@@ -54,16 +67,22 @@ def markdown(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def filled(page: str, stored: dict[str, Any]) -> str:
-    """Return the page with the tables of a stored run."""
+    """Return the page with the tables and the rows of a stored run."""
     found = tables(stored)
-    return MARK.sub(lambda match: f"<!-- referee: {match['name']} -->\n\n{found[match['name']]}\n", page)
+    verdicts = {(row["case"], row["engine"]): Verdict(**row) for row in stored["verdicts"]}
+    for case, words in ROWS.items():
+        own = "; ".join(f"{shown(verdicts[case, engine])} ({engine})" for engine in OWN)
+        row = f"| {words} | {own} | {shown(verdicts[case, PATCHES])} |"
+        page = re.sub(rf"^\| {re.escape(words)} \|.*$", lambda _, row=row: row, page, flags=re.MULTILINE)
+    return MARK.sub(lambda match: f"<!-- referee: {match['name']} -->\n\n{found.get(match['name'], MISSING)}\n", page)
 
 
 def main(folders: Sequence[str]) -> None:
     """Store a run, and fill the page."""
     for folder in folders:
         shutil.copy(Path(folder) / "referee.json", KEPT)
-    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8"), json.loads(KEPT.read_text())), encoding="utf-8")
+    for page in PAGES:
+        page.write_text(filled(page.read_text(encoding="utf-8"), json.loads(KEPT.read_text())), encoding="utf-8")
 
 
 if __name__ == "__main__":

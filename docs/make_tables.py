@@ -1,10 +1,9 @@
 """Put what was measured into the pages that show it: `python docs/make_tables.py PLACE ...`.
 
-A place is the folder of `planarfriction reproduce` or of `planarfriction simulators`, or a file that holds what
-`planarfriction bench --json` printed. A table stands below a line `<!-- table: TITLE -->`, named as in the report or
-here; what an experiment found stands below `<!-- verdict: EXPERIMENT -->`. README's row about speed is that of the
-benchmark. What the places do not have stays as it is. So do pictures, but for those of `docs/images` that the
-reports have drawn.
+A place is the folder of `planarfriction reproduce`, or a file that holds what `planarfriction bench --json` printed. A
+table stands below a line `<!-- table: TITLE -->`, named as in the report or here; what an experiment found stands below
+`<!-- verdict: EXPERIMENT -->`. README's row about speed is that of the benchmark. What the places do not have stays as
+it is. So do pictures, but for those of `docs/images` that the reports have drawn.
 """
 
 from __future__ import annotations

@@ -25,7 +25,6 @@ from pydrake.systems.primitives import ConstantValueSource, ConstantVectorSource
 from planarfriction.adapters.drake import Friction, PatchContact, prepare
 from planarfriction.adapters.drake.friction import EXPECTED
 from planarfriction.errors import InvalidValueError, MissingExtraError
-from planarfriction_studies import bench
 from planarfriction_studies.bench.coulomb_disc import stop
 from tests.support.drake_scenes import CONTACTS, bare, gripped, on_the_floor, running, sliding
 
@@ -436,5 +435,3 @@ def test_without_drake_the_extra_is_named(monkeypatch):
     monkeypatch.delitem(sys.modules, "planarfriction.adapters.drake")
     with pytest.raises(MissingExtraError, match=r"pip install 'planarfriction\[drake\]'"):
         importlib.import_module("planarfriction.adapters.drake")
-    (line,) = bench.run(["drake.disc.point"])
-    assert line.value is None and "pip install 'planarfriction[drake]'" in line.baseline

@@ -177,10 +177,8 @@ def test_tables_of_the_pages_are_those_of_the_report(result):
     shown = 0
     for path in docs.glob("*.md"):
         page = with_tables(path.read_text(encoding="utf-8"), tables)
-        # tables of simulators, and of costs, are on pages of their own
-        assert path.name in ("simulators.md", "benchmarks.md") or {
-            found["title"] for found in mark.finditer(page)
-        } <= set(tables)
+        # tables of costs are on a page of their own
+        assert path.name == "benchmarks.md" or {found["title"] for found in mark.finditer(page)} <= set(tables)
         assert with_tables(page, tables) == page
         shown += page.count("<!-- table: ")
     assert shown >= 11

@@ -14,7 +14,7 @@ OWN = {
     "measured": "planarfriction_studies.commands.definitions:measured",
     "referee": "planarfriction_studies.commands.referee:referee",
     "reproduce": "planarfriction_studies.commands.definitions:reproduce",
-    "simulators": "planarfriction_studies.commands.definitions:simulators",
+    "simulators": "planarfriction_studies.commands.referee:simulators",
     "explore": "planarfriction_explorer.command:explore",
 }
 """Entry points of the packages that come with the library, also where an installation of a checkout is older."""

@@ -205,38 +205,27 @@ def in_the_hand(d: Any) -> np.ndarray:
     return arm.xmat.reshape(3, 3).T @ (d.body("block").xpos - arm.xpos)
 
 
-def disc(
-    speed: float,
-    spin: float,
-    *,
-    joint: Literal["plane", "free"] = "plane",
-    touch: Literal["face", "point"] = "face",
-) -> MujocoScene:
+def disc(speed: float, spin: float) -> MujocoScene:
     """Build a disc of 0.2 kg and radius 0.1 m that starts with `speed` [m/s] and `spin` [rad/s] on the floor, mu 0.3.
 
-    `coulomb_disc.stop` says where it comes to rest. It moves on joints of its plane, or freely, which MuJoCo's own
-    friction does better with; it touches with its face, or in a point with the torsion of a disc that only spins,
-    `2/3 mu R`.
+    `coulomb_disc.stop` says where it comes to rest. It moves on joints of its plane.
     """
     i = 0.5 * 0.2 * 0.1**2
-    plane = """<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/><joint type="slide" axis="0 0 1"/>
-    <joint type="hinge" axis="0 0 1"/>"""
-    geom = {"face": 'type="cylinder" size="0.1 0.002"', "point": 'type="sphere" size="0.002"'}[touch]
     body = f"""<worldbody><geom name="floor" type="plane" size="9 9 .1"/><body name="disc" pos="0 0 0.002">
-    {plane if joint == "plane" else "<freejoint/>"}
-    <inertial pos="0 0 0" mass="0.2" diaginertia="{i / 2} {i / 2} {i}"/>
-    <geom name="disc" {geom} mass="0"/><site name="disc" pos="0 0 -0.002"/></body>
+    <joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/><joint type="slide" axis="0 0 1"/>
+    <joint type="hinge" axis="0 0 1"/><inertial pos="0 0 0" mass="0.2" diaginertia="{i / 2} {i / 2} {i}"/>
+    <geom name="disc" type="cylinder" size="0.1 0.002" mass="0"/><site name="disc" pos="0 0 -0.002"/></body>
     </worldbody>"""
     return MujocoScene(
         body,
         0.3,
-        2.0 / 3.0 * 0.3 * 0.1 if touch == "point" else 0.0,
+        0.0,
         (("disc", ("floor", "disc")),),
         ReducedModel(ContactPatch.disc(radius=0.1, cells=31), _law(0.3, 1e5), parts=1),
         lambda t: (),
         time=1.2,
         weightless=False,
-        start=(speed, 0.0, 0.0, spin) if joint == "plane" else (speed, 0.0, 0.0, 0.0, 0.0, spin),
+        start=(speed, 0.0, 0.0, spin),
     )
 
 

@@ -64,8 +64,6 @@ BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
     "mjx.discs": simulator_costs.mjx_discs,
     "mujoco_warp.disc": partial(simulator_costs.mujoco_warp, scene=mujoco_scenes.disc(1.0, 10.0)),
     "mujoco_warp.grip": partial(simulator_costs.mujoco_warp, scene=mujoco_scenes.grip()),
-    "drake.disc.point": partial(simulator_costs.drake_disc, contact="point"),
-    "drake.disc.hydroelastic": partial(simulator_costs.drake_disc, contact="hydroelastic"),
     "gradient.published": gradients.published,
     "gradient.published.batch": gradients.published_batch,
     "gradient.reduced": gradients.reduced,

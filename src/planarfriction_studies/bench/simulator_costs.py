@@ -1,6 +1,6 @@
 # pyright: reportAttributeAccessIssue=false
 # (MuJoCo and JAX describe few of their names to type checkers.)
-"""Costs of patch friction in MuJoCo, MJX and Drake, beside the simulators' own friction in turns."""
+"""Costs of patch friction in MuJoCo, MJX and MuJoCo Warp, beside the simulators' own friction in turns."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ import dataclasses
 import statistics
 import time
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from planarfriction_studies.bench import mujoco_scenes
-from planarfriction_studies.bench.drake_scenes import DISC, Way
 from planarfriction_studies.bench.measurement import Measurement, line, once
 from planarfriction_studies.bench.mujoco_scenes import MujocoScene, Native
 
@@ -203,34 +202,6 @@ def _rolled(step: Callable[..., Any], m: Any, d: Any) -> Callable[[], None]:
 
     def run() -> None:
         roll(mx, speeds, spins).block_until_ready()
-
-    run()
-    return run
-
-
-DRAKE_DT, DRAKE_STEPS, DRAKE_ROUNDS = 2e-3, 100, 9
-"""Time step [s], steps that are timed at once, and how often, in turns."""
-
-
-def drake_disc(full: bool, contact: Literal["point", "hydroelastic"]) -> Measurement:
-    """Measure patch friction and Drake's own in turns. Raises `MissingExtraError` without Drake."""
-    import planarfriction.adapters.drake  # noqa: F401  (says how to install Drake)
-
-    runs = [_thrown(Way(contact, patch=patch)) for patch in (True, False)]
-    times = np.array([[once(run) for run in runs] for _ in range(DRAKE_ROUNDS)]) / DRAKE_STEPS
-    value, plain = (statistics.median(column) * 1e6 for column in times.T)
-    words = f"the plant with Drake's own friction (patch friction costs {value / plain:.1f} times as much)"
-    return line(value, "us per step", words, plain)
-
-
-def _thrown(way: Way) -> Callable[[], None]:
-    """Return a function that throws the disc at 1 m/s and 10 rad/s and runs it for a number of steps."""
-    simulator, plant, context = DISC.build(way, DRAKE_DT)
-    simulator.AdvanceTo(100.5 * DRAKE_DT)
-
-    def run() -> None:
-        plant.SetVelocities(context, np.array([0.0, 0.0, 10.0, 1.0, 0.0, 0.0]))
-        simulator.AdvanceTo(simulator.get_context().get_time() + DRAKE_STEPS * DRAKE_DT)
 
     run()
     return run

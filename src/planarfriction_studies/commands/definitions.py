@@ -1,4 +1,4 @@
-"""The commands `bench`, `measured`, `reproduce` and `simulators`; each loads what it needs when it runs."""
+"""The commands `bench`, `measured` and `reproduce`; each loads what it needs when it runs."""
 
 from __future__ import annotations
 
@@ -212,7 +212,7 @@ def _show(benchmark: Any, as_json: bool, folder: Path | None) -> None:
             note(f"wrote {picture}")
 
 
-# ---------------------------------------------------------------------- reproduce, simulators
+# ---------------------------------------------------------------------- reproduce
 
 
 @click.command(
@@ -265,45 +265,6 @@ def reproduce(only: tuple[str, ...], list_only: bool, out: Path, quick: bool, fu
             rows.append([record["name"], f"{len(record['comparisons'])}", f"{missed}", number(record["seconds"])])
         print_table("Reproduced", ["experiment", "compared", "out of tolerance", "time [s]"], rows)
         note(f"wrote {write_report(reproduction)}")
-        note(f"wrote {reproduction.write_numbers()}")
-    return code
-
-
-@click.command(
-    short_help="Compare with the friction of MuJoCo and Drake.",
-    help="""Compare patch friction inside MuJoCo and Drake with the simulators' own friction at several settings.
-
-    Cases: creep of a held object, slip of a shaken one, discs that slide and spin to rest, a plate turned in the hand,
-    and the time of a step. Needs MuJoCo (pip install 'planarfriction[mujoco]'); Drake is used if it is installed.
-
-    Prints the tables, and writes numbers.json and a figure to --out. If it is interrupted and started again, finished
-    cases are not repeated. The exit code is 1 if a result of patch friction is out of its tolerance.
-
-    \b
-    Examples:
-      planarfriction simulators
-      planarfriction simulators --quick --out results/
-    """,
-)
-@click.option("--out", type=FILE, default=Path("simulators"), show_default=True, help="Folder for numbers and figure.")
-@click.option("--quick", is_flag=True, help="A small part of everything, in seconds.")
-@click.option("--again", is_flag=True, help="Repeat finished experiments.")
-def simulators(out: Path, quick: bool, again: bool) -> int:
-    """Compare (the help above is what users see)."""
-    from planarfriction.cli.console import note, print_table
-    from planarfriction.writing import make_folder
-    from planarfriction_studies.experiments import COMPARISONS
-    from planarfriction_studies.experiments.reproduction import Reproduction
-
-    reproduction = Reproduction(make_folder(out), quick, experiments=COMPARISONS)
-    code = _carry_out(reproduction, list(COMPARISONS), again=again)
-    for record in reproduction.records():
-        for table in record["tables"]:
-            print_table(table["title"], table["headings"], table["rows"])
-        for finding in record["findings"]:
-            print(finding)
-        for picture in record["pictures"]:
-            note(f"wrote {reproduction.folder / record['name'] / picture['name']}.png")
         note(f"wrote {reproduction.write_numbers()}")
     return code
 

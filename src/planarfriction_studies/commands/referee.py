@@ -1,4 +1,4 @@
-"""The command `referee`; it loads what it needs when it runs."""
+"""The commands `referee` and `simulators`, a view of it; each loads what it needs when it runs."""
 
 from __future__ import annotations
 
@@ -8,6 +8,18 @@ from typing import Any
 import click
 
 from planarfriction.cli.options import FILE
+
+ENGINE = click.option(
+    "--engine",
+    "engines",
+    metavar="NAME",
+    multiple=True,
+    help="Only this engine, or all whose names begin so; may be repeated.",
+)
+CASE = click.option(
+    "--case", "cases", metavar="NAME", multiple=True, help="Only this case, or a TOML file; may be repeated."
+)
+JSON = click.option("--json", "file", type=FILE, help="File for a JSON list of results; a run goes on from it.")
 
 
 @click.group(
@@ -28,23 +40,12 @@ from planarfriction.cli.options import FILE
       planarfriction referee export cases/
     """,
 )
-@click.option(
-    "--engine",
-    "engines",
-    metavar="NAME",
-    multiple=True,
-    help="Only this engine, or all whose names begin so; may be repeated.",
-)
-@click.option("--case", "cases", metavar="NAME", multiple=True, help="Only this case, or a TOML file; may be repeated.")
+@ENGINE
+@CASE
 @click.option("--step", type=float, help="Time step in s. Default: those of each case.")
 @click.option("--quick", is_flag=True, help="The first two engines.")
 @click.option("--list", "list_only", is_flag=True, help="List cases and engines.")
-@click.option(
-    "--json",
-    "file",
-    type=FILE,
-    help="File for a JSON list of case, engine, error, allowed, cost and more; what it has is kept.",
-)
+@JSON
 @click.option("--out", "folder", type=FILE, help="Folder for referee.json and referee.html, with a picture per case.")
 @click.pass_context
 def referee(
@@ -61,11 +62,9 @@ def referee(
     if context.invoked_subcommand is not None:
         return 0
     from planarfriction import validation
-    from planarfriction.cli import INTERRUPTED
-    from planarfriction.cli.console import count_progress, note, print_table
-    from planarfriction.writing import check_writable, make_folder
+    from planarfriction.cli.console import note, print_table
+    from planarfriction.writing import make_folder
     from planarfriction_studies.referee import report
-    from planarfriction_studies.referee.run import Apart, Kept, run
 
     chosen = _cases(cases)
     left_out: list[str] = []
@@ -75,21 +74,9 @@ def referee(
         print_table("Engines", ["name", "settings"], [[each.name, each.settings] for each in found])
         return 0
     steps = None if step is None else (validation.positive("--step", step),)
-    if file is not None:
-        check_writable(file)
     if folder is not None:
         make_folder(folder)
-    kept = Kept(file)
-    code = 0
-    try:
-        with Apart() as apart, count_progress("referee") as progress:
-            run(chosen, found, kept, steps=steps, judged=apart.judge, progress=progress)
-    except KeyboardInterrupt:
-        code = INTERRUPTED
-    verdicts = kept.of(chosen, found)
-    if code:
-        goes_on = "" if file is None else ": the same command goes on from there"
-        note(f"interrupted: {len(verdicts)} of {len(chosen) * len(found)} results are finished{goes_on}")
+    verdicts, code = _judged(chosen, found, file, steps)
     print_table("Friction against the truth: error over what is allowed", *report.table(verdicts))
     for text in left_out:
         note(f"left out: {text}")
@@ -98,9 +85,62 @@ def referee(
     return code
 
 
+def _judged(
+    cases: dict[str, Any], engines: list[Any], file: Path | None, steps: tuple[float, ...] | None = None
+) -> tuple[list[Any], int]:
+    """Judge with progress; return verdicts, those of the file among them, and the exit code."""
+    from planarfriction.cli import INTERRUPTED
+    from planarfriction.cli.console import count_progress, note
+    from planarfriction.writing import check_writable
+    from planarfriction_studies.referee.run import Apart, Kept, run
+
+    if file is not None:
+        check_writable(file)
+    kept, code = Kept(file), 0
+    try:
+        with Apart() as apart, count_progress("referee") as progress:
+            run(cases, engines, kept, steps=steps, judged=apart.judge, progress=progress)
+    except KeyboardInterrupt:
+        code = INTERRUPTED
+    verdicts = kept.of(cases, engines)
+    if code:
+        goes_on = "" if file is None else ": the same command goes on from there"
+        note(f"interrupted: {len(verdicts)} of {len(cases) * len(engines)} results are finished{goes_on}")
+    return verdicts, code
+
+
+@click.command(
+    short_help="Compare patches with simulators' own friction.",
+    help="""Compare patch friction in simulators with their own friction, as it comes and at its best settings.
+
+    This is a view of `planarfriction referee`, in units instead of marks. What --json has is not computed again.
+
+    \b
+    Examples:
+      planarfriction simulators
+      planarfriction simulators --engine MuJoCo --json referee.json
+    """,
+)
+@ENGINE
+@CASE
+@JSON
+def simulators(engines: tuple[str, ...], cases: tuple[str, ...], file: Path | None) -> int:
+    """Compare (the help above is what users see)."""
+    from planarfriction.cli.console import note, print_table
+    from planarfriction_studies.referee import report
+
+    left_out: list[str] = []
+    verdicts, code = _judged(_cases(cases), _engines(engines, left_out), file)
+    for name, table in report.simulators(verdicts).items():
+        print_table(f"{name}: largest errors", *table)
+    for text in left_out:
+        note(f"left out: {text}")
+    return code
+
+
 @referee.command(
     short_help="Write all cases for other engines.",
-    help="""Write all cases to FOLDER, to be run without this library: for each its TOML, MJCF of its bodies, pairs and
+    help="""Write all cases to FOLDER, to be run without this library: for each its TOML, MJCF and SDF of its bodies and
     friction, the forces on its bodies over time, and the truths with their errors, as CSV.
 
     \b

@@ -48,9 +48,6 @@ EXPERIMENTS = {
 }
 """Experiment by name, in the order of the paper, and what goes beyond it."""
 
-COMPARISONS = {"simulators": Experiment("simulators", "Patch friction inside simulators, beside their own")}
-"""Comparisons with other simulators, which need their packages: no part of a reproduction."""
-
 
 def find_experiment(name: str) -> Experiment:
     """Return the experiment called `name`; raises `InvalidValueError` for an unknown one."""

@@ -17,8 +17,8 @@ import platform
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -41,8 +41,6 @@ class Reproduction:
     folder: Path
     quick: bool = False
     full: bool = False
-    experiments: Mapping[str, Experiment] = field(default_factory=lambda: EXPERIMENTS)
-    """Experiments by name."""
 
     @property
     def fingerprint(self) -> str:
@@ -59,7 +57,7 @@ class Reproduction:
 
     def records(self) -> list[Record]:
         """Return all results kept in the folder, in the order of the experiments."""
-        return [record for name in self.experiments if (record := self.kept(name)) is not None]
+        return [record for name in EXPERIMENTS if (record := self.kept(name)) is not None]
 
     def run(
         self,
@@ -75,8 +73,8 @@ class Reproduction:
 
         Raises `InvalidValueError` for an unknown name, `FileError` where nothing can be written.
         """
-        wanted = self.experiments if names is None else names
-        chosen = [self.experiments[validation.choice("experiment", name, self.experiments)] for name in wanted]
+        wanted = EXPERIMENTS if names is None else names
+        chosen = [EXPERIMENTS[validation.choice("experiment", name, EXPERIMENTS)] for name in wanted]
         for each in chosen:
             record = None if again else self.kept(each.name)
             yield self._carry_out(each, again, progress) if record is None else record

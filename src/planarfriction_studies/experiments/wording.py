@@ -55,7 +55,7 @@ def environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.filters |= {"fmt": fmt, "short": short, "power": power, "length_of": length, "span": span, "number": number}
+    made.filters |= {"fmt": fmt, "short": short, "power": power, "span": span, "number": number}
     return made
 
 
@@ -68,22 +68,6 @@ def fmt(value: Any, spec: str) -> str:
 def short(value: float, digits: int = 3) -> str:
     """Return a number with so many digits, without an exponent where it reads well without."""
     return fmt(float(f"{value:.{digits}g}"), "g")
-
-
-def readable(value: float) -> str:
-    """Return a number with as many digits as are worth reading."""
-    if value < 1e-2:
-        return f"{value:.1g}"
-    return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
-
-
-def length(metres: float) -> str:
-    """Return the size of a length in mm, um or nm, whichever reads best."""
-    size = abs(metres)
-    if size < 1e-12:
-        return "< 0.001 nm"
-    unit, scale = ("mm", 1e3) if size >= 1e-3 else ("um", 1e6) if size >= 1e-8 else ("nm", 1e9)
-    return f"{readable(scale * size) if unit != 'nm' else f'{scale * size:.1g}'} {unit}"
 
 
 def power(value: float, digits: int = 0) -> str:

@@ -36,9 +36,9 @@ class Shape:
 
     name: str
     kind: str
-    """plane, box, cylinder, or capsule."""
+    """plane, box, sphere, cylinder, or capsule."""
     size: Vector = ()
-    """Sides of a box, or radius and length of a cylinder or a capsule between its ends [m]."""
+    """Sides of a box, radius of a sphere, or radius and length of a cylinder or a capsule between its ends [m]."""
     position: Vector = (0.0, 0.0, 0.0)
     """[m]"""
     axis: Vector = (0.0, 0.0, 1.0)
@@ -49,9 +49,9 @@ class Shape:
         """Half of the sides of the box about the shape [m]."""
         if self.kind == "box":
             return 0.5 * np.array(self.size)
-        radius, length = self.size
+        radius, length = (*self.size, 0.0)[:2]
         along = np.array(self.axis)
-        return radius * (1.0 - along) + (0.5 * length + (radius if self.kind == "capsule" else 0.0)) * along
+        return radius * (1.0 - along) + (0.5 * length + (radius if self.kind != "cylinder" else 0.0)) * along
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Body:
     mass: float = 0.0
     """[kg]"""
     inertia: Vector = ()
-    """Principal moments about the centre of mass [kg m^2]; none: of a homogeneous body of its one shape, a box."""
+    """Principal moments about the centre of mass [kg m^2]; none: of a homogeneous box about its one shape."""
     centre_of_mass: Vector = (0.0, 0.0, 0.0)
     """Place in the body [m]."""
     velocity: Vector = (0.0,) * 6
@@ -80,7 +80,7 @@ class Body:
         """Principal moments of inertia [kg m^2]."""
         if len(self.inertia):
             return np.array(self.inertia)
-        squares = np.square(self.shapes[0].size)
+        squares = np.square(2.0 * self.shapes[0].half)
         return self.mass / 12.0 * (squares.sum() - squares)
 
 

@@ -53,6 +53,7 @@ def _geom(shape: Shape) -> str:
     sizes = {
         "plane": lambda: (9.0, 9.0, 0.1),
         "box": lambda: shape.half,
+        "sphere": lambda: shape.size,
         "cylinder": lambda: (shape.size[0], 0.5 * shape.size[1]),
         "capsule": lambda: (shape.size[0], 0.5 * shape.size[1]),
     }

@@ -5,16 +5,19 @@ from __future__ import annotations
 import html
 import json
 import platform
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from datetime import date
 from importlib import metadata
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from planarfriction.plots.style import PlotFigure, new_figure, tidy
 from planarfriction.writing import write_text
 from planarfriction_studies.referee.case import Case
 from planarfriction_studies.referee.engines import Engine
+from planarfriction_studies.referee.pictures import scene
 from planarfriction_studies.referee.run import MARKS, Verdict, to_rows
 
 COLOURS = {"ok": "#2a7f3f", "off": "#b8860b", "fails": "#b22222", "-": "#888888"}
@@ -31,7 +34,8 @@ def table(verdicts: Sequence[Verdict]) -> tuple[list[str], list[list[str]]]:
     passed = {engine: sum(each.mark == "ok" for each in verdicts if each.engine == engine) for engine in engines}
     judged = {engine: sum(each.engine == engine for each in verdicts) for engine in engines}
     rows.append(["ok", *(f"{passed[engine]} of {judged[engine]}" for engine in engines)])
-    rows.append(["median step [µs]", *(_cost(verdicts, engine) for engine in engines)])
+    rows.append(["median step [µs]", *(_median(verdicts, engine, "cost", 1e6) for engine in engines)])
+    rows.append(["median start [s]", *(_median(verdicts, engine, "start", 1.0) for engine in engines)])
     return ["case", *engines], rows
 
 
@@ -42,9 +46,49 @@ def _cell(verdict: Verdict | None) -> str:
     return f"{verdict.mark} {share:{'.0f' if share >= 10.0 else '.2g'}}"
 
 
-def _cost(verdicts: Sequence[Verdict], engine: str) -> str:
-    costs = sorted(each.cost for each in verdicts if each.engine == engine and each.cost is not None)
-    return f"{1e6 * costs[len(costs) // 2]:.0f}" if costs else ""
+def _median(verdicts: Sequence[Verdict], engine: str, name: str, scale: float) -> str:
+    times = [getattr(each, name) for each in verdicts if each.engine == engine and getattr(each, name) is not None]
+    return f"{scale * median(times):.{0 if scale > 1.0 else 1}f}" if times else ""
+
+
+OURS = (", patches", ", cells")
+"""Ends of the names of engines with this library's friction."""
+
+
+def simulators(verdicts: Sequence[Verdict]) -> dict[str, tuple[list[str], list[list[str]]]]:
+    """Return a table for each simulator that has patches: errors of its own friction, as it comes and best, and theirs.
+
+    Best are the settings that pass the most cases.
+    """
+    found = {(each.case, each.engine): each for each in verdicts}
+    passed = Counter(each.engine for each in verdicts if each.mark == "ok")
+    tables = {}
+    engines = list(dict.fromkeys(each.engine for each in verdicts))
+    for name in dict.fromkeys(engine.split(",")[0] for engine in engines):
+        own = [engine for engine in engines if engine.split(",")[0] == name and not engine.endswith(OURS)]
+        if not own or name + OURS[0] not in engines:
+            continue
+        columns = list(dict.fromkeys([own[0], max(own, key=passed.__getitem__), name + OURS[0]]))
+        rows = [
+            [case, *(shown(found.get((case, engine))) for engine in columns)]
+            for case in dict.fromkeys(each.case for each in verdicts)
+        ]
+        tables[name] = ["case", *columns], rows
+    return tables
+
+
+def shown(verdict: Verdict | None) -> str:
+    """Return the error of the worst quantity, in a unit that it is a one of at least."""
+    if verdict is None or verdict.error is None:
+        return "" if verdict is None else verdict.mark
+    prefix, scale = next(((p, s) for p, s in PREFIXES if verdict.error >= s), PREFIXES[-1])
+    number = verdict.error / scale
+    digits = format(float(f"{number:.2g}"), "g") if number >= 1e-3 else "< 0.001"
+    return f"{digits} {prefix}{verdict.unit}"
+
+
+PREFIXES = (("", 1.0), ("m", 1e-3), ("µ", 1e-6), ("n", 1e-9))
+"""Prefixes of units, and their factors."""
 
 
 def picture(case: str, verdicts: Sequence[Verdict]) -> PlotFigure:
@@ -92,8 +136,9 @@ def write(
         return []
     run = stated(engines)
     write_text(folder / "referee.json", json.dumps({**run, "verdicts": to_rows(verdicts)}, indent=1) + "\n")
-    for case in cases:
-        picture(case, verdicts).savefig(folder / f"{case}.svg")
+    for name, case in cases.items():
+        picture(name, verdicts).savefig(folder / f"{name}.svg")
+        scene(case).savefig(folder / f"{name}-scene.svg")
     write_text(folder / "referee.html", page(verdicts, cases, run))
     return [folder / "referee.json", folder / "referee.html"]
 
@@ -110,7 +155,8 @@ table {{ border-collapse: collapse; font-size: 13px }} td, th {{ padding: .25em 
 tr {{ border-bottom: 1px solid #ddd }} {" ".join(f".{mark} {{ color: {COLOURS[mark]} }}" for mark in MARKS)}
 </style><h1>The referee: friction against the truth</h1>
 <p>{html.escape(run["date"])}; {html.escape(run["machine"])}; {html.escape(versions)}. {html.escape(marks)};
-numbers are errors over what is allowed.</p>
+numbers are errors over what is allowed. In pictures, what is fixed is grey, and dashed is where the truth says
+that bodies end; green arrows are velocities, pink ones forces.</p>
 {_table(headings, rows)}
 <h2>Settings</h2>{_table(["engine", "settings"], [list(item) for item in run["settings"].items()])}
 {sections}</html>
@@ -130,17 +176,19 @@ def _section(case: Case, verdicts: Sequence[Verdict]) -> str:
     ]
     results = [[each.engine, each.mark, *_numbers(each), each.reason] for each in verdicts if each.case == case.name]
     return f"""<h2 id="{case.name}">{html.escape(case.title)}</h2><p>{html.escape(case.about)}</p>
-<p>Allowed: {html.escape(case.why)}</p><p><img src="{case.name}.svg" alt="errors of all engines"></p>
-{_table(["engine", "mark", "error", "allowed", "worst quantity", "time step", "cost [µs]", ""], results)}
+<p>Allowed: {html.escape(case.why)}</p><p><img src="{case.name}-scene.svg" alt="the bodies of the case">
+<img src="{case.name}.svg" alt="errors of all engines"></p>
+{_table(["engine", "mark", "error", "allowed", "worst quantity", "time step", "cost [µs]", "start [s]", ""], results)}
 <details><summary>Truths</summary>
 {_table(["body", "quantity", "value", "its error", "allowed", "source"], truths)}</details>"""
 
 
 def _numbers(verdict: Verdict) -> list[str]:
     if verdict.error is None:
-        return [""] * 5
+        return [""] * 6
     cost = "" if verdict.cost is None else f"{1e6 * verdict.cost:.0f}"
+    start = "" if verdict.start is None else f"{verdict.start:.2g}"
     return [
         f"{verdict.error:.3g} {verdict.unit}", f"{verdict.allowed:.3g} {verdict.unit}", verdict.quantity,
-        f"{1e3 * verdict.dt:g} ms", cost,
+        f"{1e3 * verdict.dt:g} ms", cost, start,
     ]  # fmt: skip

@@ -152,7 +152,6 @@ def end(
     the world at the point `at` of the body. The centre of mass is above the centre of pressure, in the plane of the
     contact. From rest, the motion begins along the acceleration that is its own direction.
     """
-    from scipy.integrate import solve_ivp
     from scipy.optimize import fsolve
 
     patch = patch_of(rectangles, disc, gradient)
@@ -179,26 +178,64 @@ def end(
     if not velocity.any():
         first = np.array([*push, (at[0] - centre[0]) * push[1] - (at[1] - centre[1]) * push[0]]) / masses
         velocity = 1e-9 * fsolve(lambda a: a - acceleration(pose, a), first, xtol=1e-13)
-    pushed = any(push)
-    size = lambda v: math.hypot(v[0], v[1], scale * v[2])  # noqa: E731
-
-    def rates(_, y):
-        factor = 1.0 if pushed else min(size(y[3:6]) / 0.1, 1.0)  # slower clock where the body comes to rest
-        return np.concatenate([factor * y[3:6], factor * acceleration(y[:3], y[3:6]), [factor]])
-
-    stops = [lambda _, y: y[6] - time, lambda _, y: size(y[3:6]) - 1e-11][: 1 if pushed else 2]
-    for event in stops:
-        event.terminal = True  # pyright: ignore[reportFunctionMemberAccess]
-    start = np.concatenate([pose, velocity, [0.0]])
-    y = solve_ivp(rates, [0.0, 1e3], start, method="DOP853", rtol=RTOL, atol=1e-13, events=stops).y[:, -1]
+    y = _moved(lambda _, *motion: acceleration(*motion), velocity, scale, time, rests=not any(push))
     c, s = math.cos(y[2]) - 1.0, math.sin(y[2])
     shift = np.array([c * centre[0] - s * centre[1], s * centre[0] + c * centre[1]])
     return float(y[0] - shift[0]), float(y[1] - shift[1]), float(y[2])
 
 
+def _moved(
+    acceleration: Callable[..., np.ndarray], velocity: np.ndarray, scale: float, time: float, *, rests: bool
+) -> np.ndarray:
+    """Integrate an acceleration by time, pose and velocity from pose 0, for a time or to rest; return the pose."""
+    from scipy.integrate import solve_ivp
+
+    size = lambda v: math.hypot(v[0], v[1], scale * v[2])  # noqa: E731
+
+    def rates(_, y):
+        factor = min(size(y[3:6]) / 0.1, 1.0) if rests else 1.0  # slower clock where the body comes to rest
+        return np.concatenate([factor * y[3:6], factor * acceleration(y[6], y[:3], y[3:6]), [factor]])
+
+    stops = [lambda _, y: y[6] - time, lambda _, y: size(y[3:6]) - 1e-11][: 2 if rests else 1]
+    for event in stops:
+        event.terminal = True  # pyright: ignore[reportFunctionMemberAccess]
+    start = np.concatenate([np.zeros(3), velocity, [0.0]])
+    return solve_ivp(rates, [0.0, 1e4], start, method="DOP853", rtol=RTOL, atol=1e-13, events=stops).y[:3, -1]
+
+
+def in_hand(what: str, **motion: Any) -> float:
+    """Return x, y [m] or the turn [rad] of `held_plate`, whose arguments the others are."""
+    frozen = {key: _frozen(value) for key, value in motion.items()}
+    return dict(zip(("x", "y", "turn"), held_plate(**frozen), strict=True))[what]
+
+
+@functools.cache
+def held_plate(
+    mu: float, mass: float, inertia: float, load: float, rate: float, at: tuple[float, float], disc: float, time: float
+) -> tuple[float, float, float]:
+    """Integrate a plate between two discs that press with `load + rate t`; return where its centre of mass ends.
+
+    The discs stay where they are, at first at the point `at` from the centre of mass, and weight is along -y:
+    `M V' = 2 W(V) + (0, -m g, 0)`, mu N times the exact wrench of the limit surface, moved to the centre of mass.
+    """
+    from scipy.optimize import fsolve
+
+    surface, masses = LimitSurfaceExact(patch_of(disc=disc)), np.array([mass, mass, inertia])
+
+    def acceleration(t, pose, velocity):
+        x, y = np.array(at) - pose[:2]
+        (vx, vy, omega), bears = velocity, 2.0 * mu * (load + rate * t)
+        fx, fy, torque = bears * np.asarray(surface.wrench((vx - omega * y, vy + omega * x, omega)))
+        return np.array([fx, fy - mass * GRAVITY, torque + x * fy - y * fx]) / masses
+
+    weight = np.array([0.0, -GRAVITY, 0.0])
+    velocity = 1e-9 * fsolve(lambda a: a - acceleration(0.0, np.zeros(3), a), 0.5 * weight, xtol=1e-13)
+    return tuple(map(float, _moved(acceleration, velocity, math.sqrt(inertia / mass), time, rests=True)))  # pyright: ignore[reportReturnType]
+
+
 SOURCES: dict[str, Callable[..., float]] = {
     each.__name__: each
-    for each in (held, slope, stop, disc, stribeck_stop, grip_slips, pad_turns, tower, shaken, slide)
+    for each in (held, slope, stop, disc, stribeck_stop, grip_slips, pad_turns, tower, shaken, slide, in_hand)
 }
 
 

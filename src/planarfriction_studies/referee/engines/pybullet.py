@@ -71,7 +71,7 @@ class BulletWorld:
         """Add a body; return its number and that of its link, which is on a slide or the base itself."""
         client, mass = self.client, body.mass
         kinds = {"plane": client.GEOM_PLANE, "box": client.GEOM_BOX, "cylinder": client.GEOM_CYLINDER}
-        kinds["capsule"] = client.GEOM_CAPSULE
+        kinds |= {"capsule": client.GEOM_CAPSULE, "sphere": client.GEOM_SPHERE}
         if body.shapes[0].kind == "plane":
             found = client.createCollisionShape(client.GEOM_PLANE)
         else:
@@ -137,7 +137,7 @@ def _numbers(shape: Shape) -> dict[str, Any]:
     """Return sizes of a shape as arrays of shapes want them."""
     if shape.kind == "box":
         return {"halfExtents": shape.half.tolist(), "radii": 0.0, "lengths": 0.0}
-    return {"halfExtents": [0, 0, 0], "radii": shape.size[0], "lengths": shape.size[1]}
+    return {"halfExtents": [0, 0, 0], "radii": shape.size[0], "lengths": shape.size[-1]}
 
 
 def _turned(shape: Shape) -> list[float]:

@@ -1,0 +1,101 @@
+"""Pictures of cases: what lies where, how it is thrown and pushed, and where the truth says that it ends."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from planarfriction.plots.style import PALETTE, PlotFigure, new_figure, tidy
+from planarfriction_studies.referee.case import Body, Case, Shape
+
+WIDTH = 6.0
+"""Width of a picture [in]."""
+
+ARROW = 0.18
+"""Length of the longest arrow over the size of what is drawn."""
+
+
+def scene(case: Case) -> PlotFigure:
+    """Draw a case from above, or from the side where bodies lie on each other; dashed: where bodies end."""
+    from matplotlib.patches import Polygon
+
+    up = 2 if _stacked(case) else 1
+    drawn = [
+        (_outline(body, shape, up), body) for body in case.bodies for shape in body.shapes if shape.kind != "plane"
+    ]
+    ends = [(_outline(body, shape, up, *_end(case, body)), body) for body in case.moving for shape in body.shapes]
+    corners = np.concatenate([outline for outline, _ in (*drawn, *ends)])
+    low, high = corners.min(0), corners.max(0)
+    size = float((high - low).max())
+    margin = np.full(2, 0.22 * size)
+    width, height = high - low + 2.0 * margin
+    figure = new_figure(WIDTH, min(max(WIDTH * height / width, 1.6), 7.0) + 0.5)
+    axes = figure.subplots()
+    for outline, body in sorted(drawn, key=lambda each: _height(each[1], up)):
+        fixed = body.joint == "fixed"
+        fill = "0.8" if fixed else PALETTE[5] if body.joint == "free" else PALETTE[4]
+        axes.add_patch(Polygon(1e3 * outline, facecolor=fill, edgecolor="0.2", alpha=0.6))
+    for outline, body in ends:
+        if any(_end(case, body)):
+            axes.add_patch(Polygon(1e3 * outline, fill=False, edgecolor=PALETTE[1], linestyle="--"))
+    _arrows(axes, case, up, size)
+    names = "x", "z" if up == 2 else "y"
+    axes.set(xlabel=f"{names[0]} [mm]", ylabel=f"{names[1]} [mm]", aspect="equal")
+    axes.set_xlim(*(1e3 * np.array([low[0] - margin[0], high[0] + margin[0]])))
+    axes.set_ylim(*(1e3 * np.array([low[1] - margin[1], high[1] + margin[1]])))
+    tidy(axes)
+    return figure
+
+
+def _stacked(case: Case) -> bool:
+    places = [tuple(body.position[:2]) for body in case.moving if body.joint == "free"]
+    return len(set(places)) < len(places)
+
+
+def _height(body: Body, up: int) -> float:
+    return body.position[2] if up == 1 else 0.0
+
+
+def _end(case: Case, body: Body) -> tuple[float, float, float]:
+    """Return the true displacement and turn of a body; 0 where nothing is known."""
+    known = {truth.quantity: truth.value for truth in case.truths if truth.body == body.name}
+    return known.get("x", 0.0), known.get("y", 0.0), known.get("turn", 0.0)
+
+
+def _outline(body: Body, shape: Shape, up: int, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> np.ndarray:
+    """Return the corners `[n, 2]` of a shape from above (up 1) or from the side (up 2) [m]."""
+    half = shape.half[[0, up]]
+    if shape.kind == "box" or (up == 2 and shape.kind == "cylinder") or shape.kind == "capsule":
+        around = half * [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    else:
+        angles = np.linspace(0.0, 2.0 * math.pi, 40)
+        around = half * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    c, s = math.cos(turn), math.sin(turn)
+    turned = (around + np.array(shape.position)[[0, up]]) @ np.array([[c, s], [-s, c]])
+    return turned + np.array(body.position)[[0, up]] + [x, y if up == 1 else 0.0]
+
+
+def _arrows(axes, case: Case, up: int, size: float) -> None:
+    """Draw velocities, and the largest force of each row of forces; and gravity where it lies in the picture."""
+    throws = [(np.array(body.position), np.array(body.velocity[:3]), PALETTE[2]) for body in case.moving]
+    of = {body.name: body for body in case.moving}
+    pushes = []
+    for force in case.forces:
+        body = of[force.body]
+        rows = np.array([*force.values, force.amplitude])[:, :3]
+        at = body.centre_of_mass if force.at is None else force.at
+        largest = rows[np.argmax(np.linalg.norm(rows[:, [0, up]], axis=1))]
+        pushes.append((np.array(body.position) + at, largest, PALETTE[3]))
+    for arrows in (throws, pushes):
+        lengths = [float(np.hypot(*vector[[0, up]])) for _, vector, _ in arrows]
+        for (place, vector, colour), length in zip(arrows, lengths, strict=True):
+            if length > 0.0:
+                start = 1e3 * place[[0, up]]
+                end = start + 1e3 * ARROW * size * vector[[0, up]] / max(lengths)
+                axes.annotate("", end, start, arrowprops={"arrowstyle": "->", "color": colour, "linewidth": 2.0})
+    if up == 1 and case.gravity[1]:
+        axes.annotate(
+            "g", (0.97, 0.04), (0.97, 0.22), xycoords="axes fraction", ha="center",
+            arrowprops={"arrowstyle": "->", "color": "0.4"}, color="0.4",
+        )  # fmt: skip
