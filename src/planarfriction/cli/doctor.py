@@ -86,7 +86,7 @@ def _model(name: str) -> Any:
 def _end(name: str, coordinate: str) -> float:
     """Return a coordinate at the end of the published in-hand run with load 2."""
     scene = pf.scenes.in_hand(_model(name), normal_force=pf.scenes.in_hand_load(2))
-    return pf.simulate(scene).data[coordinate][-1]
+    return float(pf.simulate(scene).data[coordinate][-1])
 
 
 def requirements() -> Iterator[tuple[str, list[Requirement]]]:

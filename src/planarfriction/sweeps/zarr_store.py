@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import io
 import json
 import os
@@ -49,8 +50,7 @@ def _lock(journal: io.FileIO, path: Path) -> None:
     try:
         import fcntl
     except ImportError:  # on Windows
-        fcntl = None
-        import msvcrt
+        fcntl, msvcrt = None, importlib.import_module("msvcrt")
     try:
         if fcntl is not None:
             fcntl.flock(journal, fcntl.LOCK_EX | fcntl.LOCK_NB)
