@@ -15,8 +15,8 @@ from tests.support.rate_laws import BoucWen
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
 
-SLOW = [pytest.param(each, marks=pytest.mark.slow) for each in ("plain", "one", "ellipsoid")]
-NAMES = [*(each for each in MODELS if each not in ("plain", "one", "ellipsoid")), *SLOW]
+SLOW = [pytest.param(each, marks=pytest.mark.slow) for each in ("plain", "one")]
+NAMES = [*(each for each in MODELS if each not in ("plain", "one")), *SLOW]
 """Models that compile quickly, and others."""
 
 

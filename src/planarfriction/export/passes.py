@@ -44,7 +44,7 @@ def passes_of(writer: Writer, block: Block, count: int, places: Sequence[str], s
     operations = [each for each in block.operations if each.name in used]
     common: set[str] = set()
     for each in operations:
-        if all(name in common or not re.match(r"t\d|.*\bk\]", name) for name in _names(each)):
+        if all(name in common or not re.search(r"^t\d|\bk\b", name) for name in _names(each)):
             common.add(each.name)
     own = [each for each in operations if each.name not in common]
     ends = [0, *_cuts(own, block), len(own)]
