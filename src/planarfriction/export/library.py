@@ -62,7 +62,7 @@ def export_c(
 ) -> tuple[Path, ...]:
     """Write a model as C source into a folder; return the files `<name>.h`, `.c`, `_test.c` and `.cmake`.
 
-    The source is C99 and C++17, calls nothing but `math.h` and `memcpy`, allocates nothing and keeps no state of its
+    The source is C99 and C++17, calls nothing but `math.h`, allocates nothing and keeps no state of its
     own. Its step is the model's own (see `FrictionModel.step`), traced from the same formulas. The test is a program
     that compares the library with numbers of the model; the CMake file has a target for each.
     With `casadi`, `<name>_casadi.c` holds the step and its Jacobian as functions that `casadi.external` loads.

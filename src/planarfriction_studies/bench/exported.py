@@ -103,7 +103,7 @@ def step(full: bool, kind: str, vector: bool = False) -> Measurement:
 
 def percentile(full: bool, kind: str) -> Measurement:
     """Measure the 99.9th percentile of the time of single steps in C against their median."""
-    return _measured(kind, _percentile)
+    return _measured(kind, _percentile, *VECTOR)
 
 
 def instructions(full: bool, kind: str) -> Measurement:
