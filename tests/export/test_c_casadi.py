@@ -10,7 +10,7 @@ import planarfriction as pf
 from tests.support.c_libraries import MODELS, STRICT, samples
 
 ca = pytest.importorskip("casadi", reason="needs the extra [casadi]")
-pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+pytestmark = [pytest.mark.casadi, pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")]
 
 
 @pytest.fixture(scope="module", params=["few", "table"])
