@@ -23,6 +23,8 @@ class Batch:
     state: wp.uint64
     twist: wp.uint64
     normal_force: wp.uint64
+    moments: wp.uint64
+    """0, or the address of the moments of normal forces."""
     new_state: wp.uint64
     wrench: wp.uint64
     status: wp.uint64

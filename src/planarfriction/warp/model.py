@@ -8,6 +8,7 @@ from typing import Any
 import warp as wp
 
 from planarfriction import validation
+from planarfriction.errors import InvalidValueError
 from planarfriction.export.pieces import pieces_of
 from planarfriction.warp import arrays
 from planarfriction.warp.kernels import Batch, kernel_of
@@ -51,7 +52,9 @@ class Model:
         dtype: Any = wp.float32,
     ) -> None:
         pieces = pieces_of(model)
-        source = source_of(pieces, arrays.precision_of(dtype))
+        points = model.compiled.points()[0]
+        self._follows = len(points) == 1
+        source = source_of(pieces, points[0].tolist() if self._follows else [], arrays.precision_of(dtype))
         self.contacts = validation.count("contacts", contacts, at_most=2**31 - 1)
         self.device, self.dtype = wp.get_device(device), dtype
         self.names = (*pieces.parameters, "scale")
@@ -80,6 +83,8 @@ class Model:
         dt: float,
         new_state: wp.array[Any],
         wrench: wp.array[Any],
+        *,
+        moments: wp.array[Any] | None = None,
     ) -> None:
         """Advance all contacts by dt [s] at held twists, in one kernel without allocation or synchronisation.
 
@@ -87,9 +92,13 @@ class Model:
         `wrench` [contacts, 3] at the end of the step. A contact without normal force forgets its state. A contact with
         numbers that are not finite or out of range keeps its state and has no wrench (see `check`).
 
-        Raises InvalidValueError for arrays of another shape, precision or device, and a step that is negative.
+        The pressure of patches with three states follows the `moments` [contacts, 2] [N m] of the normal forces about
+        the origin (see `FrictionModel.step`).
+
+        Raises InvalidValueError for arrays of another shape, precision or device, moments of other patches, and a step
+        that is negative.
         """
-        self._launch((), state, twist, normal_force, dt, new_state, wrench)
+        self._launch((), state, twist, normal_force, dt, new_state, wrench, moments)
 
     def rollout(
         self,
@@ -99,15 +108,17 @@ class Model:
         dt: float,
         new_state: wp.array[Any],
         wrenches: wp.array[Any],
+        *,
+        moments: wp.array[Any] | None = None,
     ) -> None:
         """Step all contacts through given twists, in one kernel without allocation or synchronisation.
 
         `twists` [steps, contacts, 3], `normal_forces` [steps, contacts] [N]; written are the last state, `new_state`,
-        and `wrenches` [steps, contacts, 3] at the end of each step.
+        and `wrenches` [steps, contacts, 3] at the end of each step. `moments` [steps, contacts, 2] as in `step`.
 
-        Raises InvalidValueError for arrays of another shape, precision or device, and a step that is negative.
+        Raises InvalidValueError as `step` does.
         """
-        self._launch(twists.shape[:1], state, twists, normal_forces, dt, new_state, wrenches)
+        self._launch(twists.shape[:1], state, twists, normal_forces, dt, new_state, wrenches, moments)
 
     def check(self) -> None:
         """Wait for the device, and forget what was wrong.
@@ -117,8 +128,10 @@ class Model:
         arrays.check(self.status, WRONG, "contacts")
 
     def _launch(
-        self, steps: tuple[int, ...], state: Any, twist: Any, load: Any, dt: float, new: Any, wrench: Any
+        self, steps: tuple[int, ...], state: Any, twist: Any, load: Any, dt: float, new: Any, wrench: Any, moments: Any
     ) -> None:
+        if moments is not None and not self._follows:
+            raise InvalidValueError("moments", "be None for a model with more than three states", "an array")
         along = (*steps, self.contacts)
         batch = Batch()
         batch.contacts, batch.steps, batch.rows = self.contacts, *(steps or (1,)), self.parameters.shape[0]
@@ -126,6 +139,7 @@ class Model:
         batch.state = self._address("state", state, self.state_shape)
         batch.twist = self._address("twist", twist, (*along, 3))
         batch.normal_force = self._address("normal_force", load, along)
+        batch.moments = 0 if moments is None else self._address("moments", moments, (*along, 2))
         batch.new_state = self._address("new_state", new, self.state_shape)
         batch.wrench = self._address("wrench", wrench, (*along, 3))
         batch.parameters, batch.status = self.parameters.ptr, self.status.ptr

@@ -29,10 +29,14 @@ class Source(NamedTuple):
     """Tables of whole numbers, one after another."""
 
 
-def source_of(pieces: Pieces, precision: str) -> Source:
-    """Return the source of a step in single or double precision ("float", "double")."""
+def source_of(pieces: Pieces, point: Sequence[float], precision: str) -> Source:
+    """Return the source of a step in single or double precision ("float", "double").
+
+    `point` is the centre [m] of a patch whose pressure can follow moments, empty for others.
+    """
     (own,), numbers, places = _described([pieces], precision, slopes=False)
-    return Source(_rendered("step.cpp.j2", own=own), numbers, places)
+    values = {"point": list(map(Writer(precision).constant, point)), "reach": own["largest"]}
+    return Source(_rendered("step.cpp.j2", own=own, **values), numbers, places)
 
 
 def coupled_source_of(
