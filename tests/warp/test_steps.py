@@ -180,7 +180,7 @@ def test_bad_numbers(place, value):
     """A contact with bad numbers keeps its state and has no wrench; its neighbours do not see it."""
     model = MODELS["few"]()
     friction = Model(model, contacts=3, parameters={"mu_s": np.full(3, 1.2)}, device="cpu", dtype=wp.float64)
-    given = {"state": np.zeros((3, 2, 40)), "twist": np.full((3, 3), 0.01), "load": np.ones(3)}
+    given = {"state": np.zeros((3, 2, 56)), "twist": np.full((3, 3), 0.01), "load": np.ones(3)}
     if place in given:
         given[place].reshape(3, -1)[1, 0] = value
     else:
