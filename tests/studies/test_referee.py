@@ -267,6 +267,15 @@ def test_a_known_error_is_found(share, mark):
         assert verdict.error is None and verdict.reason and "\n" not in verdict.reason
 
 
+def test_what_an_engine_lacks_is_no_failure():
+    class Lacking(Fake):
+        def build(self, case, dt):
+            raise NotImplementedError("no cylinders")
+
+    verdict = judge(CASES["stop"], Lacking(0.0))
+    assert (verdict.mark, verdict.reason) == ("-", "no cylinders")
+
+
 @dataclass(frozen=True)
 class Crashing(Fake):
     """An engine that ends its process in one case."""
@@ -462,6 +471,7 @@ def test_mujoco(tmp_path, capsys):
 def test_the_view_of_simulators(monkeypatch, capsys, tmp_path):
     own = [Fake(9.0, "A"), Fake(2.0, "A, firm"), Fake(0.5, "A, best"), Fake(0.0, "A, patches"), Fake(0.0, "B")]
     monkeypatch.setattr(engines, "installed", lambda left_out: iter(own))
+    monkeypatch.setattr(Apart, "judge", lambda self, *given: judge(*given))
     file = str(tmp_path / "referee.json")
     assert main(["simulators", "--case", "stribeck", "--json", file]) == 0
     lines = capsys.readouterr().out.replace("┃", "│").splitlines()

@@ -98,6 +98,8 @@ def no_result(mark: str, case: Case, engine: Engine, reason: str, dt: float = 0.
 def _judge(case: Case, engine: Engine, dt: float) -> Verdict:
     try:
         path, cost, start = trace(case, engine, dt)
+    except NotImplementedError as error:
+        return no_result("-", case, engine, str(error), dt)
     except Exception as error:  # an engine may raise anything
         return no_result("fails", case, engine, f"{type(error).__name__}: {error}", dt)
     if not (np.isfinite(path.positions).all() and np.isfinite(path.turns).all()):
