@@ -1,4 +1,4 @@
-"""What other systems lack, taken away here: files that are open, locks, processors, modules of POSIX."""
+"""Other systems, by taking away what they lack: replacing of open files, locks, affinity, modules of POSIX."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `make dist` refuses: files that are missing or too many, another version, a wheel that grows."""
+"""Distributions that `make dist` refuses: files missing or too many, another version, a wheel that grows."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def source(folder: Path, names: set[str]) -> Path:
 
 
 def faults(folder: Path, *, code: set[str] = CODE, beside: set[str] = frozenset(), **options) -> list[str]:
-    """What is found wrong with a release that has these files."""
+    """Lines about a release that has these files."""
     sent = source(folder, {f"src/{name}" for name in code} | check.BESIDE | beside)
     return check.faults(sent, wheel(folder / "a", code), wheel(folder / "b", code), CODE, **options)
 

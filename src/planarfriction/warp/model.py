@@ -72,7 +72,7 @@ class Model:
         wp.load_module(self.kernel.module, device=self.device)
 
     def rest(self) -> wp.array[Any]:
-        """Return the state [contacts, *model.state_shape] of contacts without memory."""
+        """Return the state `[contacts, *model.state_shape]` of contacts without memory."""
         return wp.zeros(self.state_shape, dtype=self.dtype, device=self.device)
 
     def step(

@@ -48,6 +48,10 @@ class Friction:
     in the last numbers of `userdata`, in the same way as by `planarfriction.adapters.mujoco`: `mujoco_warp.reset_data`
     resets them too, of single worlds if asked.
 
+    Raises `InvalidValueError` for an unsuitable integrator or cone, noslip iterations, sleeping, disabled actuation,
+    too little user data, names that are not in the model, pairs with friction of their own, models without source (see
+    `export_c`), and pressure that is to follow but cannot.
+
     Parameters
     ----------
     m
@@ -63,10 +67,6 @@ class Friction:
         Those of MuJoCo Warp, if they are made already; else they are made from `m`, at its initial state.
     nconmax, njmax
         Contacts and constraints of a world at most, if the data are made here.
-
-    Raises `InvalidValueError` for an unsuitable integrator or cone, noslip iterations, sleeping, disabled actuation,
-    too little user data, names that are not in the model, pairs with friction of their own, models without source (see
-    `export_c`), and pressure that is to follow but cannot.
     """
 
     def __init__(
