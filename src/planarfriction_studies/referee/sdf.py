@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
 from planarfriction_studies.referee.case import Body, Case, Shape
 
@@ -34,7 +34,7 @@ def _numbers(values: Iterable[float]) -> str:
     return " ".join(f"{value:.12g}" for value in values)
 
 
-def _model(body: Body, grips: dict[str, tuple[float, ...]]) -> str:
+def _model(body: Body, grips: Mapping[str, Sequence[float]]) -> str:
     shapes = "\n".join(_collision(shape, *grips[shape.name]) for shape in body.shapes)
     fixed, slides = body.joint == "fixed", body.joint == "slide"
     inertial = "" if fixed else _inertial(body)

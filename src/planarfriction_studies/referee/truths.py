@@ -206,7 +206,7 @@ def _moved(
 def in_hand(what: str, **motion: Any) -> float:
     """Return x, y [m] or the turn [rad] of `held_plate`, whose arguments the others are."""
     frozen = {key: _frozen(value) for key, value in motion.items()}
-    return dict(zip(("x", "y", "turn"), held_plate(**frozen), strict=True))[what]
+    return held_plate(**frozen)[("x", "y", "turn").index(what)]
 
 
 @functools.cache
