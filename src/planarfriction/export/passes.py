@@ -13,8 +13,8 @@ from typing import NamedTuple
 from planarfriction.export.c_source import TYPES, Writer, used_by
 from planarfriction.export.trace import Block, Branch, Operation
 
-CELLS = 40
-"""Largest number of cells of a block: 3 kB of stack."""
+CELLS = 56
+"""Largest number of cells of a block, those of the default model: 3 kB of stack, with their new states."""
 
 PASSES = 4
 """Passes over a block: from three on they take the same time, half of that of one."""
@@ -30,7 +30,10 @@ class Passes(NamedTuple):
     shared: str
     """Lines of what all cells have in common."""
     each: list[str]
-    """Lines of each pass, of cell `k` in row `i` of the block; the last leaves the wrench in `row[0]` to `row[2]`."""
+    """Lines of each pass, of cell `k` in row `i` of the block; the last leaves the wrench in `row[0]` to `row[2]`.
+
+    The place of a new state holds what passes hand on, until the last one writes the state there.
+    """
 
 
 def passes_of(writer: Writer, block: Block, count: int, places: Sequence[str], share: str) -> Passes | None:
@@ -50,22 +53,23 @@ def passes_of(writer: Writer, block: Block, count: int, places: Sequence[str], s
     ends = [0, *_cuts(own, block), len(own)]
     kept = [_handed(own, block, end) for end in ends]
     shared = [writer.line(each) for each in operations if each.name in common]
-    rows, texts, places_of = 3, [], {}
+    room = [f"row[{row}][i]" for row in range(len(own))]
+    room, texts, places_of = [*room[:3], *places, *room[3:]], [], {}
     for first, last, after in zip(ends, ends[1:], kept[1:], strict=False):
-        before, places_of = places_of, {name: row for name, row in places_of.items() if name in after}
+        before, places_of = places_of, {name: each for name, each in places_of.items() if name in after}
         for name in after:
-            places_of.setdefault(name, next(row for row in range(99) if row not in places_of.values()))
-        rows = max(rows, 1 + max(places_of.values(), default=0))
+            places_of.setdefault(name, next(each for each in room if each not in places_of.values()))
         read = {name for each in own[first:last] for name in _names(each)}
         read |= set(block.results) if last == len(own) else set()
-        lines = [f"    const real {name} = row[{row}][i];" for name, row in before.items() if name in read]
+        lines = [f"    const real {name} = {place};" for name, place in before.items() if name in read]
         lines += [writer.line(each) for each in own[first:last]]
-        lines += [f"    row[{row}][i] = {name};" for name, row in places_of.items() if name not in before]
+        lines += [f"    {place} = {name};" for name, place in places_of.items() if name not in before]
         if last == len(own):
             results = [writer.atom(each) for each in block.results]
             lines += [f"    {place} = {result};" for place, result in zip(places, results, strict=False)]
             lines += [f"    row[{j}][i] = {share} * {result};" for j, result in enumerate(results[len(places) :])]
         texts.append("\n".join(f"    {line}" for line in lines))
+    rows = 1 + max(int(row) for row in re.findall(r"row\[(\d+)\]", "".join(texts)))
     blocks = -(-count // CELLS)
     return Passes(-(-count // blocks), blocks, rows, "\n".join(shared), texts)
 
