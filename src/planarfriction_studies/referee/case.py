@@ -251,7 +251,7 @@ def read_case(path: Path) -> Case:
 
 
 def _both(mu: float | Vector) -> Vector:
-    return (mu, mu) if isinstance(mu, float) else tuple(mu)
+    return tuple(mu) if isinstance(mu, Sequence) else (mu, mu)
 
 
 def _check(path: Path, case: Case) -> None:

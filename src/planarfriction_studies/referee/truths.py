@@ -83,8 +83,8 @@ def tower(force: float, below: int, above: int, mass: float, mu: float, time: fl
 
 def shaken(mu: float, amplitude: float, frequency: float, time: float) -> float:
     """Return the displacement [m] of a box under a force `amplitude m sin(2 pi f t)`, phase by phase in closed form."""
-    omega, t, x, v = 2.0 * math.pi * frequency, 0.0, 0.0, 0.0
-    slowing = mu * GRAVITY
+    omega, slowing = 2.0 * math.pi * frequency, mu * GRAVITY
+    t, x, v = 0.0, 0.0, 0.0
     while t < time:
         pull = amplitude * math.sin(omega * t)
         if v == 0.0 and abs(pull) < slowing * (1.0 - 1e-12):
@@ -92,10 +92,11 @@ def shaken(mu: float, amplitude: float, frequency: float, time: float) -> float:
             continue
         side = math.copysign(1.0, v if v != 0.0 else pull)
 
-        def speed(s: float, t=t, v=v, side=side) -> float:
-            return v + amplitude / omega * (math.cos(omega * t) - math.cos(omega * s)) - side * slowing * (s - t)
+        def braked(s: float, t: float = t, v: float = v, side: float = side) -> float:
+            speed = v + amplitude / omega * (math.cos(omega * t) - math.cos(omega * s)) - side * slowing * (s - t)
+            return -side * speed
 
-        end = _next(lambda s, speed=speed, side=side: side * -speed(s), t + 1e-6, time)
+        end = _next(braked, t + 1e-6, time)  # pyright: ignore[reportGeneralTypeIssues]
         lasts = end - t
         x += v * lasts + amplitude / omega * (math.cos(omega * t) * lasts) - 0.5 * side * slowing * lasts**2
         x -= amplitude / omega**2 * (math.sin(omega * end) - math.sin(omega * t))
@@ -109,7 +110,7 @@ def _next(function: Callable[[float], float], start: float, end: float) -> float
 
     times = np.linspace(start, end, 4001)
     above = next((i for i, t in enumerate(times) if i and function(t) >= 0.0 > function(times[i - 1])), None)
-    return end if above is None else float(brentq(function, times[above - 1], times[above], xtol=1e-14))
+    return end if above is None else float(np.asarray(brentq(function, times[above - 1], times[above], xtol=1e-14)))
 
 
 # ---------------------------------------------------------------------- exact motion of a patch
@@ -124,16 +125,19 @@ def patch_of(
     if len(rectangles) == 1:
         _, _, width, height = rectangles[0]
         return ContactPatch.rectangle(
-            width, height, pressure=LinearGradient(tuple(gradient)) if any(gradient) else None
+            width, height, pressure=LinearGradient((gradient[0], gradient[1])) if any(gradient) else None
         )
     (x0, y0, x1, y1), (x2, _, x3, y3) = [(x - w / 2, y - h / 2, x + w / 2, y + h / 2) for x, y, w, h in rectangles]
     return ContactPatch.polygon([(x0, y0), (x1, y0), (x1, y1), (x3, y1), (x3, y3), (x2, y3)])
 
 
+_PLACES = "x", "y", "turn"
+
+
 def slide(what: str, **motion: Any) -> float:
     """Return x, y [m] or the turn [rad] of `end`, whose arguments the others are."""
     frozen = {key: _frozen(value) for key, value in motion.items()}
-    return dict(zip(("x", "y", "turn"), end(**frozen), strict=True))[what]
+    return end(**frozen)[_PLACES.index(what)]
 
 
 def _frozen(value: Any) -> Any:
@@ -177,7 +181,7 @@ def end(
     scale = math.sqrt(inertia / mass)
     if not velocity.any():
         first = np.array([*push, (at[0] - centre[0]) * push[1] - (at[1] - centre[1]) * push[0]]) / masses
-        velocity = 1e-9 * fsolve(lambda a: a - acceleration(pose, a), first, xtol=1e-13)
+        velocity = 1e-9 * np.asarray(fsolve(lambda a: a - acceleration(pose, a), first, xtol=1e-13))
     y = _moved(lambda _, *motion: acceleration(*motion), velocity, scale, time, rests=not any(push))
     c, s = math.cos(y[2]) - 1.0, math.sin(y[2])
     shift = np.array([c * centre[0] - s * centre[1], s * centre[0] + c * centre[1]])
@@ -206,7 +210,7 @@ def _moved(
 def in_hand(what: str, **motion: Any) -> float:
     """Return x, y [m] or the turn [rad] of `held_plate`, whose arguments the others are."""
     frozen = {key: _frozen(value) for key, value in motion.items()}
-    return held_plate(**frozen)[("x", "y", "turn").index(what)]
+    return held_plate(**frozen)[_PLACES.index(what)]
 
 
 @functools.cache
@@ -229,7 +233,7 @@ def held_plate(
         return np.array([fx, fy - mass * GRAVITY, torque + x * fy - y * fx]) / masses
 
     weight = np.array([0.0, -GRAVITY, 0.0])
-    velocity = 1e-9 * fsolve(lambda a: a - acceleration(0.0, np.zeros(3), a), 0.5 * weight, xtol=1e-13)
+    velocity = 1e-9 * np.asarray(fsolve(lambda a: a - acceleration(0.0, np.zeros(3), a), 0.5 * weight, xtol=1e-13))
     return tuple(map(float, _moved(acceleration, velocity, math.sqrt(inertia / mass), time, rests=True)))  # pyright: ignore[reportReturnType]
 
 

@@ -108,7 +108,7 @@ class DrakeWorld:
 
     def step(self, wrenches: np.ndarray) -> None:
         """Make a step; forces on free bodies act at their origins, those on pads along their slides."""
-        values = np.zeros(len(self.forces.values))
+        values = np.zeros(len(self.forces.values))  # pyright: ignore
         for body, own, wrench in zip(self.case.moving, self.bodies, wrenches, strict=True):
             if body.joint == "slide":
                 values[self.plant.GetJointByName(body.name).velocity_start()] = wrench[2]
@@ -117,7 +117,7 @@ class DrakeWorld:
             lever, at = rotation @ np.array(body.centre_of_mass), own.floating_velocities_start_in_v()
             values[at : at + 3] = wrench[3:] + np.cross(lever, wrench[:3])
             values[at + 3 : at + 6] = wrench[:3]
-        self.forces.values = values
+        self.forces.values = values  # pyright: ignore
         self.now += 1
         self.simulator.AdvanceTo(self.now * self.dt)
 
