@@ -101,3 +101,30 @@ def test_the_grip_of_a_slip_is_what_balances_less_what_accelerates(speed, place)
     a = push + 8.0 * (wished_speed - speed) + 16.0 * (wished - place - speed * slide.delay)
     assert abs(a) < 0.25 * slide.acceleration
     assert slide._grip(np.ones(1), np.zeros(1)) == pytest.approx(4.0 * (1.0 - a / slide.acceleration))
+
+
+def observed(controller, *, slips, wrench=(0.0, 1.0, 0.0)):
+    """The controller after a sample of one part that slips or sticks; its clock has run for a second."""
+    sample = Measurement([1.0], [wrench], [4.0])
+    controller.estimate = controller.observer.update(sample)._replace(slip=np.full(1, float(slips)))
+    controller.wrench, controller._time, controller._age = np.array([wrench]), np.ones(1), np.ones(1)
+    return controller
+
+
+@pytest.mark.parametrize("place, caught", [(0.0195, True), (0.018, False)])
+def test_a_part_that_sticks_near_its_goal_is_left_there(place, caught):
+    slide = observed(SlideBy(FrictionObserver(known_model(), batch=1), -0.02), slips=False)
+    slide.balance[:], slide._began[:], slide._since[:] = 4.0, 0.5, 0.2
+    slide.slid = np.array([[0.0, -place, 0.0]])
+    slide._grip(np.ones(1), np.full(1, 1e-3))
+    assert slide.caught.tolist() == [caught]
+
+
+@pytest.mark.parametrize("torque, falls", [(0.02, True), (2e-4, False)])
+def test_a_hinge_releases_what_does_not_hang_yet(torque, falls):
+    hinge = observed(Hinge(FrictionObserver(known_model(), batch=1)), slips=False, wrench=(0.0, 1.0, torque))
+    hinge._found[:], hinge._force[:], hinge._torque[:], hinge._since[:] = True, 1.0, torque, 0.2
+    first = hinge._grip(np.ones(1), np.full(1, 1e-3))
+    for _ in range(100):
+        last = hinge._grip(np.ones(1), np.full(1, 1e-3))
+    assert last / first == pytest.approx(np.exp(-0.1) if falls else 1.0, rel=1e-6)

@@ -86,6 +86,14 @@ def test_sensors_are_late_biased_and_noisy():
     assert force.std() == pytest.approx(0.02, rel=0.05)
 
 
+def test_an_empty_hand_shows_the_bias():
+    gripper = Gripper(parts(2, delay=0.02, bias=((0.05, 0.0, 1e-3), (0.0, -0.02, 0.0))), 20.0, seed=3)
+    samples = list(gripper.empty_hand(400))
+    assert np.mean([each.wrench for each in samples], axis=0) == pytest.approx(gripper.parts.bias, abs=4e-3)
+    assert abs(np.mean([each.normal_force for each in samples])) < 4e-3
+    assert samples[-1].time.max() < gripper.measurement.time.min()
+
+
 def test_the_slip_sensor_counts_and_loses_nothing():
     gripper = Gripper(parts(), 1.5, sensors=QUIET)
     time, _, _, slip = run(gripper, 1.5, 0.1)

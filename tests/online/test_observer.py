@@ -184,6 +184,45 @@ def test_measurements_and_spreads_are_those_of_a_kalman_filter():
     assert state[:n] == pytest.approx(np.where(np.arange(n) == 1, 5.0, mean + 0.7 * gain))
 
 
+@njit
+def moved(own, state, column):
+    kernels._move(own, state, column)
+
+
+def test_errors_of_the_count_do_not_add_up():
+    # x = (remainder e, twist, ...); a window of v counts: twist = v + (e - e')/span, e' again and kept
+    rng, n, span = np.random.default_rng(1), kernels.N, 1.0 / 120.0
+    own, column, state = observer()._filter, np.zeros(n), np.zeros(kernels.STATE)
+    root = np.tril(rng.normal(size=(n, n)))
+    state[kernels.ROOT : kernels.ROOT + n * n] = root.ravel()
+    state[:3], state[kernels.CHAIN], state[kernels.OLD + 8] = (1e-6, 2e-6, -1e-6), 3.0, span
+    state[kernels.OLD + 5 : kernels.OLD + 8] = 0.01, 0.02, 0.03
+    before = state[:3].copy()
+    moved(own, state, column)
+    map_ = np.eye(n)
+    map_[:6, :6] = 0.0
+    map_[3:6, :3] = np.eye(3) / span
+    new = np.zeros((n, 3))
+    new[:3], new[3:6] = np.diag(own.remainder), -np.diag(own.remainder) / span
+    found = state[kernels.ROOT : kernels.ROOT + n * n].reshape(n, n)
+    assert found @ found.T == pytest.approx(map_ @ root @ root.T @ map_.T + new @ new.T, rel=1e-9, abs=1e-15)
+    assert state[3:6] == pytest.approx((0.01, 0.02, 0.03) + before / span)
+    assert not state[:3].any()
+
+
+def test_an_empty_hand_gives_the_bias():
+    own, plain = observer(bias=(0.05, 0.05, 5e-4)), observer(bias=(0.05, 0.05, 5e-4))
+    bias, load = np.array([0.06, -0.04, 4e-4]), np.array([0.0, 1.0, 0.0])
+    for k in range(100):
+        own.update(Measurement(1e-3 * k, bias, 0.0))
+        own.update(Measurement(1e-3 * k + 5e-4, bias + 1.5 * load, 0.0))  # holds something: it cannot be empty
+    for k in range(100, 200):
+        found, other = (each.update(Measurement(1e-3 * k, bias + load, 4.0)) for each in (own, plain))
+    assert own.bias == pytest.approx(bias, rel=1e-2)
+    assert found.gauge == pytest.approx(0.25, rel=5e-3)
+    assert abs(other.gauge / 0.25 - 1.0) > 0.02  # without an empty hand the bias is load
+
+
 def test_a_slip_in_the_gripper_is_seen_and_its_friction_found():
     count = 40
     mu = np.linspace(0.35, 0.8, count)

@@ -1,10 +1,10 @@
 """Square-root Kalman filter for friction from samples of wrench, load and slip velocity (docs/online.md).
 
-The unknowns x are the slip twist `V_S = F V` (3), `log mu_c`, `log mu_s/mu_c`, the log of a scale of the radius, and
-the bias of the scaled wrench (3); their covariance is `S S'`. Sliding is steady: `w = N g(|u|) D h(u) + b` with
-`u = D V_S`, `D = diag(1, 1, scale)`; Jacobians are those of the limit surface and of the Stribeck curve. The
-probability of slip follows a hidden Markov chain: sliding has the velocity of x, sticking none and a wrench within the
-surface.
+The unknowns x are what the slip sensor's count left out (3), the slip twist `V_S = F V` (3), `log mu_c`,
+`log mu_s/mu_c`, the log of a scale of the radius, and the bias of the scaled wrench (3); their covariance is `S S'`.
+Sliding is steady: `w = N g(|u|) D h(u) + b` with `u = D V_S`, `D = diag(1, 1, scale)`; Jacobians are those of the limit
+surface and of the Stribeck curve. The probability of slip follows a hidden Markov chain: sliding has the velocity of x,
+sticking none and a wrench within the surface.
 """
 
 from __future__ import annotations
@@ -18,36 +18,33 @@ from planarfriction.compiler import jit, kernel
 from planarfriction.formulas import LARGEST
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
 
-N = 9
+N = 12
 """Unknowns."""
 
-MU, RATIO, SCALE, BIAS = 3, 4, 5, 6
-"""Places of the unknowns after the twist."""
+TWIST, MU, RATIO, SCALE, BIAS = 3, 6, 7, 8, 9
+"""Places of the unknowns after the remainder of the count [m], which is the error of a place."""
 
-ROOT, SLIP, TIME, BOUND, PEAK, GAUGE, SEEN, PLACE, REST = N, 90, 91, 92, 93, 94, 95, 98, 101
+ROOT, SLIP, TIME, BOUND, PEAK, GAUGE, SEEN, PLACE, REST = N, 156, 157, 158, 159, 160, 161, 164, 167
 """Places in the state after x: covariance root, probability of slip, time, logs of the largest gauge of the wrench
 while it stuck, of a recent one, and of that now, filtered wrench over load (3), recent displacement (3), time since
 the last velocity."""
 
-SUM, LOADS, COUNT, OLD, CHAIN, BACK = 102, 105, 106, 107, 115, 116
+SUM, LOADS, COUNT, OLD, CHAIN, BACK, LEVER = 168, 171, 172, 173, 182, 183, 184
 """Places of the sums of the wrench over load (3) and of the load since the last velocity, and their number; the same
-of the samples before it, with their velocity (8); velocities in a row that were those of sliding; samples in a row that
-were not later than one before."""
+of the samples before it, with their velocity and time (9); velocities in a row that were those of sliding; samples in a
+row that were not later than one before; the share of the torque in the gauge of the wrench."""
 
 RESTART = 10.0
 """Samples in a row whose time went back after which the clock counts as set anew."""
 
-STATE = 117
+STATE = 185
 """Length of the state."""
 
 PEAK_TIME, SEEN_TIME, PLACE_TIME = 0.1, 0.004, 0.06
 """Times in which the peak of the wrench, its filter and the recent displacement fade [s]."""
 
-LEAVES, CREEPS = 2.0, 0.2
-"""Rates at which a slip ends, and at which one begins within the surface [1/s]."""
-
-BREAKS = 100.0
-"""Rate at which one begins at the surface [1/s]."""
+LEAVES, CREEPS, BREAKS = 2.0, 0.2, 100.0
+"""Rates at which a slip ends, and at which one begins within the surface and at it [1/s]."""
 
 FRESH = 0.03
 """Standard deviation of the slip velocity at its beginning [m/s]."""
@@ -58,6 +55,9 @@ SLOW = 1.5
 MEMORY = 0.01
 """Time [s] within which samples inside the surface are one, not many, in the probability of slip."""
 
+EMPTY = 5.0
+"""Standard deviations by which the wrench of an empty hand may differ from the bias: else it holds something."""
+
 ESTIMATE = 19
 """Numbers of an estimate: twist, mu_c, mu_s, radius, covariance of their logs (9), probability of slip and of being
 about to, margin, log of the gauge of the wrench per load."""
@@ -65,11 +65,8 @@ about to, margin, log of the gauge of the wrench per load."""
 NEAR = 0.1
 """Share of more load at which a part that is about to slip does [-]."""
 
-SEEN_ERROR = 0.02
-"""Relative error of the filtered wrench over load [-]."""
-
-PEAK_ERROR = 0.1
-"""Relative error of the peak of the wrench as `mu_s` [-]."""
+SEEN_ERROR, PEAK_ERROR = 0.02, 0.06
+"""Relative errors of the filtered wrench over load, and of its peak as `mu_s` [-]."""
 
 
 class Filter(NamedTuple):
@@ -102,8 +99,11 @@ class Filter(NamedTuple):
     """Smallest slip velocity [m/s]."""
     place: float
     """Place that one count is [m]."""
+    remainder: np.ndarray
+    """Standard deviations of what a count leaves out, scaled `[3]` [m]."""
     model_error: float
-    """Relative error of a wrench of the model [-], anew between velocities; half of it stays in every estimate."""
+    """Relative error of a wrench of the model [-], anew between velocities; as much stays in every radius and mu_s, and
+    half of it in every mu_c."""
     drift: float
     """Random walk of `log mu_c` [1 per square root of s]."""
     saturation: float
@@ -205,19 +205,36 @@ def _gauge(own, s, scale, best):
             sign = 1.0 if each > 0.0 else -1.0
             for i in range(3):
                 best[i] = sign * own.duals[m, i]
+    s[LEVER] = z * best[2] / max(most, 1e-9)
     return most
+
+
+@kernel
+def _move(own, s, column):
+    """Set the twist to the counted velocity plus what the count left out before, less what it left out at its end."""
+    span = max(s[OLD + 8], 1e-9)
+    for i in range(3):
+        if s[CHAIN] <= 2.0:
+            _reset(s, i, 0.0, own.remainder[i], column)
+        _reset(s, TWIST + i, s[OLD + 5 + i] + s[i] / span, 0.0, column)
+        for j in range(i + 1):
+            s[ROOT + N * (TWIST + i) + j] = s[ROOT + N * i + j] / span
+        _reset(s, i, 0.0, own.remainder[i], column)
+        s[ROOT + N * (TWIST + i) + i] -= own.remainder[i] / span
 
 
 @kernel
 def _learn(own, s, h, column, jacobian):
     """Update with the mean wrench and the velocity of the samples before the last velocity, which were sliding."""
+    _move(own, s, column)
     count = s[OLD + 4]
+    if count == 0.0:
+        return
     load = s[OLD + 3] / count
-    for i in range(3):
-        _reset(s, i, s[OLD + 5 + i], own.quantum / math.sqrt(6.0), column)
+    before = s[SCALE]
     for row in range(3):
         mu, ratio, scale = math.exp(s[MU]), math.exp(s[RATIO]), _scale(own, s, load)
-        x, y, z = s[0], s[1], scale * s[2]
+        x, y, z = s[TWIST], s[TWIST + 1], scale * s[TWIST + 2]
         speed = math.sqrt(x * x + y * y + z * z)
         u = sliding(own.kind, own.data, 0, own.size, x, y, z, speed)
         sliding_jacobian(own.kind, own.data, 0, own.size, x, y, z, speed, jacobian)
@@ -233,14 +250,15 @@ def _learn(own, s, h, column, jacobian):
         for j in range(3):
             unit = (x if j == 0 else (y if j == 1 else z)) / speed
             slope = g * (jacobian[3 * row + j] - along * unit) / speed + by_speed * along * unit
-            h[j] = factor * slope * (scale if j == 2 else 1.0)
+            h[TWIST + j] = factor * slope * (scale if j == 2 else 1.0)
         h[MU] = factor * steady * along
         h[RATIO] = factor * along * mu * ratio * fade
-        h[SCALE] = h[2] * s[2] + (factor * g * along if row == 2 else 0.0)
+        h[SCALE] = h[TWIST + 2] * s[TWIST + 2] + (factor * g * along if row == 2 else 0.0)
         h[BIAS + row] = 1.0
         error = own.model_error * factor * g
         variance = own.noise[row] / count + error * error
         _measure(s, h, load * s[OLD + row] / count - factor * g * along - s[BIAS + row], variance, column)
+    s[BOUND] -= s[LEVER] * (s[SCALE] - before)
 
 
 @kernel
@@ -252,27 +270,40 @@ def _see(own, s, v, h, column, jacobian):
         s[PLACE + i] = s[PLACE + i] * math.exp(-span / PLACE_TIME) + v[i] * span
         far2 += s[PLACE + i] * s[PLACE + i]
         speed2 += v[i] * v[i]
-        miss = v[i] - (s[i] if s[SLIP] > 0.5 else 0.0)
+        miss = v[i] - (s[TWIST + i] if s[SLIP] > 0.5 else 0.0)
         odds += 0.5 * (v[i] * v[i] / (rest * rest) - miss * miss / sd2) - 0.5 * math.log(sd2 / (rest * rest))
     moves = speed2 > SLOW * SLOW * own.quantum * own.quantum
-    if moves and s[CHAIN] >= 2.0 and s[OLD + 4] > 0.0:
+    if moves and s[CHAIN] >= 2.0:
         _learn(own, s, h, column, jacobian)
     s[CHAIN] = s[CHAIN] + 1.0 if moves else 0.0
     for i in range(3):
         s[OLD + i], s[OLD + 5 + i] = s[SUM + i], v[i]
         s[SUM + i] = 0.0
-        _reset(s, i, v[i], own.quantum, column)
-    s[OLD + 3], s[OLD + 4], s[LOADS], s[COUNT], s[REST] = s[LOADS], s[COUNT], 0.0, 0.0, 0.0
+        _reset(s, TWIST + i, v[i], own.quantum, column)
+    s[OLD + 3], s[OLD + 4], s[OLD + 8], s[LOADS], s[COUNT], s[REST] = s[LOADS], s[COUNT], s[REST], 0.0, 0.0, 0.0
     return min(max(odds, -8.0), 8.0) + (8.0 if far2 > 16.0 * own.place * own.place else 0.0)
+
+
+@kernel
+def _tare(own, s, wrench, load, h, column):
+    """Learn the bias from a wrench of an empty hand, if it may be one."""
+    for i in range(3):
+        w = -s[BIAS + i]
+        for j in range(3):
+            w += own.conjugate[i, j] * wrench[j]
+        friction = math.exp(s[MU]) * load
+        variance = own.noise[i] + friction * friction
+        if w * w < EMPTY * EMPTY * (variance + _variance(s, BIAS + i, BIAS + i)):
+            for k in range(N):
+                h[k] = 1.0 if k == BIAS + i else 0.0
+            _measure(s, h, w, variance, column)
 
 
 @kernel
 def _judge(own, s, load, dt, best):
     """Update the probability of slip with the filtered wrench over load."""
-    sd_s, sd_c = (
-        math.sqrt(_variance(s, MU, RATIO) + SEEN_ERROR * SEEN_ERROR),
-        math.sqrt(_variance(s, MU, MU) + SEEN_ERROR * SEEN_ERROR),
-    )
+    sd_s = math.sqrt(_variance(s, MU, RATIO) + SEEN_ERROR * SEEN_ERROR)
+    sd_c = math.sqrt(_variance(s, MU, MU) + SEEN_ERROR * SEEN_ERROR)
     level = math.log(max(_gauge(own, s, _scale(own, s, load), best), 1e-9))
     inside = max(0.0, (s[MU] - level) / sd_c - 2.0)
     begins = CREEPS + BREAKS * _normal((level - s[MU] - s[RATIO]) / sd_s - 1.0)
@@ -289,7 +320,7 @@ def _estimate(own, s, out):
     for i in range(3):
         out[i] = 0.0
         for j in range(3):
-            out[i] += own.back[i, j] * s[j] if s[SLIP] > 0.5 else 0.0
+            out[i] += own.back[i, j] * s[TWIST + j] if s[SLIP] > 0.5 else 0.0
     log_s = max(s[MU] + max(s[RATIO], 0.0), s[BOUND])
     out[3], out[4], out[5] = math.exp(s[MU]), math.exp(log_s), own.radius * math.exp(s[SCALE])
     for i in range(3):
@@ -299,7 +330,7 @@ def _estimate(own, s, out):
                 a = s[ROOT + N * (MU if i < 2 else SCALE) + j] + (s[ROOT + N * RATIO + j] if i == 1 else 0.0)
                 b = s[ROOT + N * (MU if k < 2 else SCALE) + j] + (s[ROOT + N * RATIO + j] if k == 1 else 0.0)
                 total += a * b
-            floor = 0.25 * own.model_error * own.model_error
+            floor = own.model_error * own.model_error * (0.5 if i == 0 else 1.0) * (0.5 if k == 0 else 1.0)
             out[6 + 3 * i + k] = total + (floor if (i < 2) == (k < 2) else 0.0)
     out[15] = s[SLIP]
     out[16] = (1.0 - s[SLIP]) * _normal((s[GAUGE] + NEAR - log_s) / math.sqrt(out[10] + SEEN_ERROR * SEEN_ERROR))
@@ -336,13 +367,15 @@ def update(own, states, times, wrenches, loads, velocities, flags, out):
             s[BOUND] -= own.drift * math.sqrt(dt)
             s[REST] += dt
         before = s[SLIP]
-        if good and load > own.least_load and dt > 0.0:
+        if good and load <= own.least_load and dt > 0.0:
+            _tare(own, s, wrenches[p], load, h, column)
+        elif good and dt > 0.0:
             share = 1.0 - math.exp(-dt / SEEN_TIME)
             for i in range(3):
                 w = 0.0
                 for j in range(3):
                     w += own.conjugate[i, j] * wrenches[p, j]
-                s[SEEN + i] += share * (w / load - s[SEEN + i])
+                s[SEEN + i] += share * ((w - s[BIAS + i]) / load - s[SEEN + i])
                 s[SUM + i] += w / load
             s[LOADS], s[COUNT] = s[LOADS] + load, s[COUNT] + 1.0
             _judge(own, s, load, dt, best)
@@ -360,5 +393,6 @@ def update(own, states, times, wrenches, loads, velocities, flags, out):
         if before <= 0.5 < s[SLIP] and s[PEAK] > -9.0:
             for i in range(N):
                 h[i] = 1.0 if i in (MU, RATIO) else 0.0
+            h[SCALE] = s[LEVER]
             _measure(s, h, s[PEAK] - s[MU] - s[RATIO], PEAK_ERROR * PEAK_ERROR, column)
         _estimate(own, s, out[p])

@@ -27,6 +27,15 @@ STICKS = 0.05
 STUCK = 1.0
 """Rate at which it falls if a part that shall slip has stuck [1/s]."""
 
+AIM = 0.3
+"""Share of the tolerance by which a part is caught before the goal: late samples let it go on."""
+
+REGRIP = 5.0
+"""Rate at which the grip of a hinge that was released rises again while the part moves [1/s]."""
+
+HANGS = 0.12
+"""Lever of the load of a part that hangs, over the contact radius [-]."""
+
 CAUGHT = 1.5
 """Grip after a slip on purpose, over the one that balances the load [-]."""
 
@@ -66,7 +75,7 @@ class GripController:
         Raises InvalidValueError for a measurement that does not fit the observer.
         """
         self.estimate = estimate = self.observer.update(measurement)
-        self.wrench = np.broadcast_to(np.asarray(measurement.wrench, float), (*self.grip.shape, 3))
+        self.wrench = np.asarray(measurement.wrench, float) - self.observer.bias
         time, force = np.asarray(measurement.time, float), np.asarray(measurement.normal_force, float)
         dt = np.where(np.isfinite(self._time), np.nan_to_num(np.clip(time - self._time, 0.0, 0.1)), 0.0)
         self._time = np.fmax(self._time, time)
@@ -152,13 +161,16 @@ class Slip(GripController):
     While the part slips, a grip f accelerates it by `A (1 - f/f_b)`, A that of its load alone and `f_b` the grip that
     balances it. So `f = f_b (1 - a/A)`, `a = a_d + k_v (v_d - v) + k_x (x_d - x)`, with the place and the speed of the
     part when the grip acts. `f_b` is that of the first slip, then follows `f_b' = f_b k_i (v - v_c)`, `v_c = v_d + 2
-    (x_d - x)`. A part that has stuck is released slowly; at the goal it is caught.
+    (x_d - x)`. A part that has stuck is released slowly; at the goal, or where it sticks within `tolerance` of it, it
+    is caught: to release it there would move it by more.
     """
 
     axis: int
     """Component of the slip."""
     gains = (8.0, 16.0)
     """`k_v` [1/s] and `k_x` [1/s^2]."""
+    tolerance: float
+    """Distance from the goal that is good enough [m or rad]."""
 
     def __init__(
         self,
@@ -195,11 +207,13 @@ class Slip(GripController):
         ahead = self.balance
         place, speed, push = trapezoid(now - self._began, np.abs(self.goal), self.duration)
         there = x + v * self.delay
-        self.caught = self.caught | (there + 0.5 * v * v / self._braking() >= np.abs(self.goal) * (1.0 - 1e-3))
+        left = np.abs(self.goal) - there
+        self.caught = self.caught | (0.5 * v * v / self._braking() >= left - AIM * self.tolerance)
         wish = speed + 2.0 * (place - there)
         self.balance = self.balance * np.exp(np.where(slips, self.adapt * (v - wish) * dt, 0.0))
         self._since = np.where(slips, 0.0, self._since + dt)
         stuck = self._since > STICKS  # then the wrench is that of the load, and says which grip balances it
+        self.caught = self.caught | (stuck & (left < self.tolerance))
         self.balance = np.where(stuck & ~np.isnan(self.balance), 1.1 * needed / e.mu_c, self.balance)
         a = push + self.gains[0] * (speed - v) + self.gains[1] * (place - there)
         lead = np.clip(a / self.acceleration, -0.6, 0.25)
@@ -217,7 +231,7 @@ class Slip(GripController):
 class SlideBy(Slip):
     """Let a part slide down by `goal` [m] under its weight within `duration` [s], and hold it (see `Slip`)."""
 
-    axis = 1
+    axis, tolerance = 1, 0.9e-3
 
     def __init__(self, observer: FrictionObserver, goal: Any, *, duration: float = 2.0, **options: Any) -> None:
         options = {"acceleration": GRAVITY, "adapt": 20.0} | options
@@ -230,7 +244,7 @@ class TurnBy(Slip):
     `acceleration` [rad/s^2] is that of the part without friction.
     """
 
-    axis = 2
+    axis, tolerance = 2, math.radians(1.6)
 
     def __init__(self, observer: FrictionObserver, goal: Any, *, duration: float = 2.0, **options: Any) -> None:
         options = {"acceleration": 100.0, "adapt": 1.0} | options
@@ -240,21 +254,35 @@ class TurnBy(Slip):
 class Hinge(GripController):
     """Let a part pivot about the grip under its weight, with the least grip that carries its force alone.
 
-    `f = reserve |f_t|/mu_low + gain v`: the torque that friction then still has slows the pivot, and the part slides a
-    little as it turns, more the smaller the reserve.
+    The grip first falls until the part slips. Then `f = reserve |f_t|/mu_c + gain v`: the torque that friction still
+    has slows the pivot, and the part slides a little as it turns, more the smaller the reserve. A part that has stuck
+    before it hangs (the lever of its load is above an eighth of the contact radius) is released slowly.
 
     Raises InvalidValueError for values out of range.
     """
 
     def __init__(
-        self, observer: FrictionObserver, *, reserve: float = 1.2, gain: float = 50.0, most: float = 60.0
+        self, observer: FrictionObserver, *, reserve: float = 1.1, gain: float = 50.0, most: float = 60.0
     ) -> None:
         super().__init__(observer, most=most)
         self.reserve, self.gain = validation.positive("reserve", reserve), validation.non_negative("gain", gain)
-        self._force = np.zeros(self.grip.shape)
+        shape = self.grip.shape
+        self._force, self._torque, self._since, self._eased = *np.zeros((3, *shape)), np.ones(shape)
+        self._found = np.zeros(shape, bool)
 
     def _grip(self, needed: np.ndarray, dt: np.ndarray) -> np.ndarray:
         e, force = self.estimate, np.hypot(self.wrench[..., 0], self.wrench[..., 1])
-        self._force = np.where(np.isfinite(force), self._force + (force - self._force) * DT / 0.05, self._force)
-        speed = np.hypot(self.velocity[..., 0], self.velocity[..., 1]) * (e.slip > 0.5)
-        return self.reserve * self._force / e.mu_c + self.gain * speed
+        share = DT / 0.05 * (np.isfinite(force) & np.isfinite(self.wrench[..., 2]))
+        self._force = self._force + share * np.nan_to_num(force - self._force)
+        self._torque = self._torque + share * np.nan_to_num(self.wrench[..., 2] - self._torque)
+        slips = e.slip > 0.5
+        self._found = self._found | (slips & (self._age >= SETTLED))
+        moves = slips & self.velocity.any(axis=-1)  # near the surface a slip is probable, before any is seen
+        self._since = np.where(moves, 0.0, self._since + dt)
+        eases = (self._since > STICKS) & (np.abs(self._torque) > HANGS * e.radius * self._force)
+        rate = np.where(moves, REGRIP, -RELEASE * eases)
+        self._eased = np.minimum(self._eased * np.exp(rate * dt), 1.0)
+        speed = np.hypot(self.velocity[..., 0], self.velocity[..., 1]) * slips
+        start = self._begin(2.5 * self.load / e.mu_c)
+        first = np.minimum(start, self.grip * np.exp(-RELEASE * dt))
+        return np.where(self._found, self.reserve * self._eased * self._force / e.mu_c + self.gain * speed, first)

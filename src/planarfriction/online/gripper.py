@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
 from typing import Any, NamedTuple
 
@@ -218,14 +219,30 @@ class Gripper:
         late = self._past[(self.steps - self._late) % len(self._past), np.arange(len(self.parts))]
         return Measurement(late[:, 0].copy(), late[:, 1:4].copy(), late[:, 4].copy(), late[:, 5:].copy())
 
+    def empty_hand(self, samples: int = 100) -> Iterator[Measurement]:
+        """Yield what the sensors said before the hand gripped: bias and noise, from which an observer learns the bias.
+
+        Raises InvalidValueError for a number of samples that is not >= 1.
+        """
+        first = len(self._past) + validation.count("samples", samples, 1)
+        for k in range(samples):
+            sensed = self._sensed()
+            yield Measurement(np.full(len(sensed), DT * (k - first)), sensed[:, :3], sensed[:, 3])
+
+    def _sensed(self) -> np.ndarray:
+        """Return bias and noise of the wrenches and the grip force `[P, 4]`."""
+        force, torque = self.sensors.force_noise, self.sensors.torque_noise
+        sensed = self._random.normal(size=(4, len(self.parts))).T * (force, force, torque, force)
+        sensed[:, :3] += self.parts.bias
+        return sensed
+
     def _record(self, step: int) -> None:
         """Sample the sensors."""
-        sensors, count, row = self.sensors, len(self.parts), self._past[step % len(self._past)]
+        sensors, row = self.sensors, self._past[step % len(self._past)]
         row[:, 0], row[:, 5:] = step * DT, np.nan
-        noise = self._random.normal(size=(4, count)).T
-        scale = np.array([sensors.force_noise, sensors.force_noise, sensors.torque_noise])
-        row[:, 1:4] = self.wrench + self.parts.bias + scale * noise[:, :3]
-        row[:, 4] = self.normal_force + sensors.force_noise * noise[:, 3]
+        row[:, 1:5] = self._sensed()
+        row[:, 1:4] += self.wrench
+        row[:, 4] += self.normal_force
         if int((step + 1) * DT * sensors.slip_rate) > int(step * DT * sensors.slip_rate) and step > 0:
             unit = sensors.quantum / sensors.slip_rate * np.array([1.0, 1.0, 1.0 / sensors.base])
             places = np.rint(self.slip / unit)

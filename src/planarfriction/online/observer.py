@@ -79,11 +79,12 @@ class FrictionObserver:
     While a part slips, its wrench is that of steady sliding, `W = (g(|V|) + sigma_2 |V|) f_N h(V)`, of the limit
     surface and the law, with unknown `mu_c`, `mu_s/mu_c` and a scale of the radius; a square-root filter updates their
     logs, the twist and the bias of the sensor with the Jacobians of the surface. It learns from the mean wrench between
-    two slip velocities once the next one shows that the part slipped throughout. While the part sticks, the wrench only
-    bounds mu_s from below. Peaks of the wrench at the beginning of a slip are mu_s. The probability of slip follows a
-    hidden Markov chain. Without slip velocities nothing but that bound is learnt.
+    two slip velocities once the next one shows that the part slipped throughout; errors of the counted place do not add
+    up over a slip. While the part sticks, the wrench only bounds mu_s from below. Peaks of the wrench at the beginning
+    of a slip are mu_s. Samples of an empty hand (a load below `least_load`) give the bias of the wrench. The
+    probability of slip follows a hidden Markov chain. Without slip velocities nothing but that bound is learnt.
 
-    `information()` is that of the motion so far. `state` `[..., 117]` is all that changes: a copy of it is a
+    `information()` is that of the motion so far. `state` `[..., 185]` is all that changes: a copy of it is a
     checkpoint. With `batch`, the observer watches so many parts at once; measurements have that leading shape.
 
     Raises InvalidValueError for what is neither a model nor a limit surface, asymmetric friction, and values out of
@@ -102,7 +103,7 @@ class FrictionObserver:
         radius_spread: float = 0.2,
         bias: Any = (0.03, 0.03, 3e-4),
         sensors: Sensors | None = None,
-        model_error: float = 0.03,
+        model_error: float = 0.02,
         drift: float = 0.0,
         tolerance: float = 0.05,
         saturation: float = 1e3,
@@ -133,7 +134,8 @@ class FrictionObserver:
         spreads = {"mu_spread": mu_spread, "ratio_spread": ratio_spread, "radius_spread": radius_spread}
         self._prior = np.array([validation.positive(name, value) for name, value in spreads.items()])
         unsure = np.abs(self._filter.conjugate) @ validation.non_negative_array("bias", bias, (3,))
-        root = np.diag([kernels.FRESH] * 3 + self._prior.tolist() + np.maximum(unsure, 1e-9).tolist())
+        fresh = [kernels.FRESH] * 3
+        root = np.diag(np.concatenate([self._filter.remainder, fresh, self._prior, np.maximum(unsure, 1e-9)]))
         n, numbers = kernels.N, model.law.numbers
         self.state = state = np.zeros(validation.batched(batch, (kernels.STATE,)))
         state[..., kernels.MU] = math.log(numbers.mu_c)
@@ -168,13 +170,20 @@ class FrictionObserver:
         odds = (out[..., i] for i in (15, 16, 17))
         return Estimate(out[..., :3], *numbers, covariance, within, *odds, np.exp(out[..., 18]), flags.reshape(batch))
 
+    @property
+    def bias(self) -> np.ndarray:
+        """Estimated bias of the measured wrench, `[..., 3]` [N, N, N m]."""
+        return self.state[..., kernels.BIAS : kernels.N] @ np.linalg.inv(self._filter.conjugate).T
+
     def information(self) -> np.ndarray:
         """Return the information of the samples so far on the logs of mu_c, mu_s/mu_c and the radius, `[..., 3, 3]`.
 
         The inverse covariance less that of the prior; a direction without information is not determined by the motion.
         """
         n = kernels.N
-        root = self.state[..., kernels.ROOT : kernels.ROOT + n * n].reshape(*self.state.shape[:-1], n, n)[..., 3:6, :]
+        root = self.state[..., kernels.ROOT : kernels.ROOT + n * n].reshape(*self.state.shape[:-1], n, n)[
+            ..., kernels.MU : kernels.BIAS, :
+        ]
         return np.linalg.inv(root @ np.swapaxes(root, -1, -2)) - np.diag(1.0 / self._prior**2)
 
 
@@ -183,6 +192,7 @@ def _settings(model: FrictionModel, surface: LimitSurface, load: float, sensors:
     kind, size, data = surface.numbers
     frame, numbers = surface._frame(), model.law.numbers
     back = np.linalg.inv(frame)
+    place = sensors.quantum / max(sensors.slip_rate, 1.0)
     noise = np.abs(back.T) @ (sensors.force_noise, sensors.force_noise, sensors.torque_noise)
     return kernels.Filter(
         kind,
@@ -200,7 +210,8 @@ def _settings(model: FrictionModel, surface: LimitSurface, load: float, sensors:
         numbers.sigma_2,
         np.maximum(noise, _LEAST_NOISE) ** 2,
         sensors.quantum,
-        sensors.quantum / max(sensors.slip_rate, 1.0),
+        place,
+        np.abs(frame) @ (place, place, place / sensors.base) / math.sqrt(12.0),
         *rest,
     )
 
