@@ -26,3 +26,15 @@ def test_the_table_of_the_trials_is_written(tmp_path, capsys, monkeypatch):
 def test_too_few_parts_are_refused(capsys):
     assert main(["online", "trials", "--parts", "2"]) != 0
     assert "--parts must be" in capsys.readouterr().err
+
+
+def test_a_film_is_written(tmp_path, monkeypatch, capsys):
+    from planarfriction.online import demo
+    from planarfriction.plots import grip
+
+    monkeypatch.setattr(demo, "record_hold", lambda seed: seed)
+    monkeypatch.setattr(grip, "write_grip_film", lambda path, record: path.write_text(str(record)))
+    assert main(["online", "demo", "--out", str(tmp_path / "hold.gif"), "--seed", "3"]) == 0
+    assert (tmp_path / "hold.gif").read_text() == "3"
+    assert main(["online", "demo", "--out", str(tmp_path / "hold.bmp")]) != 0
+    assert "animations are" in capsys.readouterr().err
