@@ -30,8 +30,8 @@ ROWS = {
 }
 """Case -> its row of README."""
 
-OWN, PATCHES = ("MuJoCo, elliptic", "MuJoCo, noslip"), "MuJoCo, patches"
-"""Engines of these rows."""
+OWN, PATCHES = ("MuJoCo", "MuJoCo, stiff"), "MuJoCo, patches"
+"""Engines of these rows: as it comes, at the settings that pass the most cases, and with patches."""
 
 
 def tables(stored: dict[str, Any]) -> dict[str, str]:
