@@ -140,7 +140,7 @@ def test_a_disk_that_fails_late_leaves_the_old_file(tmp_path, monkeypatch, call)
 
     target = tmp_path / "run.nc"
     target.write_bytes(OLD)
-    monkeypatch.setattr(os, "fsync", full) if call == "fsync" else monkeypatch.setattr(Path, "replace", full)
+    monkeypatch.setattr(os, "fsync", full) if call == "fsync" else monkeypatch.setattr(os, "replace", full)
     with pytest.raises(FrictionError, match=r"run.nc: cannot be written: No space left on device") as caught:
         write_text(target, "new")
     assert "\n" not in str(caught.value)
@@ -150,9 +150,9 @@ def test_a_disk_that_fails_late_leaves_the_old_file(tmp_path, monkeypatch, call)
 
 def test_the_bytes_are_on_the_disk_before_they_take_the_place(tmp_path, monkeypatch):
     calls = []
-    fsync, replace = os.fsync, Path.replace
+    fsync, replace = os.fsync, os.replace
     monkeypatch.setattr(os, "fsync", lambda number: calls.append("fsync") or fsync(number))
-    monkeypatch.setattr(Path, "replace", lambda part, to: calls.append("replace") or replace(part, to))
+    monkeypatch.setattr(os, "replace", lambda part, to: calls.append("replace") or replace(part, to))
     write_text(tmp_path / "a.txt", "µ")
     assert calls == ["fsync", "replace"]
     assert (tmp_path / "a.txt").read_bytes() == "µ".encode()

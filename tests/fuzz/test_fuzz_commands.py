@@ -91,9 +91,10 @@ def test_commands(draw: random.Random) -> None:
         plt.close("all")
         if code in (0, OUT_OF_TOLERANCE, INTERRUPTED):
             return
-        if code != 2 or not errors.getvalue().startswith("error: ") or not errors.getvalue().endswith("\n"):
+        lines = [line for line in errors.getvalue().splitlines(keepends=True) if not line.startswith("warning: ")]
+        if code != 2 or not lines or not lines[0].startswith("error: ") or not lines[-1].endswith("\n"):
             raise Broken(f"exit code {code} and {errors.getvalue()[:200]!r}")
-        raise FrictionError(errors.getvalue()[len("error: ") : -1])
+        raise FrictionError("".join(lines)[len("error: ") : -1])
 
     with folder() as here:
         (here / "log.csv").write_bytes(LOGS[0])

@@ -267,3 +267,9 @@ def test_points_keep_their_order_and_weights():
     assert pf.ContactPatch.points(legs, [1, 0, 1]).cells == 2
     assert pf.ContactPatch.points(legs, area=2e-4).pressure_values(6.0) == pytest.approx([1e4] * 3)
     assert pf.ContactPatch.points([(0.3, 0.4)]).contact_radius() == 0.0
+
+
+def test_a_published_patch_in_millimetres_warns_once():
+    with pytest.warns(UserWarning, match="are its lengths in metres") as told:
+        pf.patch.PUBLISHED_PATCHES["Line"](width=2.0)
+    assert len(told) == 1

@@ -74,7 +74,7 @@ def test_what_cannot_be_held_or_does_not_hold_is_refused_in_one_line():
     cases = {
         "model must be a friction model": lambda: dynamic_holding_load(LOAD, DISC),
         "model must have a law that holds at rest": lambda: dynamic_holding_load(LOAD, creeps),
-        "fall must be > 1": lambda: dynamic_holding_load(LOAD, model, fall=1.0),
+        "fall must be at least 1.001": lambda: dynamic_holding_load(LOAD, model, fall=1.000000000001),
         "ramp must be >= 0": lambda: dynamic_holding_load(LOAD, model, ramp=-1.0),
         "mass must be > 0": lambda: dynamic_holding_load(LOAD, model, mass=0.0),
         "inertia must be > 0": lambda: dynamic_holding_load(LOAD, model, inertia=-1.0),

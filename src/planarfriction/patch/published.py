@@ -7,6 +7,7 @@ and the lines follow their own rules, which depend on the number of cells).
 from __future__ import annotations
 
 import dataclasses
+import warnings
 
 import numpy as np
 
@@ -56,7 +57,9 @@ def non_convex_2(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPa
 
 def _even(patch: ContactPatch) -> ContactPatch:
     """Return the patch with weights in proportion to pressure and area alone, as published."""
-    return with_outline(dataclasses.replace(patch, point_shares=None), patch.outline)
+    with warnings.catch_warnings():  # that the shape itself has given
+        warnings.simplefilter("ignore")
+        return with_outline(dataclasses.replace(patch, point_shares=None), patch.outline)
 
 
 def _steps(cells: int) -> np.ndarray:

@@ -121,8 +121,8 @@ def dynamic_holding_load(
     if not model.law.holds_at_rest:
         raise InvalidValueError("model", "have a law that holds at rest", type(model.law).__name__)
     fall = validation.number("fall", fall)
-    if fall <= 1.0:
-        raise InvalidValueError("fall", "be > 1", fall)
+    if fall < 1.0 + CLOSE:
+        raise InvalidValueError("fall", f"be at least {1.0 + CLOSE:g}", fall)
     slow = holding_load(load, model.patch, model.law.numbers.mu_s)
     if slow == 0.0:
         return 0.0
