@@ -79,7 +79,7 @@ def hold_rule(
 
 def hinge_rule(force: ArrayLike, speed: ArrayLike, mu: ArrayLike) -> np.ndarray:
     """Return the normal force `max(0.6, 1.4 |f|/mu + 100 v)` [N] under which a part pivots without sliding."""
-    return np.maximum(LEAST_HINGE, 1.4 * np.asarray(force) / mu + 100.0 * np.abs(speed))
+    return np.maximum(LEAST_HINGE, 1.4 * np.asarray(force) / np.asarray(mu) + 100.0 * np.abs(speed))
 
 
 @dataclass(frozen=True)

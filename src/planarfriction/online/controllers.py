@@ -10,7 +10,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.online.gripper import DT, GRAVITY, Measurement
-from planarfriction.online.observer import Estimate, FrictionObserver
+from planarfriction.online.observer import FrictionObserver
 
 LOAD_TIME = 0.3
 """Time in which the largest load of late fades from the grip [s]."""
@@ -62,7 +62,7 @@ class GripController:
     def __init__(self, observer: FrictionObserver, *, most: float = 60.0) -> None:
         self.observer = validation.instance("observer", observer, FrictionObserver, "a FrictionObserver")
         self.most = validation.positive("most", most)
-        self.estimate: Estimate | None = None
+        self.estimate: Any = None
         shape = observer.state.shape[:-1]
         self.load, self.grip = np.zeros(shape), np.full(shape, self.most)
         self.slid, self.velocity = np.zeros((*shape, 3)), np.zeros((*shape, 3))

@@ -119,13 +119,13 @@ class FrictionObserver:
         self.surface = validation.instance("surface", surface, LimitSurface, "a limit surface")
         if surface.patch.asymmetric:
             raise InvalidValueError("model", "have symmetric friction", "a patch with an asymmetry")
-        sensors = Sensors() if sensors is None else validation.instance("sensors", sensors, Sensors, "Sensors")
+        own: Any = Sensors() if sensors is None else validation.instance("sensors", sensors, Sensors, "Sensors")
         self.tolerance = validation.positive("tolerance", tolerance)
         self._filter = _settings(
             model,
             surface,
             load,
-            sensors,
+            own,
             validation.positive("model_error", model_error),
             validation.non_negative("drift", drift),
             validation.positive("saturation", saturation),
@@ -166,9 +166,9 @@ class FrictionObserver:
         out = out.reshape(*batch, kernels.ESTIMATE)
         covariance = out[..., 6:15].reshape(*batch, 3, 3)
         within = out[..., 6:15:4] <= (math.log1p(self.tolerance) / _TWO_SIDED) ** 2
-        numbers = (out[..., i] for i in (3, 4, 5))
-        odds = (out[..., i] for i in (15, 16, 17))
-        return Estimate(out[..., :3], *numbers, covariance, within, *odds, np.exp(out[..., 18]), flags.reshape(batch))
+        numbers, odds = ([out[..., i] for i in of] for of in ((3, 4, 5), (15, 16, 17)))
+        margin = np.exp(out[..., 18])
+        return Estimate._make((out[..., :3], *numbers, covariance, within, *odds, margin, flags.reshape(batch)))
 
     @property
     def bias(self) -> np.ndarray:

@@ -124,7 +124,7 @@ def trial(task: str, parts: Parts, goal: Any, duration: float, *, ours: bool, se
     for sample in empty:
         observer.update(sample)
     bias = np.mean([sample.wrench for sample in empty], axis=0)
-    controller = makes[task]() if ours else Rule(task, parts, unit, goal, duration, bias)
+    controller: Any = makes[task]() if ours else Rule(task, parts, unit, goal, duration, bias)
     steps = HOLD_STEPS if task == "hold" else steps + AFTER_STEPS
     first = _FirstSlip(parts, unit) if ours and task == "hold" else None
     sample, grip, start = gripper.measurement, np.zeros(count), np.zeros((count, 3))
