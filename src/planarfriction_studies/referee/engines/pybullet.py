@@ -37,7 +37,7 @@ class Client:
     def __init__(self) -> None:
         import pybullet
 
-        self._module, self._number = pybullet, pybullet.connect(pybullet.DIRECT)
+        self._module, self._number = pybullet, pybullet.connect(pybullet.DIRECT)  # pyright: ignore[reportAttributeAccessIssue]
 
     def __getattr__(self, name: str) -> Any:
         found = getattr(self._module, name)
