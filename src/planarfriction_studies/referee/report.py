@@ -71,7 +71,7 @@ def simulators(verdicts: Sequence[Verdict]) -> dict[str, tuple[list[str], list[l
         columns = list(dict.fromkeys([own[0], max(own, key=passed.__getitem__), name + OURS[0]]))
         rows = [
             [case, *(shown(found.get((case, engine))) for engine in columns)]
-            for case in dict.fromkeys(each.case for each in verdicts)
+            for case in dict.fromkeys(each.case for each in verdicts if each.engine in columns)
         ]
         tables[name] = ["case", *columns], rows
     return tables
