@@ -7,6 +7,7 @@ import signal
 
 import pytest
 from hypothesis import settings
+from hypothesis.internal.conjecture import providers
 
 from planarfriction import families
 
@@ -22,6 +23,9 @@ def pytest_configure(config) -> None:
     if config.getoption("--hypothesis-profile") is None:
         slow = "slow" in config.getoption("markexpr").replace("not slow", "")
         settings.load_profile("random" if slow else "repeatable")
+    if settings.get_current_profile_name() == "repeatable" and hasattr(providers, "_get_local_constants"):
+        # Hypothesis draws numbers that it reads in the project's modules: those that earlier tests happened to import.
+        providers._get_local_constants = lambda: providers._local_constants
 
 
 @pytest.fixture(autouse=True)

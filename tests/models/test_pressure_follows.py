@@ -32,6 +32,15 @@ def moments_at(centre, load) -> np.ndarray:
     return np.asarray(load)[..., None] * np.stack([y, -x], -1)
 
 
+@pytest.mark.parametrize("load", [1e-20, 1e-61, 1e-300, 5e-324])
+def test_moments_of_hardly_any_load_give_numbers(model, load):
+    """Its centre lies further away than any patch: one part went to 1e99 m, and then to infinity."""
+    state = model.rest()
+    for _ in range(2):
+        state, wrench = model.step(state, (0.005, 0.002, 0.5), load, 1e-3, moments=(1e-3, -2e-3))
+        assert (np.abs(state) < 1e50).all() and (np.abs(wrench) < 1e50).all()
+
+
 def test_translation_pulls_at_the_centre_of_pressure(model):
     """Friction of a translation acts at the centre of pressure: within the kern, beyond it, beyond parts' centres."""
     size = model.patch.positions.max()

@@ -30,9 +30,9 @@ NARROW = 1e-8
 OVERSHOT = 0.5
 """Slope along a Newton step at which it may end, as a share of that at its start."""
 
-
-REACH = 1e100
-"""Distance [m] at which a centre of pressure may be asked for; that of a load of nearly nothing lies beyond."""
+REACH = 1e15
+"""Distance [m] at which a centre of pressure may be asked for; that of a load of nearly nothing lies beyond. Its square
+is a number in single precision too, and its fifth power times a large twist one in double precision."""
 
 
 class Plane(NamedTuple):

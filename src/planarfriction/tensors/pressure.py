@@ -9,11 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from planarfriction.kernels.tilt import FARTHEST, NARROW, SOFTNESS
+from planarfriction.kernels.tilt import FARTHEST, NARROW, REACH, SOFTNESS
 from planarfriction.tensors.distributed import Cells, positions_of
-
-REACH = 1e15
-"""Distance [m] at which a centre of pressure may be asked for: its square is a number in single precision too."""
 
 
 def centre_of(xp: Any, moments: Any, load: Any) -> Any:
