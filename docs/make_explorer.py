@@ -1,6 +1,6 @@
 """The explorer's pictures and times: `python docs/make_explorer.py [pictures] [times]`, by default the pictures.
 
-Writes to `docs/images` and `docs/explorer.md`. Needs the extras `explore` and `browser`, and Chromium. Times are of
+Writes to `docs/images` and `docs/pictures.md`. Needs the extras `explore` and `browser`, and Chromium. Times are of
 this machine and this browser, which draws without a graphics processor: measure while nothing else runs.
 """
 
@@ -122,7 +122,7 @@ def times() -> None:
         lines.append(f"| {name} | {' | '.join(cells)} |\n")
         print(lines[-1], end="")
     head = "| patch | server, median [ms] | 95 % | pointer to numbers, median [ms] | 95 % |\n|---|---|---|---|---|\n"
-    path = DOCS / "explorer.md"
+    path = DOCS / "pictures.md"
     pattern = r"(<!-- times -->\n\n).*?(?=\n\n|\Z)"
     text = re.sub(pattern, lambda found: found[1] + (head + "".join(lines)).rstrip(), path.read_text(), flags=re.S)
     path.write_text(text.rstrip() + "\n", encoding="utf-8")

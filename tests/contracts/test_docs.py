@@ -26,7 +26,7 @@ OPTIONAL = ("torch", "jax", "warp", "mujoco", "mujoco.mjx", "mujoco_warp", "pydr
 """Packages behind an extra; `planarfriction.torch`, `planarfriction.adapters.mujoco` and so on carry their names."""
 RECIPES = ("pybullet", "genesis", "newton")
 """Hosts that a page has recipes for, and no extra of ours installs."""
-SLOW_PAGES = ("mjx.md", "mujoco-warp.md")
+SLOW_PAGES = ("mjx-and-warp.md",)
 """Pages whose hosts compile for a minute."""
 FAMILIES = (families.LAWS, families.MODELS, families.SURFACES, families.SHAPES, families.SCENES)
 MODULES = {module.name for module in pkgutil.iter_modules(planarfriction.__path__)}
@@ -196,7 +196,7 @@ def test_names_exist(page):
             assert resolve(name), f"{page.name}: {name}"
 
 
-EXPLANATION = ("physics", "exact-surfaces", "reduced-model", "solver", "contact-space", "anisotropy")
+EXPLANATION = ("physics", "exact-surfaces", "reduced-model", "solver", "embedding", "anisotropy")
 """Pages that give equations and say which code holds them."""
 
 
