@@ -206,8 +206,8 @@ class TossModel(BatchModel):
         regions, far = self.regions(questions), self.distances(cases)
         axes = 1e3 * np.sqrt(np.linalg.eigvalsh(regions[:, :2, :2]))
         found: dict[str, Any] = {
-            "half axis along the way, median [mm]": float(np.median(axes[:, 1])),
-            "half axis across, median [mm]": float(np.median(axes[:, 0])),
+            "half axis along the path, median [mm]": float(np.median(axes[:, 1])),
+            "half axis across it, median [mm]": float(np.median(axes[:, 0])),
             "half width of the interval, median [deg]": float(np.degrees(np.median(np.sqrt(regions[:, 2, 2])))),
         }
         predicted, moved = moved_to(questions, self.ends(questions)[0]), moved_to(questions, reached)

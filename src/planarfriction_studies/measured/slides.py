@@ -21,8 +21,8 @@ CELLS = 11
 """Cells across the face: finer ones move no final yaw by more than 0.12 deg, and their RMS error by 0.02 deg."""
 
 MEASURES = (
-    Measure("path_mm", "along the way [mm]", rms),
-    Measure("path_deg", "along the way [deg]", rms, column=1),
+    Measure("path_mm", "along the path [mm]", rms),
+    Measure("path_deg", "along the path [deg]", rms, column=1),
     Measure("end_mm", "at the end [mm]", rms, column=2),
     Measure("end_deg", "at the end [deg]", rms, column=3),
 )
