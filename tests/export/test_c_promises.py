@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import re
 import shutil
 import subprocess
@@ -103,6 +104,20 @@ def test_calls_and_memory(name):
         slopes, asked = stack_of(frames, "slopes"), stack_of(frames, "twist|holding|search|try_|find_")
         assert stack_of(frames, "") - slopes - asked < STEP_STACK
         assert slopes < SLOPES_STACK and asked < STEP_STACK
+
+
+VECTORS = {"gcc": VECTOR, "clang": (*VECTOR, "-mprefer-vector-width=256")}
+"""Options for vector code, of clang with vectors of four numbers: eight of them spill over."""
+
+
+@pytest.mark.parametrize("compiler", VECTORS)
+@pytest.mark.parametrize("name", [each for each in EACH if each.values[0] in REDUCED])
+def test_stack_of_vector_code(name, compiler):
+    if shutil.which(compiler) is None or platform.machine() != "x86_64":
+        pytest.skip(f"needs {compiler} for x86-64")
+    folder = objects(name, compiler, *VECTORS[compiler], "-fstack-usage")
+    frames = [line.split("\t") for line in next(folder.glob("*.su")).read_text().splitlines()]
+    assert 0 < stack_of(frames, r"step(_cells|_of|_default)?$") < STEP_STACK
 
 
 @pytest.mark.parametrize("name", EACH)

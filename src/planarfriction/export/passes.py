@@ -14,10 +14,13 @@ from planarfriction.export.c_source import TYPES, Writer, used_by
 from planarfriction.export.trace import Block, Branch, Operation
 
 CELLS = 56
-"""Largest number of cells of a block, those of the default model: 3 kB of stack, with their new states."""
+"""Largest number of cells of a block, those of the default model: 2 kB of stack, with their new states."""
 
 PASSES = 4
 """Passes over a block: from three on they take the same time, half of that of one."""
+
+SHORT = 2
+"""Sums and products that each pass does itself instead of keeping their result, which would take stack."""
 
 
 class Passes(NamedTuple):
@@ -50,6 +53,8 @@ def passes_of(writer: Writer, block: Block, count: int, places: Sequence[str], s
         if all(name in common or not re.search(r"^t\d|\bk\b", name) for name in _names(each)):
             common.add(each.name)
     own = [each for each in operations if each.name not in common]
+    again = _again(own)
+    own = [each for each in own if each not in again]
     ends = [0, *_cuts(own, block), len(own)]
     kept = [_handed(own, block, end) for end in ends]
     shared = [writer.line(each) for each in operations if each.name in common]
@@ -61,7 +66,10 @@ def passes_of(writer: Writer, block: Block, count: int, places: Sequence[str], s
             places_of.setdefault(name, next(each for each in room if each not in places_of.values()))
         read = {name for each in own[first:last] for name in _names(each)}
         read |= set(block.results) if last == len(own) else set()
+        for each in reversed(again):
+            read |= set(_names(each)) if each.name in read else set()
         lines = [f"    const real {name} = {place};" for name, place in before.items() if name in read]
+        lines += [writer.line(each) for each in again if each.name in read]
         lines += [writer.line(each) for each in own[first:last]]
         lines += [f"    {place} = {name};" for name, place in places_of.items() if name not in before]
         if last == len(own):
@@ -76,6 +84,18 @@ def passes_of(writer: Writer, block: Block, count: int, places: Sequence[str], s
 
 def _names(operation: Operation) -> Iterator[str]:
     return (each for each in operation.arguments if isinstance(each, str))
+
+
+def _again(own: list[Operation]) -> list[Operation]:
+    """Return operations of so few steps that each pass does them itself."""
+    steps: dict[str, int] = {}
+    for each in own:
+        steps[each.name] = 1 + sum(steps.get(name, 0) for name in _names(each)) if _is_short(each) else SHORT + 1
+    return [each for each in own if steps[each.name] <= SHORT]
+
+
+def _is_short(operation: Operation) -> bool:
+    return operation.kind == "real" and bool(re.fullmatch(r"\{0\} [-+*] \{1\}", operation.text))
 
 
 def _handed(own: list[Operation], block: Block, end: int) -> list[str]:
