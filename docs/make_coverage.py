@@ -1,4 +1,4 @@
-"""Count how often intervals contain the true value; writes identification-coverage.md: `python docs/make_coverage.py`.
+"""Count how often intervals contain the true value, for the table of identification.md: `python docs/make_coverage.py`.
 
 The counts are kept in the file given by `--kept`, so that an interrupted run can be continued.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,6 +15,9 @@ import numpy as np
 
 import planarfriction as pf
 from planarfriction.identify import FitOptions, Log, identify_lugre
+
+PAGE = Path(__file__).parent / "identification.md"
+MARK = re.compile(r"<!-- coverage -->\n\n(?:\|.*\n)+")
 
 NAMES = ("mu_c", "mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2", "contact_radius")
 
@@ -54,7 +58,7 @@ ROWS = {
     "bias": Row("offset of 3 % on each wrench channel", "reduced-published", bias=0.03),
     "twist": Row("1 % noise on the twist", "reduced-published", twist_noise=0.01),
     "distributed": Row("distributed model, same disc", "distributed"),
-    "rim": Row("pressure concentrated at the rim, but a uniform disc is fitted", "distributed", rim_heavy=True),
+    "rim": Row("pressure at the rim, a uniform disc is fitted", "distributed", rim_heavy=True),
 }
 
 
@@ -113,33 +117,18 @@ def counted(row: Row, made: tuple, seed: int, count: Count) -> None:
         count.inside_told[name] += inside and told
 
 
-def page(counts: dict[str, Count]) -> str:
-    """The page of the counts."""
-    lines = [
-        "# How often the intervals contain the true value",
-        "",
-        "`docs/make_coverage.py` simulates logs of 4 s at 200 Hz with 1 % noise on each wrench channel, and fits eight",
-        "parameters to each of them, with all nuisance parameters free and one starting point. An entry such as",
-        "*28 of 30* means that the parameter was called identifiable in 30 logs, which differ in their noise, and that",
-        "the 95 % interval contained the true value in 28 of them. The column *all* is the share over all parameters.",
-        "The last column counts the logs whose fit was rejected; no parameter is called identifiable in those. Where",
-        "the load cell drifts, the true values are those that belong to its first sample.",
-        "",
-        f"| data | model | {' | '.join(NAMES)} | all | rejected |",
-        "|---" * (len(NAMES) + 4) + "|",
-    ]
+def table(counts: dict[str, Count]) -> str:
+    """Rows of the page: one for each kind of data."""
+    lines = ["| data | fitted model | intervals that contain the truth | rejected |", "|---|---|---|---|"]
     for name, count in counts.items():
-        row = ROWS[name]
-        cells = [f"{count.inside_told[n]} of {count.told[n]}" if count.told[n] else "not identifiable" for n in NAMES]
-        told = sum(count.told.values())
-        share = f"{100.0 * sum(count.inside_told.values()) / told:.1f} %" if told else "none"
-        cells += [share, f"{count.rejected} of {count.seeds}"]
-        lines.append(f"| {row.words} | {row.model} | {' | '.join(cells)} |")
+        row, told = ROWS[name], sum(count.told.values())
+        share = f"{sum(count.inside_told.values())} of {told}" if told else "none identifiable"
+        lines.append(f"| {row.words} | {row.model} | {share} | {count.rejected} of {count.seeds} |")
     return "\n".join(lines) + "\n"
 
 
 def main() -> None:
-    """Count what is not counted yet, and write the page."""
+    """Count what is not counted yet, and write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rows", default=",".join(ROWS))
     parser.add_argument("--seeds", type=int, default=30)
@@ -154,7 +143,8 @@ def main() -> None:
             options.kept.write_text(json.dumps(kept, indent=1))
         print(name, count.rejected, count.told, count.inside, flush=True)
     counts = {name: Count(**kept[name]) for name in ROWS if name in kept}
-    (Path(__file__).parent / "identification-coverage.md").write_text(page(counts), encoding="utf-8")
+    text = PAGE.read_text(encoding="utf-8")
+    PAGE.write_text(MARK.sub(lambda found: f"<!-- coverage -->\n\n{table(counts)}", text), encoding="utf-8")
 
 
 if __name__ == "__main__":
