@@ -11,6 +11,12 @@ the brush model, the stiffness of the bristles does not depend on the pressure. 
 Run it:
 
     python examples/tyre.py --out out/
+
+It draws a picture and prints the largest differences over 25 slip angles up to 12 degrees, as shares of the largest
+force and torque:
+
+    largest difference from the brush model: force 0.10 %, torque 0.52 %
+    if bristles above their limit relax as in LuGre: force 15 %, torque 102 %
 """
 
 from __future__ import annotations

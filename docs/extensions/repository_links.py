@@ -12,8 +12,8 @@ PAGES = {"contributing": "CONTRIBUTING.md", "changelog": "CHANGELOG.md"}
 
 LINKS = {
     r"(?:\.\./)?README\.md(?:#[\w-]+)?": "index.md#citation",
-    r"(?:\.\./)?CONTRIBUTING\.md": "contributing.md",
-    r"(?:\.\./)?CHANGELOG\.md": "changelog.md",
+    r"(?:\.\./)?CONTRIBUTING\.md(#[\w-]+)?": r"contributing.md\1",
+    r"(?:\.\./)?CHANGELOG\.md(#[\w-]+)?": r"changelog.md\1",
     r"docs/((?:images/)?[\w-]+\.(?:md|png)(?:#[\w-]+)?)": r"\1",
 }
 """Link in a file of the repository -> link to the page."""
