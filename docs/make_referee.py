@@ -13,22 +13,31 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from planarfriction_studies.referee.case import QUANTITIES, all_cases
-from planarfriction_studies.referee.report import shown, simulators, table
+from planarfriction_studies.referee.case import all_cases
+from planarfriction_studies.referee.report import shown, table
 from planarfriction_studies.referee.run import Verdict
 
 DOCS = Path(__file__).parent
-KEPT, PAGES = DOCS / "referee.json", [DOCS.parent / "README.md", DOCS / "referee.md", DOCS / "simulators.md"]
-MARK = re.compile(r"<!-- referee: (?P<name>[\w ]+) -->\n\n(?:(?:[^\n#<].*\n)+\n)?")
+KEPT, PAGES = DOCS / "referee.json", [DOCS.parent / "README.md", DOCS / "referee.md"]
+MARK = re.compile(r"<!-- referee: (?P<name>[\w ]+) -->\n\n(?:(?:(?:\||Run on |Not in ).*\n)+\n)?")
 
 MISSING = "Not in this run.\n"
 
 ROWS = {
-    "off_centre": "Creep of a [block held off-centre](docs/simulators.md) by two box pads",
-    "disc": "Largest error in where [discs that slide and spin](docs/simulators.md) come to rest",
-    "in_hand": "Largest error in where a [plate that slips 23 mm in the hand](docs/simulators.md) ends",
+    "off_centre": "Creep of a [block held off-centre](docs/referee.md) by two box pads",
+    "disc": "Largest error in where [discs that slide and spin](docs/referee.md) come to rest",
+    "in_hand": "Largest error in where a [plate that slips 23 mm in the hand](docs/referee.md) ends",
 }
 """Case -> its row of README."""
+
+COUNTS = {"ok": "ok", "step [µs]": "median step [µs]", "start [s]": "median start [s]"}
+"""Heading in the table of engines -> row of the referee's table."""
+
+SHOWN = (
+    *("MuJoCo", "MuJoCo, stiff", "MuJoCo, patches"),
+    *("Drake", "Drake, surfaces", "Drake, patches"),
+)
+"""Engines in the table of cases: as they come, at the settings that pass the most cases, and with patches."""
 
 OWN, PATCHES = ("MuJoCo", "MuJoCo, stiff"), "MuJoCo, patches"
 """Engines of these rows: as it comes, at the settings that pass the most cases, and with patches."""
@@ -37,27 +46,25 @@ OWN, PATCHES = ("MuJoCo", "MuJoCo, stiff"), "MuJoCo, patches"
 def tables(stored: dict[str, Any]) -> dict[str, str]:
     """Return what stands below each mark of the page, from a stored run."""
     verdicts = [Verdict(**row) for row in stored["verdicts"]]
-    headings, rows = table(verdicts)
+    (_, *engines), rows = table(verdicts)
+    columns = {row[0]: dict(zip(engines, row[1:], strict=True)) for row in rows}
+    passed = [[*each, *(columns[row][each[0]] for row in COUNTS.values())] for each in stored["settings"].items()]
     versions = ", ".join(f"{name} {version}" for name, version in stored["versions"].items())
-    views = {name: markdown(*view) for name, view in simulators(verdicts).items()}
-    return views | {
+    return {
         "run": f"Run on {stored['date']}: {stored['machine']}; {versions}.\n",
-        "results": markdown(headings, rows),
-        "settings": markdown(["engine", "settings"], list(stored["settings"].items())),
-        "cases": markdown(
-            ["case", "what happens", "truths", "allowed"],
-            [
-                [case.name, case.title, f"{len(case.truths)}", allowed(case.truths)]
-                for case in all_cases().values()
-            ],
-        ),
-    }  # fmt: skip
+        "engines": markdown(["engine", "settings", *COUNTS], passed),
+        "cases": markdown(["case", *SHOWN], errors(verdicts)),
+    }
 
 
-def allowed(truths: Sequence[Any]) -> str:
-    """Return the smallest allowed error of each quantity."""
-    least = {truth.quantity: min(t.allowed for t in truths if t.quantity == truth.quantity) for truth in truths}
-    return ", ".join(f"{name} {value:.2g} {QUANTITIES[name]}" for name, value in least.items())
+def errors(verdicts: Sequence[Verdict]) -> list[list[str]]:
+    """Return a row for each case: its words, and the errors of the engines on the page, bold beyond what is allowed."""
+    found = {(each.case, each.engine): each for each in verdicts}
+    cells = {key: f"**{shown(each)}**" if each.mark in ("off", "fails") else shown(each) for key, each in found.items()}
+    return [
+        [f"`{case.name}`: {case.title}", *(cells.get((case.name, engine), "") for engine in SHOWN)]
+        for case in all_cases().values()
+    ]
 
 
 def markdown(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -152,7 +152,7 @@ def rollout_vjp(
 
     If the shape depends on the load, it is differentiated too: weights of cells, second moments and shares by central
     differences with a step of 1e-5 of the load (relative error 1e-10), maps along the chord between two of the stored
-    loads (docs/load-families.md).
+    loads (docs/anisotropy.md, "Gradients to the load").
 
     Raises `InvalidValueError` as `rollout` does, and for a model that has no compiled roll-out.
     """
