@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from matplotlib.patches import Rectangle
 
 import planarfriction as pf
 from planarfriction import plots
@@ -41,7 +42,51 @@ def figures() -> dict[str, plots.style.PlotFigure]:
         "pre-sliding-cycles": pre_sliding_cycles(),
         "grip-plan": grip_plan(),
         "pressure-map": plots.plot_patch(fingertip(), normal_force=5.0),
+        "concept-motions": motions(),
+        "concept-bristle": bristle(),
     }
+
+
+def motions() -> plots.style.PlotFigure:
+    """A pad that slides, turns about a point inside and spins: friction of each cell, and all of it together."""
+    pad = pf.ContactPatch.rectangle(0.03, 0.02, cells=12)
+    figure = plots.style.new_figure(9.0, 2.7)
+    twists = {"it slides": (1.0, 0.0, 0.0), "it turns about the cross": (0.008, 0.0, 1.0), "it spins": (0.0, 0.0, 1.0)}
+    for axes, (words, (vx, _, omega)) in zip(figure.subplots(1, 3), twists.items(), strict=True):
+        x, y = 1e3 * pad.positions.T
+        velocity = np.stack([vx - 1e-3 * omega * y, 1e-3 * omega * x])
+        away = -velocity / np.linalg.norm(velocity, axis=0)
+        axes.quiver(x, y, *away, color=plots.style.DISTRIBUTED, scale=17, width=0.006, pivot="mid")
+        fx, _, tau = pf.LimitSurfaceExact(pad).wrench((vx, 0.0, omega))
+        axes.set_title(f"{words}\nforce {abs(fx):.0%}, torque {abs(tau) / pad.contact_radius():.0%}", fontsize="medium")
+        if omega:
+            axes.plot(0.0, 1e3 * vx / omega, "x", color=plots.style.PUBLISHED, ms=9, mew=2.5)
+        axes.set(aspect="equal", xticks=(), yticks=(), xlim=(-18, 18), ylim=(-11, 11))
+        axes.add_patch(Rectangle((-15, -10), 30, 20, fill=False, color="0.6"))
+        axes.spines[:].set_visible(False)
+    return figure
+
+
+def bristle() -> plots.style.PlotFigure:
+    """Friction of a pad that is pushed from rest until it slides, over its displacement."""
+    law = pf.LuGre(mu_c=0.6, mu_s=0.75, sigma_0=2e4, v_s=5e-3, sigma_1=5.0, sigma_2=0.0, elasto_plastic=0.9)
+    model = pf.ReducedModel(pf.ContactPatch.disc(0.01), law)
+    speeds = 2e-2 * np.linspace(0.0, 1.0, 800) ** 2
+    twists = np.stack([speeds, 0.0 * speeds, 0.0 * speeds], axis=-1)
+    force = -pf.derivatives.rollout(model, None, twists, 1.0, 1e-4).wrenches[:, 0]
+    moved = 1e6 * np.cumsum(speeds) * 1e-4
+    figure = plots.style.new_figure(7.2, 3.2)
+    axes = figure.subplots()
+    axes.plot(moved, force, color=plots.style.DISTRIBUTED)
+    for words, at, text in (
+        ("sticks: a spring", (18.0, 0.36), (30.0, 0.25)),
+        ("breakaway", (38.0, 0.69), (45.0, 0.77)),
+        ("slides: less friction, the faster it is", (120.0, 0.63), (75.0, 0.5)),
+    ):
+        axes.annotate(words, at, text, arrowprops={"arrowstyle": "->"})
+    axes.set(xlabel="displacement [um]", ylabel="friction / load", xlim=(0.0, 200.0), ylim=(0.0, 0.85))
+    plots.style.tidy(axes)
+    return figure
 
 
 def small_cycles(model: pf.ReducedModel | pf.ReducedModelPublished, cycles: int = 20) -> tuple[np.ndarray, np.ndarray]:
