@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,13 @@ from planarfriction import validation, writing
 from planarfriction.compiler import compiled_math
 from planarfriction.errors import InvalidValueError
 from planarfriction.export.c_source import Writer, of_compiled
+from planarfriction.export.loops import Array, Fixed, Loops, Scalar
 from planarfriction.export.passes import passes_of
 from planarfriction.export.pieces import Pieces, pieces_of
 from planarfriction.export.samples import samples_of
 from planarfriction.export.slip import Slip, slip_of
 from planarfriction.formulas import LARGEST
+from planarfriction.kernels import tilt
 from planarfriction.limit_surface.loops.twists import MOST_TRIALS
 
 PRECISIONS = {"double": LARGEST, "float": 1e9}
@@ -95,12 +98,15 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, kinds: tuple[s
     writer, slip = Writer(precision), slip_of(model.patch, precision)
     first = f"{pieces.spacing} * k" if pieces.spacing > 1 else "k"
     functions = _functions(writer, pieces, first)
-    tables = _tables(writer, pieces.tables, functions) | ({} if slip is None else _tables(writer, slip.tables))
+    places, words = model.compiled.points()
+    moves, places = not words, dict(zip(("place_x", "place_y"), places.T, strict=True))
+    functions["tilt"] = _tilt(pieces.count)
+    tables = _tables(writer, pieces.tables | places, functions) | ({} if slip is None else _tables(writer, slip.tables))
     step = functions["step"].splitlines()
     vector = Writer(precision, own=precision == "double")
-    places = [f"next[{first} + {i * pieces.stride}]" for i in range(pieces.states)]
+    results = [f"next[{first} + {i * pieces.stride}]" for i in range(pieces.states)]
     share = "(at->low[k] + at->part * (at->high[k] - at->low[k]))" if pieces.rungs else "share[k]"
-    passes = passes_of(vector, pieces.step, pieces.count, places, share)
+    passes = passes_of(vector, pieces.step, pieces.count, results, "shares[k]")
     own = {each: "\n".join(of_compiled(getattr(compiled_math, each))) for each in ("exp", "sin")}
     own = {each: lines for each, lines in own.items() if passes and f"{each}_of(" in "".join(passes.each)}
     values = functions | {
@@ -124,6 +130,7 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, kinds: tuple[s
         "one": writer.constant(1.0),
         "slip": None if slip is None else _search(writer, slip),
         "passes": passes,
+        "moves": moves,
         "share": share,
         "own": own,
         "samples": samples_of(model, slip, writer, pieces.tables.get("rungs")),
@@ -166,6 +173,16 @@ def _functions(writer: Writer, pieces: Pieces, first: str) -> dict[str, str]:
     return {name: unused[name] + text for name, text in texts.items()}
 
 
+def _tilt(count: int) -> str:
+    """Return the functions that shift shares of the load to a centre of pressure, always in double precision."""
+    loops, shares = Loops(Writer()), Array("shares", (count,))
+    x, y = (Array(name, (count,), fixed=True) for name in ("place_x", "place_y"))
+    loops.add(tilt.centre, (Scalar("mx"), Scalar("my"), Scalar("load")))
+    if count > 1:
+        loops.add(tilt.tilt, (x, y, shares, Fixed(count), Scalar("cx"), Scalar("cy"), shares))
+    return re.sub(r"\breal\b", "double", "\n\n".join(loops.functions))
+
+
 def _tables(
     writer: Writer, tables: dict[str, np.ndarray], functions: dict[str, str] | None = None
 ) -> dict[str, tuple[str, list[str]]]:
@@ -173,7 +190,9 @@ def _tables(
     return {
         table: ("int", list(map(str, numbers))) if numbers.dtype.kind == "i" else _table(writer, numbers)
         for table, numbers in tables.items()
-        if functions is None or table in ("share", "rungs") or any(f"{table}[" in each for each in functions.values())
+        if functions is None
+        or table in ("share", "rungs", "place_x", "place_y")
+        or any(f"{table}[" in each for each in functions.values())
     }
 
 

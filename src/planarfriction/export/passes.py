@@ -76,7 +76,7 @@ def passes_of(writer: Writer, block: Block, count: int, places: Sequence[str], s
             results = [writer.atom(each) for each in block.results]
             lines += [f"    {place} = {result};" for place, result in zip(places, results, strict=False)]
             lines += [f"    row[{j}][i] = {share} * {result};" for j, result in enumerate(results[len(places) :])]
-        texts.append("\n".join(f"    {line}" for line in lines))
+        texts.append("\n".join(f"        {line}" for line in lines))
     rows = 1 + max(int(row) for row in re.findall(r"row\[(\d+)\]", "".join(texts)))
     blocks = -(-count // CELLS)
     return Passes(-(-count // blocks), blocks, rows, "\n".join(shared), texts)

@@ -99,7 +99,11 @@ def _distributed(model: DistributedModel) -> Pieces:
         raise InvalidValueError("model", "have no asymmetry", model.patch.asymmetry)
     numbers, n, law = model.compiled.numbers(), model.patch.cells, model.law.numbers
     lever = twin(cells.LEVERS if model.patch.anisotropic else cells.POSITIONS)
-    names = ["lever_xx", "lever_xy", "lever_yy", "lever_x", "lever_y"] if model.patch.anisotropic else ["x", "y"]
+    names = (
+        ["lever_xx", "lever_xy", "lever_yy", "lever_x", "lever_y"]
+        if model.patch.anisotropic
+        else ["place_x", "place_y"]
+    )
 
     def step(trace: Trace) -> Any:
         own = _vector(trace, *(f"{name}[k]" for name in names))
