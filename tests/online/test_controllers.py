@@ -9,6 +9,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import friction_filter
 from planarfriction.online import FrictionObserver, Gripper, Hinge, Hold, Measurement, Parts, SlideBy, TurnBy
 from planarfriction.online.controllers import trapezoid
 from planarfriction.online.trials import known_model, random_parts, trial
@@ -62,13 +63,25 @@ def test_the_trapezoid_is_the_integral_of_its_speed():
 
 
 def test_bad_samples_keep_the_grip_finite():
-    hold = Hold(FrictionObserver(known_model()), explore=0.0)
+    hold = Hold(FrictionObserver(known_model()), explore=0.0, most=20.0)
     for k in range(100):
         bad = k % 10 == 9
         sample = Measurement(1e-3 * k, (0.0, np.nan if bad else 1.0, 0.0), np.nan if bad else 5.0)
         force = float(hold.update(sample))
         assert np.isfinite(force)
-    assert 1.0 / 0.52 < force < hold.most
+    assert 1.0 / 0.52 < force < 20.0
+
+
+def test_a_grip_without_a_load_stays_as_it_is(observer):
+    hold = Hold(observer, most=30.0)
+    assert hold.update(Measurement([0.0], [(0.0, 1.0, 0.0)], [np.nan])).tolist() == [30.0]
+
+
+def test_a_clock_that_is_set_back_does_not_stop_a_grip(observer):
+    hold = Hold(observer)
+    for now in (np.inf, *(1e-3 * np.arange(300)), *(-5.0 + 1e-3 * np.arange(100))):
+        hold.update(Measurement([now], [(0.0, 1.0, 0.0)], [5.0]))
+    assert hold.state["age"] == pytest.approx(0.388, abs=2e-3)  # all but ten samples
 
 
 def test_wrong_settings_are_refused():
@@ -89,42 +102,51 @@ def test_wrong_settings_are_refused():
         Hinge(observer, reserve=0.0)
 
 
+def found(count=1, **changes) -> np.ndarray:
+    """What an observer found of a part that slips under 1 N, a millisecond after the sample before."""
+    one = np.zeros(count, friction_filter.ESTIMATE)
+    given = {"mu_c": 0.5, "radius": 5e-3, "slip": 1.0, "gauge": 0.25, "dt": 1e-3, "normal_force": 4.0}
+    for name, value in (given | {"wrench": (0.0, 1.0, 0.0), "velocity": np.nan} | changes).items():
+        one[name] = value
+    return one
+
+
+def gripped(controller, changes, **state) -> float:
+    """The next grip of one part in a state whose filters have settled."""
+    for name, value in ({"age": 1.0, "span": 0.0, "start": 50.0, "grip": 10.0} | state).items():
+        controller.state[name] = value
+    controller._grip(controller.state, found(**changes), *controller._settings)
+    return float(controller.state["grip"][0])
+
+
+@pytest.fixture(scope="module")
+def observer():
+    return FrictionObserver(known_model(), batch=1)
+
+
 @pytest.mark.parametrize("speed, place", [(0.0, 0.0), (0.02, 0.004), (0.005, 0.006)])
-def test_the_grip_of_a_slip_is_what_balances_less_what_accelerates(speed, place):
-    observer = FrictionObserver(known_model(), batch=1)
-    slide = SlideBy(observer, -0.02)
-    sample = Measurement([1.0], [[0.0, 1.0, 0.0]], [4.0], [[0.0, -speed, 0.0]])
-    slide.estimate = observer.update(sample)._replace(slip=np.ones(1))
-    slide.balance[:], slide._began[:], slide._time[:] = 4.0, 0.5, 1.0
-    slide.velocity, slide.slid = np.array([[0.0, -speed, 0.0]]), np.array([[0.0, -place, 0.0]])
-    wished, wished_speed, push = trapezoid(1.0 + slide.delay - 0.5, 0.02, 2.0)
-    a = push + 8.0 * (wished_speed - speed) + 16.0 * (wished - place - speed * slide.delay)
-    assert abs(a) < 0.25 * slide.acceleration
-    assert slide._grip(np.ones(1), np.zeros(1)) == pytest.approx(4.0 * (1.0 - a / slide.acceleration))
-
-
-def observed(controller, *, slips, wrench=(0.0, 1.0, 0.0)):
-    """The controller after a sample of one part that slips or sticks; its clock has run for a second."""
-    sample = Measurement([1.0], [wrench], [4.0])
-    controller.estimate = controller.observer.update(sample)._replace(slip=np.full(1, float(slips)))
-    controller.wrench, controller._time, controller._age = np.array([wrench]), np.ones(1), np.ones(1)
-    return controller
+def test_the_grip_of_a_slip_is_what_balances_less_what_accelerates(observer, speed, place):
+    slide, delay, top = SlideBy(observer, -0.02), 0.02, 9.81
+    wished, wished_speed, push = trapezoid(0.5 + delay, 0.02, 2.0)
+    a = push + 8.0 * (wished_speed - speed) + 16.0 * (wished - place - speed * delay)
+    assert abs(a) < 0.25 * top
+    state = {"balance": 4.0, "began": 0.499, "slid": (0.0, -place, 0.0), "velocity": (0.0, -speed, 0.0)}
+    assert gripped(slide, {}, **state) == pytest.approx(4.0 * (1.0 - a / top))
+    follows = 20.0 * (speed - wished_speed - 2.0 * (wished - place - speed * delay)) * 1e-3
+    assert np.log(slide.state["balance"][0] / 4.0) == pytest.approx(follows)
 
 
 @pytest.mark.parametrize("place, caught", [(0.0195, True), (0.018, False)])
-def test_a_part_that_sticks_near_its_goal_is_left_there(place, caught):
-    slide = observed(SlideBy(FrictionObserver(known_model(), batch=1), -0.02), slips=False)
-    slide.balance[:], slide._began[:], slide._since[:] = 4.0, 0.5, 0.2
-    slide.slid = np.array([[0.0, -place, 0.0]])
-    slide._grip(np.ones(1), np.full(1, 1e-3))
-    assert slide.caught.tolist() == [caught]
+def test_a_part_that_sticks_near_its_goal_is_left_there(observer, place, caught):
+    slide = SlideBy(observer, -0.02)
+    gripped(slide, {"slip": 0.0}, balance=4.0, began=0.5, since=0.2, slid=(0.0, -place, 0.0))
+    assert slide.state["caught"].tolist() == [caught]
 
 
 @pytest.mark.parametrize("torque, falls", [(0.02, True), (2e-4, False)])
-def test_a_hinge_releases_what_does_not_hang_yet(torque, falls):
-    hinge = observed(Hinge(FrictionObserver(known_model(), batch=1)), slips=False, wrench=(0.0, 1.0, torque))
-    hinge._found[:], hinge._force[:], hinge._torque[:], hinge._since[:] = True, 1.0, torque, 0.2
-    first = hinge._grip(np.ones(1), np.full(1, 1e-3))
+def test_a_hinge_releases_what_does_not_hang_yet(observer, torque, falls):
+    hinge, sample = Hinge(observer), {"slip": 0.0, "wrench": (0.0, 1.0, torque)}
+    first = gripped(hinge, sample, found=1.0, force=1.0, torque=torque, since=0.2)
     for _ in range(100):
-        last = hinge._grip(np.ones(1), np.full(1, 1e-3))
-    assert last / first == pytest.approx(np.exp(-0.1) if falls else 1.0, rel=1e-6)
+        hinge._grip(hinge.state, found(**sample), *hinge._settings)
+    assert hinge.state["grip"] / first == pytest.approx(np.exp(-0.1) if falls else 1.0, rel=1e-6)

@@ -14,6 +14,7 @@ from numba import njit
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import friction_filter as kernels
+from planarfriction.kernels import square_root
 from planarfriction.online import FrictionObserver, Gripper, Measurement, Parts, Sensors
 
 LAW = pf.LuGre(mu_c=0.5, mu_s=0.55, v_s=2e-3, sigma_2=0.1)
@@ -160,9 +161,9 @@ def test_a_batch_is_many_observers():
 
 @njit
 def updated(state, h, column):
-    kernels._measure(state, h, 0.7, 0.04, column)
-    kernels._spread(state, 3, 0.25, column)
-    kernels._reset(state, 1, 5.0, 0.5, column)
+    square_root.measure(state, h, 0.7, 0.04, column)
+    square_root.spread(state, 3, 0.25, column)
+    square_root.reset(state, 1, 5.0, 0.5, column)
 
 
 def test_measurements_and_spreads_are_those_of_a_kalman_filter():

@@ -14,20 +14,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
-from planarfriction.formulas import LARGEST
+from planarfriction.kernels.square_root import ROOT, N, measure, reset, spread, variance_of
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
-
-N = 12
-"""Unknowns."""
 
 TWIST, MU, RATIO, SCALE, BIAS = 3, 6, 7, 8, 9
 """Places of the unknowns after the remainder of the count [m], which is the error of a place."""
 
-ROOT, SLIP, TIME, BOUND, PEAK, GAUGE, SEEN, PLACE, REST = N, 156, 157, 158, 159, 160, 161, 164, 167
-"""Places in the state after x: covariance root, probability of slip, time, logs of the largest gauge of the wrench
-while it stuck, of a recent one, and of that now, filtered wrench over load (3), recent displacement (3), time since
-the last velocity."""
+SLIP, TIME, BOUND, PEAK, GAUGE, SEEN, PLACE, REST = 156, 157, 158, 159, 160, 161, 164, 167
+"""Places in the state after x and its root: probability of slip, time, logs of the largest gauge of the wrench while it
+stuck, of a recent one, and of that now, filtered wrench over load (3), recent displacement (3), time since the last
+velocity."""
 
 SUM, LOADS, COUNT, OLD, CHAIN, BACK, LEVER = 168, 171, 172, 173, 182, 183, 184
 """Places of the sums of the wrench over load (3) and of the load since the last velocity, and their number; the same
@@ -58,9 +56,21 @@ MEMORY = 0.01
 EMPTY = 5.0
 """Standard deviations by which the wrench of an empty hand may differ from the bias: else it holds something."""
 
-ESTIMATE = 19
-"""Numbers of an estimate: twist, mu_c, mu_s, radius, covariance of their logs (9), probability of slip and of being
-about to, margin, log of the gauge of the wrench per load."""
+ESTIMATE = np.dtype(
+    [
+        ("twist", float, 3),
+        *((name, float) for name in ("mu_c", "mu_s", "radius")),
+        ("covariance", float, (3, 3)),
+        ("determined", np.uint8, 3),
+        *((name, float) for name in ("slip", "about_to_slip", "margin", "gauge")),
+        ("flags", np.int64),
+        *((name, float) for name in ("dt", "normal_force")),
+        *((name, float, 3) for name in ("wrench", "velocity")),
+    ],
+    align=True,
+)
+"""Estimate after a sample, and the sample as controllers read it: time step, grip force, wrench without its bias, and
+slip velocity."""
 
 NEAR = 0.1
 """Share of more load at which a part that is about to slip does [-]."""
@@ -110,76 +120,8 @@ class Filter(NamedTuple):
     """Force at which the sensor saturates [N]."""
     least_load: float
     """Load [N] below which a contact says nothing of friction."""
-
-
-@kernel
-def _finite(x):
-    """Return True for a finite number; reordered sums may not use x - x."""
-    return abs(x) < LARGEST
-
-
-@kernel
-def _measure(s, h, innovation, variance, column):
-    """Update with a scalar `innovation` of slope `h [9]` and variance: rotate `[[sqrt(variance), h'S], [0, S]]`."""
-    corner = math.sqrt(variance)
-    for i in range(N):
-        column[i] = 0.0
-    for j in range(N - 1, -1, -1):
-        v = 0.0
-        for i in range(j, N):
-            v += s[ROOT + N * i + j] * h[i]
-        size = math.sqrt(corner * corner + v * v)
-        cosine, sine, corner = corner / size, v / size, size
-        for i in range(j, N):
-            a, b = column[i], s[ROOT + N * i + j]
-            column[i], s[ROOT + N * i + j] = cosine * a + sine * b, cosine * b - sine * a
-    for i in range(N):
-        s[i] += column[i] * innovation / corner
-
-
-@kernel
-def _take_in(s, first, column):
-    """Rotate a column, zero above its row `first`, into the root: the covariance grows by its outer product."""
-    for j in range(first, N):
-        a, b = s[ROOT + N * j + j], column[j]
-        size = math.sqrt(a * a + b * b)
-        if size > 0.0:
-            cosine, sine = a / size, b / size
-            for k in range(j, N):
-                a, b = s[ROOT + N * k + j], column[k]
-                s[ROOT + N * k + j], column[k] = cosine * a + sine * b, cosine * b - sine * a
-
-
-@kernel
-def _spread(s, i, variance, column):
-    """Add a variance to unknown i."""
-    for k in range(N):
-        column[k] = 0.0
-    column[i] = math.sqrt(variance)
-    _take_in(s, i, column)
-
-
-@kernel
-def _reset(s, i, value, deviation, column):
-    """Forget unknown i: a value with a standard deviation, independent of all others."""
-    for k in range(N):
-        column[k] = s[ROOT + N * k + i] if k > i else 0.0
-    for j in range(i + 1):
-        s[ROOT + N * i + j] = 0.0
-    for k in range(i + 1, N):
-        s[ROOT + N * k + i] = 0.0
-    s[i], s[ROOT + N * i + i] = value, deviation
-    _take_in(s, i + 1, column)  # what the others had in that column goes on
-
-
-@kernel
-def _variance(s, i, k):
-    """Return the variance of the sum of unknowns i and k, or of i alone if they are one."""
-    total = 0.0
-    for j in range(N):
-        each = s[ROOT + N * i + j] + (s[ROOT + N * k + j] if k != i else 0.0)
-        total += each * each
-    return total
+    variance: float
+    """Largest variance of the log of a number that is determined."""
 
 
 @kernel
@@ -215,11 +157,11 @@ def _move(own, s, column):
     span = max(s[OLD + 8], 1e-9)
     for i in range(3):
         if s[CHAIN] <= 2.0:
-            _reset(s, i, 0.0, own.remainder[i], column)
-        _reset(s, TWIST + i, s[OLD + 5 + i] + s[i] / span, 0.0, column)
+            reset(s, i, 0.0, own.remainder[i], column)
+        reset(s, TWIST + i, s[OLD + 5 + i] + s[i] / span, 0.0, column)
         for j in range(i + 1):
             s[ROOT + N * (TWIST + i) + j] = s[ROOT + N * i + j] / span
-        _reset(s, i, 0.0, own.remainder[i], column)
+        reset(s, i, 0.0, own.remainder[i], column)
         s[ROOT + N * (TWIST + i) + i] -= own.remainder[i] / span
 
 
@@ -257,7 +199,7 @@ def _learn(own, s, h, column, jacobian):
         h[BIAS + row] = 1.0
         error = own.model_error * factor * g
         variance = own.noise[row] / count + error * error
-        _measure(s, h, load * s[OLD + row] / count - factor * g * along - s[BIAS + row], variance, column)
+        measure(s, h, load * s[OLD + row] / count - factor * g * along - s[BIAS + row], variance, column)
     s[BOUND] -= s[LEVER] * (s[SCALE] - before)
 
 
@@ -279,7 +221,7 @@ def _see(own, s, v, h, column, jacobian):
     for i in range(3):
         s[OLD + i], s[OLD + 5 + i] = s[SUM + i], v[i]
         s[SUM + i] = 0.0
-        _reset(s, TWIST + i, v[i], own.quantum, column)
+        reset(s, TWIST + i, v[i], own.quantum, column)
     s[OLD + 3], s[OLD + 4], s[OLD + 8], s[LOADS], s[COUNT], s[REST] = s[LOADS], s[COUNT], s[REST], 0.0, 0.0, 0.0
     return min(max(odds, -8.0), 8.0) + (8.0 if far2 > 16.0 * own.place * own.place else 0.0)
 
@@ -293,17 +235,17 @@ def _tare(own, s, wrench, load, h, column):
             w += own.conjugate[i, j] * wrench[j]
         friction = math.exp(s[MU]) * load
         variance = own.noise[i] + friction * friction
-        if w * w < EMPTY * EMPTY * (variance + _variance(s, BIAS + i, BIAS + i)):
+        if w * w < EMPTY * EMPTY * (variance + variance_of(s, BIAS + i, BIAS + i)):
             for k in range(N):
                 h[k] = 1.0 if k == BIAS + i else 0.0
-            _measure(s, h, w, variance, column)
+            measure(s, h, w, variance, column)
 
 
 @kernel
 def _judge(own, s, load, dt, best):
     """Update the probability of slip with the filtered wrench over load."""
-    sd_s = math.sqrt(_variance(s, MU, RATIO) + SEEN_ERROR * SEEN_ERROR)
-    sd_c = math.sqrt(_variance(s, MU, MU) + SEEN_ERROR * SEEN_ERROR)
+    sd_s = math.sqrt(variance_of(s, MU, RATIO) + SEEN_ERROR * SEEN_ERROR)
+    sd_c = math.sqrt(variance_of(s, MU, MU) + SEEN_ERROR * SEEN_ERROR)
     level = math.log(max(_gauge(own, s, _scale(own, s, load), best), 1e-9))
     inside = max(0.0, (s[MU] - level) / sd_c - 2.0)
     begins = CREEPS + BREAKS * _normal((level - s[MU] - s[RATIO]) / sd_s - 1.0)
@@ -315,14 +257,15 @@ def _judge(own, s, load, dt, best):
 
 
 @kernel
-def _estimate(own, s, out):
-    """Write what is known after a sample to `out [ESTIMATE]`."""
+def _estimate(own, s, e):
+    """Write an estimate after a sample."""
     for i in range(3):
-        out[i] = 0.0
+        e.twist[i] = 0.0
         for j in range(3):
-            out[i] += own.back[i, j] * s[TWIST + j] if s[SLIP] > 0.5 else 0.0
+            e.twist[i] += own.back[i, j] * s[TWIST + j] if s[SLIP] > 0.5 else 0.0
+            e.wrench[i] += own.frame[j, i] * s[BIAS + j]
     log_s = max(s[MU] + max(s[RATIO], 0.0), s[BOUND])
-    out[3], out[4], out[5] = math.exp(s[MU]), math.exp(log_s), own.radius * math.exp(s[SCALE])
+    e.mu_c, e.mu_s, e.radius = math.exp(s[MU]), math.exp(log_s), own.radius * math.exp(s[SCALE])
     for i in range(3):
         for k in range(3):
             total = 0.0
@@ -331,50 +274,52 @@ def _estimate(own, s, out):
                 b = s[ROOT + N * (MU if k < 2 else SCALE) + j] + (s[ROOT + N * RATIO + j] if k == 1 else 0.0)
                 total += a * b
             floor = own.model_error * own.model_error * (0.5 if i == 0 else 1.0) * (0.5 if k == 0 else 1.0)
-            out[6 + 3 * i + k] = total + (floor if (i < 2) == (k < 2) else 0.0)
-    out[15] = s[SLIP]
-    out[16] = (1.0 - s[SLIP]) * _normal((s[GAUGE] + NEAR - log_s) / math.sqrt(out[10] + SEEN_ERROR * SEEN_ERROR))
-    out[17] = 1.0 - math.exp(min(s[GAUGE] - log_s, 50.0))
-    out[18] = s[GAUGE]
+            e.covariance[i, k] = total + (floor if (i < 2) == (k < 2) else 0.0)
+        e.determined[i] = 1 if e.covariance[i, i] <= own.variance else 0
+    sd = math.sqrt(e.covariance[1, 1] + SEEN_ERROR * SEEN_ERROR)
+    e.slip, e.about_to_slip = s[SLIP], (1.0 - s[SLIP]) * _normal((s[GAUGE] + NEAR - log_s) / sd)
+    e.margin = 1.0 - math.exp(min(s[GAUGE] - log_s, 50.0))
+    e.gauge = math.exp(s[GAUGE])
 
 
 @jit
-def update(own, states, times, wrenches, loads, velocities, flags, out):
-    """Update states `[P, STATE]` with a sample each; NaN is no sample. `out [P, ESTIMATE]` gets what is known.
+def update(own, states, samples, found):
+    """Update states `[P, STATE]` with a sample each; `found [P]` of dtype `ESTIMATE` gets what is known.
 
-    Flags `[P]` get the sum of what was odd: 1 no or bad wrench or load, 2 time that does not go on, 4 saturated sensor.
+    Samples `[P, 8]` are time, wrench, load and slip velocity; NaN is none. `flags` is the sum of what was odd: 1 no or
+    bad wrench or load, 2 time that does not go on, 4 saturated sensor.
     """
     h, column, jacobian, best, v = np.empty(N), np.empty(N), np.empty(9), np.empty(3), np.empty(3)
     for p in range(states.shape[0]):
-        s, flags[p] = states[p], 0
-        now, dt = times[p], times[p] - s[TIME]
-        if not _finite(now) or dt <= 0.0:
-            s[BACK] += 1.0 if _finite(now) else 0.0
-            flags[p], dt = 2, 0.0
+        s, e, flags = states[p], found[p], 0
+        now, wrench, load, velocity = samples[p, 0], samples[p, 1:4], samples[p, 4], samples[p, 5:]
+        dt = now - s[TIME]
+        if not xp.in_range(now) or dt <= 0.0:
+            s[BACK] += 1.0 if xp.in_range(now) else 0.0
+            flags, dt = 2, 0.0
             s[TIME] = now if s[BACK] >= RESTART else s[TIME]
         else:
             s[TIME], s[BACK], dt = now, 0.0, dt if dt <= 1.0 else 1e-3  # the first sample, or a long pause
-        load = loads[p]
-        force = math.hypot(wrenches[p, 0], wrenches[p, 1])
-        good = _finite(load) and _finite(force) and _finite(wrenches[p, 2])
-        flags[p] += 0 if good else 1
+        force = math.hypot(wrench[0], wrench[1])
+        good = xp.in_range(load) and xp.in_range(force) and xp.in_range(wrench[2])
+        flags += 0 if good else 1
         if good and force >= own.saturation:
-            flags[p], good = flags[p] + 4, False
+            flags, good = flags + 4, False
         if dt > 0.0:
             if own.drift > 0.0:
-                _spread(s, MU, own.drift * own.drift * dt, column)
+                spread(s, MU, own.drift * own.drift * dt, column)
             s[PEAK] -= dt / PEAK_TIME
             s[BOUND] -= own.drift * math.sqrt(dt)
             s[REST] += dt
         before = s[SLIP]
         if good and load <= own.least_load and dt > 0.0:
-            _tare(own, s, wrenches[p], load, h, column)
+            _tare(own, s, wrench, load, h, column)
         elif good and dt > 0.0:
             share = 1.0 - math.exp(-dt / SEEN_TIME)
             for i in range(3):
                 w = 0.0
                 for j in range(3):
-                    w += own.conjugate[i, j] * wrenches[p, j]
+                    w += own.conjugate[i, j] * wrench[j]
                 s[SEEN + i] += share * ((w - s[BIAS + i]) / load - s[SEEN + i])
                 s[SUM + i] += w / load
             s[LOADS], s[COUNT] = s[LOADS] + load, s[COUNT] + 1.0
@@ -382,11 +327,11 @@ def update(own, states, times, wrenches, loads, velocities, flags, out):
             s[PEAK] = max(s[PEAK], s[GAUGE])
             if s[SLIP] < 0.1:
                 s[BOUND] = max(s[BOUND], s[GAUGE])
-        if _finite(velocities[p, 0]) and _finite(velocities[p, 1]) and _finite(velocities[p, 2]) and dt > 0.0:
+        if xp.in_range(velocity[0]) and xp.in_range(velocity[1]) and xp.in_range(velocity[2]) and dt > 0.0:
             for i in range(3):
                 v[i] = 0.0
                 for j in range(3):
-                    v[i] += own.frame[i, j] * velocities[p, j]
+                    v[i] += own.frame[i, j] * velocity[j]
             odds = math.exp(_see(own, s, v, h, column, jacobian))
             s[SLIP] = s[SLIP] * odds / (s[SLIP] * odds + 1.0 - s[SLIP])
         s[SLIP] = min(max(s[SLIP], 1e-9), 1.0 - 1e-9)
@@ -394,5 +339,8 @@ def update(own, states, times, wrenches, loads, velocities, flags, out):
             for i in range(N):
                 h[i] = 1.0 if i in (MU, RATIO) else 0.0
             h[SCALE] = s[LEVER]
-            _measure(s, h, s[PEAK] - s[MU] - s[RATIO], PEAK_ERROR * PEAK_ERROR, column)
-        _estimate(own, s, out[p])
+            measure(s, h, s[PEAK] - s[MU] - s[RATIO], PEAK_ERROR * PEAK_ERROR, column)
+        e.flags, e.dt, e.normal_force = flags, dt, load
+        for i in range(3):
+            e.wrench[i], e.velocity[i] = wrench[i], velocity[i]
+        _estimate(own, s, e)

@@ -130,6 +130,7 @@ class FrictionObserver:
             validation.non_negative("drift", drift),
             validation.positive("saturation", saturation),
             validation.positive("least_load", least_load),
+            (math.log1p(self.tolerance) / _TWO_SIDED) ** 2,
         )
         spreads = {"mu_spread": mu_spread, "ratio_spread": ratio_spread, "radius_spread": radius_spread}
         self._prior = np.array([validation.positive(name, value) for name, value in spreads.items()])
@@ -149,31 +150,26 @@ class FrictionObserver:
 
         Raises InvalidValueError for a measurement whose arrays do not have the shape of the batch.
         """
+        return estimate_of(self.take(measurement))
+
+    def take(self, measurement: Measurement) -> np.ndarray:
+        """Take a sample of every part; return the compiled filter's records of what is known, one a part."""
         validation.instance("measurement", measurement, Measurement, "a Measurement")
         batch, state = self.state.shape[:-1], self.state.reshape(-1, kernels.STATE)
-        time, wrench, load, velocity = measurement
+        velocity, samples = measurement.slip_velocity, np.empty((*batch, 8))
         try:
-            samples = (
-                _rows(time, batch),
-                _rows(wrench, (*batch, 3)).reshape(-1, 3),
-                _rows(load, batch),
-                _rows(math.nan if velocity is None else velocity, (*batch, 3)).reshape(-1, 3),
-            )
+            samples[..., 0], samples[..., 1:4], samples[..., 4] = measurement[:3]
+            samples[..., 5:] = math.nan if velocity is None else velocity
         except (TypeError, ValueError):
             raise InvalidValueError("measurement", f"hold numbers of the batch {list(batch)}", measurement) from None
-        flags, out = np.zeros(len(state), np.int64), np.empty((len(state), kernels.ESTIMATE))
-        kernels.update(self._filter, state, *samples, flags, out)
-        out = out.reshape(*batch, kernels.ESTIMATE)
-        covariance = out[..., 6:15].reshape(*batch, 3, 3)
-        within = out[..., 6:15:4] <= (math.log1p(self.tolerance) / _TWO_SIDED) ** 2
-        numbers, odds = ([out[..., i] for i in of] for of in ((3, 4, 5), (15, 16, 17)))
-        margin = np.exp(out[..., 18])
-        return Estimate._make((out[..., :3], *numbers, covariance, within, *odds, margin, flags.reshape(batch)))
+        found = np.empty(batch, kernels.ESTIMATE)
+        kernels.update(self._filter, state, samples.reshape(-1, 8), found.reshape(-1))
+        return found
 
     @property
     def bias(self) -> np.ndarray:
         """Estimated bias of the measured wrench, `[..., 3]` [N, N, N m]."""
-        return self.state[..., kernels.BIAS : kernels.N] @ np.linalg.inv(self._filter.conjugate).T
+        return -self.state[..., kernels.BIAS : kernels.N] @ self._filter.frame
 
     def information(self) -> np.ndarray:
         """Return the information of the samples so far on the logs of mu_c, mu_s/mu_c and the radius, `[..., 3, 3]`.
@@ -185,6 +181,11 @@ class FrictionObserver:
             ..., kernels.MU : kernels.BIAS, :
         ]
         return np.linalg.inv(root @ np.swapaxes(root, -1, -2)) - np.diag(1.0 / self._prior**2)
+
+
+def estimate_of(found: np.ndarray) -> Estimate:
+    """Return the estimate in records of the compiled filter."""
+    return Estimate._make(found[name] for name in Estimate._fields)._replace(determined=found["determined"] > 0)
 
 
 def _settings(model: FrictionModel, surface: LimitSurface, load: float, sensors: Sensors, *rest: float) -> Any:
@@ -231,10 +232,3 @@ def _growth(patch: Any, load: float) -> float:
         return 0.0
     small, large = (float(patch.contact_radius(share * load)) for share in (0.5, 2.0))
     return math.log(large / small) / math.log(4.0)
-
-
-def _rows(value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Return numbers of a shape, in one piece."""
-    array = np.asarray(value, float)
-    array = array if array.shape == shape else np.broadcast_to(array, shape)
-    return np.ascontiguousarray(array).reshape(-1)

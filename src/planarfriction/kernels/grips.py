@@ -1,0 +1,193 @@
+"""Grip forces of the controllers of `planarfriction.online`, for one sample of every part (docs/online.md)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import jit, kernel
+from planarfriction.formulas import LARGEST
+
+STATE = np.dtype(
+    [
+        *((name, float) for name in ("age", "span", "since", "start", "load", "grip")),
+        *((name, float, 3) for name in ("slid", "velocity")),
+        *((name, float) for name in ("found", "goal", "began", "balance", "caught", "eased", "force", "torque")),
+    ]
+)
+"""State of a part in any controller: times since the first sample, since a slip velocity and since it slipped [s], grip
+from which it falls, largest holding load of late at mu = 1 and grip [N], displacement and velocity; then of some
+controllers: 1 once friction is found, goal, time since the slip began [s], the grip that balances the load [N], 1 once
+caught, share of the grip that is left, and filtered force and torque."""
+
+FRESH = (-math.inf, -math.inf, 0.0, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -math.inf, 0.0, 0.0, 1.0, 0.0, 0.0)
+"""State before the first sample; what has not begun is infinitely far."""
+
+LOAD_TIME = 0.3
+"""Time in which the largest load of late fades from the grip [s]."""
+
+SETTLED = 0.03
+"""Time after which the load of a part is known [s]."""
+
+PAUSE = 0.1
+"""Longest time between samples that grips and loads go on by [s]."""
+
+RELEASE = 1.0
+"""Rate at which a grip falls until the part slips [1/s]."""
+
+STICKS = 0.05
+"""Time without slip after which a part has stuck [s]."""
+
+STUCK = 1.0
+"""Rate at which it falls if a part that shall slip has stuck [1/s]."""
+
+AIM = 0.3
+"""Share of the tolerance by which a part is caught before the goal: late samples let it go on."""
+
+REGRIP = 5.0
+"""Rate at which the grip of a hinge that was released rises again while the part moves [1/s]."""
+
+HANGS = 0.12
+"""Lever of the load of a part that hangs, over the contact radius [-]."""
+
+FORCE_TIME = 0.05
+"""Time of the filter of force and torque at a hinge [s]."""
+
+CAUGHT = 1.5
+"""Grip after a slip on purpose, over the one that balances the load [-]."""
+
+SPEED_GAIN, PLACE_GAIN = 8.0, 16.0
+"""Accelerations per error of the speed [1/s] and of the place [1/s^2] of a slip on purpose."""
+
+
+@kernel
+def trapezoid(xp, time, size, duration):
+    """Compute place, speed and acceleration at a time [s] of a way of a `size` whose ramps take a quarter each."""
+    ramp = 0.25 * duration
+    top = size / (duration - ramp)
+    t = xp.minimum(xp.maximum(time, 0.0), duration)
+    left = duration - t
+    rise, fall = xp.minimum(t, ramp), xp.minimum(left, ramp)
+    place = top * (t - rise + 0.5 * (rise * rise - (ramp - fall) * (ramp - fall)) / ramp)
+    push = xp.where((t > 0.0) & (t < ramp), 1.0, 0.0) - xp.where((left > 0.0) & (left < ramp), 1.0, 0.0)
+    return place, top * xp.minimum(rise, fall) / ramp, top / ramp * push
+
+
+@kernel
+def _follow(c, e):
+    """Take in what an observer found; return the grip at mu = 1 that holds the present load, and the time step."""
+    dt = min(e.dt, PAUSE) if c.age >= 0.0 else 0.0  # the first sample has none
+    force = e.normal_force
+    needed = e.gauge * force if xp.in_range(force) and force > 0.0 else 0.0
+    c.load, c.age = max(needed, c.load * math.exp(-dt / LOAD_TIME)), max(c.age, 0.0) + dt
+    c.span += dt
+    v = e.velocity
+    if dt > 0.0 and xp.in_range(v[0]) and xp.in_range(v[1]) and xp.in_range(v[2]):
+        for i in range(3):
+            c.slid[i] += v[i] * c.span if c.span >= 0.0 else 0.0
+            c.velocity[i] = v[i]
+        c.span = 0.0
+    return needed, dt
+
+
+@kernel
+def _begin(c, value, most):
+    """Return the grip from which it first falls: the `value` once the filters have settled."""
+    if c.start > LARGEST and c.age >= SETTLED:
+        c.start = value
+    return min(c.start, most)
+
+
+@kernel
+def _set(c, e, asked, most):
+    """Set the grip that is asked for; before the filters have settled, leave it as it is."""
+    if c.age >= SETTLED:
+        c.grip = min(max(asked, 0.0), most)
+    elif xp.in_range(e.normal_force):
+        c.grip = min(max(e.normal_force, 0.0), most)
+
+
+@jit
+def hold(states, found, most, z, reserve, gain, explore):
+    """Set the grips of `Hold` in states `[P]` from what an observer found `[P]`; `z` is the quantile of mu_c."""
+    for p in range(states.shape[0]):
+        c, e = states[p], found[p]
+        _, dt = _follow(c, e)
+        slips, slid, v = e.slip > 0.5, c.slid, c.velocity
+        path = math.hypot(slid[0], slid[1]) + e.radius * abs(slid[2])
+        if slips and c.age >= SETTLED and (e.determined[0] > 0 or path >= explore):
+            c.found = 1.0
+        low = e.mu_c * math.exp(-z * math.sqrt(e.covariance[0, 0]))
+        speed = math.hypot(v[0], v[1]) + e.radius * abs(v[2]) if slips else 0.0
+        held = reserve * c.load / low + gain * speed
+        start = _begin(c, held, most)
+        if c.found == 0.0:
+            held = min(start, c.grip if slips else c.grip * math.exp(-RELEASE * dt))
+        elif slips:
+            held = max(held, start)  # as if nothing were known, until it sticks
+        _set(c, e, held, most)
+
+
+@jit
+def slip(states, found, most, axis, tolerance, duration, acceleration, adapt, delay):
+    """Set the grips of `SlideBy` (axis 1) and `TurnBy` (axis 2) in states `[P]` from what an observer found `[P]`."""
+    for p in range(states.shape[0]):
+        c, e = states[p], found[p]
+        needed, dt = _follow(c, e)
+        slips, goal = e.slip > 0.5, abs(c.goal)
+        sign = 1.0 if c.goal > 0.0 else -1.0
+        v, x = sign * c.velocity[axis] if slips else 0.0, sign * c.slid[axis]
+        c.began += dt
+        if slips and c.began < 0.0 and c.age >= SETTLED:
+            c.began, c.balance = 0.0, 1.05 * needed / max(e.gauge, 1e-9)
+        balance = c.balance
+        time = c.began + delay if c.began >= 0.0 else 0.0
+        place, speed, push = trapezoid(xp, time, goal, duration)
+        there = x + v * delay
+        left = goal - there
+        c.since = 0.0 if slips else c.since + dt
+        stuck = c.since > STICKS  # then the wrench is that of the load, and says which grip balances it
+        braking = 0.5 * acceleration
+        if 0.5 * v * v / braking >= left - AIM * tolerance or (stuck and left < tolerance):
+            c.caught = 1.0
+        if slips:
+            c.balance = min(c.balance * math.exp(adapt * (v - speed - 2.0 * (place - there)) * dt), LARGEST)
+        if stuck and c.began >= 0.0:
+            c.balance = 1.1 * needed / e.mu_c
+        a = push + SPEED_GAIN * (speed - v) + PLACE_GAIN * (place - there)
+        lead = min(max(a / acceleration, -0.6), 0.25)
+        start = _begin(c, 2.5 * c.load / e.mu_c, most)
+        if c.caught > 0.0:
+            asked = CAUGHT * max(c.balance, c.load / e.mu_c)
+        elif c.began < 0.0:
+            asked = min(start, c.grip) * math.exp(-RELEASE * dt)
+        else:
+            asked = balance * (1.0 - lead) * math.exp(-STUCK * max(c.since - STICKS, 0.0))
+        _set(c, e, asked, most)
+
+
+@jit
+def hinge(states, found, most, reserve, gain):
+    """Set the grips of `Hinge` in states `[P]` from what an observer found `[P]`."""
+    for p in range(states.shape[0]):
+        c, e = states[p], found[p]
+        _, dt = _follow(c, e)
+        force, torque = math.hypot(e.wrench[0], e.wrench[1]), e.wrench[2]
+        if xp.in_range(force) and xp.in_range(torque):
+            share = dt / FORCE_TIME
+            c.force += share * (force - c.force)
+            c.torque += share * (torque - c.torque)
+        slips, v = e.slip > 0.5, c.velocity
+        if slips and c.age >= SETTLED:
+            c.found = 1.0
+        moves = slips and (v[0] != 0.0 or v[1] != 0.0 or v[2] != 0.0)  # near the surface a slip is probable, unseen
+        c.since = 0.0 if moves else c.since + dt
+        eases = c.since > STICKS and abs(c.torque) > HANGS * e.radius * c.force
+        rate = REGRIP if moves else (-RELEASE if eases else 0.0)
+        c.eased = min(c.eased * math.exp(rate * dt), 1.0)
+        start = _begin(c, 2.5 * c.load / e.mu_c, most)
+        speed = math.hypot(v[0], v[1]) if slips else 0.0
+        carried = reserve * c.eased * c.force / e.mu_c + gain * speed
+        _set(c, e, carried if c.found > 0.0 else min(start, c.grip * math.exp(-RELEASE * dt)), most)
