@@ -19,23 +19,26 @@ SURFACES = {"exact surface": pf.LimitSurfaceExact, "ellipsoid": pf.LimitSurfaceE
 BOARDS = {"hardboard": "feet on hardboard", "plywood": "feet on plywood", "flat": "flat face", "in time": "in time"}
 
 
-def cell(values: np.ndarray, unit: float) -> str:
-    """Mean with its 95 % interval, and the median."""
-    drawn = drawings([str(i) for i in range(len(values))], 0)
-    low, high = interval(mean(unit * values, drawn))
-    return f"{unit * values.mean():.2f} ({low:.2f} to {high:.2f}), {unit * np.median(values):.2f}"
+def cell(values: np.ndarray) -> str:
+    """Mean with its 95 % interval."""
+    low, high = interval(mean(values, drawings([str(i) for i in range(len(values))], 0)))
+    return f"{values.mean():.2f} [{low:.2f}, {high:.2f}]"
 
 
 def table(measured: list[replayed_pushes.ReplayedPush]) -> str:
-    """Rows of the page: one for each surface and kind of push."""
-    lines = ["| pushes | number | limit surface | position [mm] | angle [deg] |", "|---|---|---|---|---|"]
+    """Rows of the page: one for each kind of push."""
+    units = "[mm]", "[deg]"
+    headings = ["pushes", "number", *(f"{name} {unit}" for unit in units for name in (*SURFACES, "no motion"))]
+    lines = [f"| {' | '.join(headings)} |", "|---" * len(headings) + "|"]
     for board, words in BOARDS.items():
         some = [each for each in measured if each.board == board]
-        found = {name: replayed_pushes.errors(some, make) for name, make in SURFACES.items()}
-        found["it does not move"] = np.array([each.error(each.start) for each in some])
-        for name, values in found.items():
-            cells = cell(values[:, 0], 1e3), cell(values[:, 1], np.degrees(1.0))
-            lines.append(f"| {words} | {len(some)} | {name} | {cells[0]} | {cells[1]} |")
+        found = [replayed_pushes.errors(some, make) for make in SURFACES.values()]
+        still = np.array([each.error(each.start) for each in some]).mean(axis=0)
+        cells = []
+        for column, factor in enumerate((1e3, np.degrees(1.0))):
+            cells += [cell(factor * values[:, column]) for values in found]
+            cells.append(f"{factor * still[column]:.2f}")
+        lines.append(f"| {words} | {len(some)} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
 
