@@ -1,4 +1,4 @@
-"""The tables of docs/solver.md: how far runs at the default tolerances end from converged ones, and what tolerances do.
+"""Numbers of docs/solver.md: how far runs at the default tolerances end from converged ones, and what tolerances do.
 
 python docs/default_accuracy.py
 """
