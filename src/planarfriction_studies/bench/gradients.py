@@ -69,7 +69,7 @@ def published(full: bool) -> Measurement:
     model = ReducedModelPublished(disc(), law())
     value = _value_and_gradient(model, (STEPS,), 15)
     try:
-        return line(value, "s", "PyTorch, eager, the same roll-out", _eager_gradient(model, full))
+        return line(value, "s", "PyTorch, eager, the same rollout", _eager_gradient(model, full))
     except ImportError:
         inputs, once = len(derivatives.PARAMETERS) + 3 + 4 * STEPS, _alone(model, (STEPS,), 15)
         words = f"central differences, 2 x {inputs} roll-outs of {once * 1e3:.2g} ms (PyTorch is not installed)"
