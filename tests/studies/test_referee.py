@@ -20,8 +20,9 @@ from planarfriction.errors import FileError
 from planarfriction_studies.referee import engines, truths
 from planarfriction_studies.referee.case import FOLDER, all_cases, read_case
 from planarfriction_studies.referee.export import export_case
+from planarfriction_studies.referee.film import film
 from planarfriction_studies.referee.pictures import scene
-from planarfriction_studies.referee.run import Apart, Kept, judge, run
+from planarfriction_studies.referee.run import Apart, Kept, judge, no_result, run
 from planarfriction_studies.referee.sdf import sdf
 
 CASES = all_cases()
@@ -430,6 +431,25 @@ def test_pictures_show_where_bodies_end():
     assert (x, y) == pytest.approx([1e3 * truth.value for truth in CASES["in_hand"].truths[:2]], abs=1e-9)
 
 
+def test_films_go_to_where_an_engine_ends():
+    case = CASES["stop"]
+    verdicts = [
+        judge(case, Fake(0.5)),
+        replace(judge(case, Fake(2.0)), engine="a & b"),
+        no_result("-", case, Fake(0), ""),
+    ]
+    panels = ElementTree.fromstring(film(case, verdicts)).findall("{*}svg")
+    assert len(panels) == 2
+    for panel, verdict in zip(panels, verdicts, strict=False):
+        goes = panel.find(".//{*}animateTransform[@type='translate']").get("values").split(";")
+        first, last = (float(goes[i].split(",")[0]) for i in (0, -1))
+        ways = {truth.body: truth.value for truth in case.truths}
+        allowed = {truth.body: truth.allowed for truth in case.truths}
+        body = verdict.quantity.partition(" of ")[2]
+        share = verdict.error / verdict.allowed
+        assert last - first == pytest.approx(ways[body] + share * allowed[body], rel=1e-3)
+
+
 @pytest.mark.drake
 @pytest.mark.parametrize("name", ["in_hand", "angle"])
 def test_drake_reads_the_sdf(name):
@@ -488,6 +508,7 @@ def test_the_view_of_simulators(monkeypatch, capsys, tmp_path):
         "drake",
         "pybullet",
         pytest.param("mujoco_warp", marks=pytest.mark.mujoco_warp),
+        pytest.param("newton", marks=pytest.mark.slow),
         pytest.param("mjx", marks=[pytest.mark.mjx, pytest.mark.slow]),
     ],
 )

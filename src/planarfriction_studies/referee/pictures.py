@@ -20,25 +20,23 @@ def scene(case: Case) -> PlotFigure:
     """Draw a case from above, or from the side where bodies lie on each other; dashed: where bodies end."""
     from matplotlib.patches import Polygon
 
-    up = 2 if _stacked(case) else 1
-    drawn = [
-        (_outline(body, shape, up), body) for body in case.bodies for shape in body.shapes if shape.kind != "plane"
-    ]
-    ends = [(_outline(body, shape, up, *_end(case, body)), body) for body in case.moving for shape in body.shapes]
-    corners = np.concatenate([outline for outline, _ in (*drawn, *ends)])
+    up = side(case)
+    drawn = [(outline(body, shape, up), body) for body in case.bodies for shape in body.shapes if shape.kind != "plane"]
+    ends = [(outline(body, shape, up, *end(case, body)), body) for body in case.moving for shape in body.shapes]
+    corners = np.concatenate([corners for corners, _ in (*drawn, *ends)])
     low, high = corners.min(0), corners.max(0)
     size = float((high - low).max())
     margin = np.full(2, 0.22 * size)
     width, height = high - low + 2.0 * margin
     figure = new_figure(WIDTH, min(max(WIDTH * height / width, 1.6), 7.0) + 0.5)
     axes = figure.subplots()
-    for outline, body in sorted(drawn, key=lambda each: _height(each[1], up)):
+    for corners, body in sorted(drawn, key=lambda each: _height(each[1], up)):
         fixed = body.joint == "fixed"
         fill = "0.8" if fixed else PALETTE[5] if body.joint == "free" else PALETTE[4]
-        axes.add_patch(Polygon(1e3 * outline, facecolor=fill, edgecolor="0.2", alpha=0.6))
-    for outline, body in ends:
-        if any(_end(case, body)):
-            axes.add_patch(Polygon(1e3 * outline, fill=False, edgecolor=PALETTE[1], linestyle="--"))
+        axes.add_patch(Polygon(1e3 * corners, facecolor=fill, edgecolor="0.2", alpha=0.6))
+    for corners, body in ends:
+        if any(end(case, body)):
+            axes.add_patch(Polygon(1e3 * corners, fill=False, edgecolor=PALETTE[1], linestyle="--"))
     _arrows(axes, case, up, size)
     names = "x", "z" if up == 2 else "y"
     axes.set(xlabel=f"{names[0]} [mm]", ylabel=f"{names[1]} [mm]", aspect="equal")
@@ -48,22 +46,23 @@ def scene(case: Case) -> PlotFigure:
     return figure
 
 
-def _stacked(case: Case) -> bool:
+def side(case: Case) -> int:
+    """Return the axis that points up in pictures: y from above, z (2) where bodies lie on each other."""
     places = [tuple(body.position[:2]) for body in case.moving if body.joint == "free"]
-    return len(set(places)) < len(places)
+    return 2 if len(set(places)) < len(places) else 1
 
 
 def _height(body: Body, up: int) -> float:
     return body.position[2] if up == 1 else 0.0
 
 
-def _end(case: Case, body: Body) -> tuple[float, float, float]:
+def end(case: Case, body: Body) -> tuple[float, float, float]:
     """Return the true displacement and turn of a body; 0 where nothing is known."""
     known = {truth.quantity: truth.value for truth in case.truths if truth.body == body.name}
     return known.get("x", 0.0), known.get("y", 0.0), known.get("turn", 0.0)
 
 
-def _outline(body: Body, shape: Shape, up: int, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> np.ndarray:
+def outline(body: Body, shape: Shape, up: int, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> np.ndarray:
     """Return the corners `[n, 2]` of a shape from above (up 1) or from the side (up 2) [m]."""
     half = shape.half[[0, up]]
     if shape.kind == "box" or (up == 2 and shape.kind == "cylinder") or shape.kind == "capsule":

@@ -17,6 +17,7 @@ from planarfriction.plots.style import PlotFigure, new_figure, tidy
 from planarfriction.writing import write_text
 from planarfriction_studies.referee.case import Case
 from planarfriction_studies.referee.engines import Engine
+from planarfriction_studies.referee.film import film
 from planarfriction_studies.referee.pictures import scene
 from planarfriction_studies.referee.run import MARKS, Verdict, to_rows
 
@@ -139,6 +140,7 @@ def write(
     for name, case in cases.items():
         picture(name, verdicts).savefig(folder / f"{name}.svg")
         scene(case).savefig(folder / f"{name}-scene.svg")
+        write_text(folder / f"{name}-film.svg", film(case, verdicts))
     write_text(folder / "referee.html", page(verdicts, cases, run))
     return [folder / "referee.json", folder / "referee.html"]
 
@@ -156,7 +158,8 @@ tr {{ border-bottom: 1px solid #ddd }} {" ".join(f".{mark} {{ color: {COLOURS[ma
 </style><h1>The referee: friction against the truth</h1>
 <p>{html.escape(run["date"])}; {html.escape(run["machine"])}; {html.escape(versions)}. {html.escape(marks)};
 numbers are errors over what is allowed. In pictures, what is fixed is grey, and dashed is where the truth says
-that bodies end; green arrows are velocities, pink ones forces.</p>
+that bodies end; green arrows are velocities, pink ones forces. In films, each engine moves the body that it
+moves worst.</p>
 {_table(headings, rows)}
 <h2>Settings</h2>{_table(["engine", "settings"], [list(item) for item in run["settings"].items()])}
 {sections}</html>
@@ -178,6 +181,7 @@ def _section(case: Case, verdicts: Sequence[Verdict]) -> str:
     return f"""<h2 id="{case.name}">{html.escape(case.title)}</h2><p>{html.escape(case.about)}</p>
 <p>Allowed: {html.escape(case.why)}</p><p><img src="{case.name}-scene.svg" alt="the bodies of the case">
 <img src="{case.name}.svg" alt="errors of all engines"></p>
+<p><img src="{case.name}-film.svg" alt="film: the worst body of each engine"></p>
 {_table(["engine", "mark", "error", "allowed", "worst quantity", "time step", "cost [µs]", "start [s]", ""], results)}
 <details><summary>Truths</summary>
 {_table(["body", "quantity", "value", "its error", "allowed", "source"], truths)}</details>"""

@@ -20,10 +20,13 @@ import numpy as np
 from planarfriction.errors import FileError
 from planarfriction.reading import read_text
 from planarfriction.writing import write_text
-from planarfriction_studies.referee.case import QUANTITIES, Case, Path3
+from planarfriction_studies.referee.case import QUANTITIES, Case, Path3, Truth
 from planarfriction_studies.referee.engines import Engine
 
 MARKS = {"ok": "within what is allowed", "off": "up to ten times that", "fails": "beyond, or no result"}
+
+FRAMES = 16
+"""Times of a path that are kept."""
 
 _FAILS = 10.0
 """Error over what is allowed from which a result has nothing to do with the truth."""
@@ -52,6 +55,8 @@ class Verdict:
     """Processor time to build the case and make the first step, in which engines compile [s]."""
     reason: str = ""
     """Reason of no result."""
+    path: tuple[tuple[float, float, float], ...] = ()
+    """Displacement and turn of the worst body at a few times [m, m, rad]: its film."""
     fingerprint: str = ""
     """Hash of the case, the settings, the versions and the time steps: a verdict with another one is not reused."""
 
@@ -109,7 +114,17 @@ def _judge(case: Case, engine: Engine, dt: float) -> Verdict:
     share = error / truth.allowed
     mark = "ok" if share <= 1.0 else "off" if share <= _FAILS else "fails"
     what, unit = f"{truth.quantity} of {truth.body}", QUANTITIES[truth.quantity]
-    return Verdict(case.name, engine.name, mark, error, truth.allowed, unit, what, dt, cost, start)
+    frames = _frames(case, truth, path)
+    return Verdict(case.name, engine.name, mark, error, truth.allowed, unit, what, dt, cost, start, path=frames)
+
+
+def _frames(case: Case, truth: Truth, path: Path3) -> tuple[tuple[float, float, float], ...]:
+    """Return displacements and turns of the body of a truth, with four digits."""
+    body = [each.name for each in case.moving].index(truth.body)
+    kept = np.linspace(0, len(path.times) - 1, FRAMES).round().astype(int)
+    rows = np.column_stack([path.positions[kept, body, :2], path.turns[kept, body]])
+    x, y, turn = ([float(f"{each:.4g}") for each in column] for column in (rows - rows[0]).T)
+    return tuple(zip(x, y, turn, strict=True))
 
 
 class Apart:

@@ -13,6 +13,7 @@ from planarfriction_studies.referee.case import Case
 
 MODULES = {
     "mujoco": "mujoco", "mjx": "jax", "mujoco_warp": "mujoco_warp", "drake": "pydrake", "pybullet": "pybullet",
+    "newton": "newton",
 }  # fmt: skip
 """Modules of this package, and the Python package that each needs."""
 
