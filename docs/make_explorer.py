@@ -86,7 +86,7 @@ def save(page: Page, name: str, **options: Any) -> None:
 
 
 def pictures() -> None:
-    """A published patch with its models, a painted map, and a scene."""
+    """A published patch with its models."""
     with opened() as page:
         page.locator(".patch select").select_option("NonConvex2")
         page.wait_for_timeout(2000)
@@ -95,17 +95,6 @@ def pictures() -> None:
         page.get_by_text("For the patch, the law").wait_for(timeout=120_000)
         page.wait_for_timeout(4000)
         save(page, "explorer", full_page=True)
-        page.get_by_text("Run a scene").click()
-        page.locator(".scene select").select_option("in-hand")
-        page.locator(".run button").click()
-        film = page.frame_locator("#film")
-        film.locator("img").wait_for(timeout=300_000)
-        film.locator("input[type=range]").fill("30")
-        film.get_by_title("Pause").click()
-        page.wait_for_timeout(1000)
-        page.locator("#film").screenshot(path=DOCS / "images" / "explorer-film.png")
-        with Image.open(DOCS / "images" / "explorer-film.png") as picture:
-            picture.convert("RGB").quantize(128).save(DOCS / "images" / "explorer-film.png", optimize=True)
 
 
 def times() -> None:
