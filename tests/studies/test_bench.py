@@ -44,11 +44,11 @@ def test_costs_become_a_table_and_readme_has_its_row_of_them(pages):
     page = pages["with_tables"]("<!-- table: Cost -->\n\n| old |\n\nNext.\n", pages["costs"]([LINE, missing]))
     assert "| 93 ms | 0.67 s: LSODA over the first 0.1 s | 130 | `in_hand.distributed` |\n\nNext." in page
     assert "old" not in page and "import" not in page
-    row = "| LSODA, [2 s](docs/benchmarks.md) | 1 s | 2 ms |\n"
-    assert pages["with_speed"](row, [LINE]) == "| LSODA, [2 s](docs/benchmarks.md) | 0.67 s | 93 ms |\n"
-    # with --full LSODA is given the whole run, which is not what the row says
-    assert pages["with_speed"](row, [LINE | {"baseline": "LSODA over the whole run"}]) == row
-    assert pages["with_speed"]((DOCS.parent / "README.md").read_text("utf-8"), [LINE]).count("93 ms |") == 1
+    row = "| [gradient](docs/benchmarks.md) | 1 s (PyTorch, eager) | 2 ms |\n"
+    line = LINE | {"name": "gradient.published", "baseline": "PyTorch, eager, the same rollout"}
+    assert pages["with_speed"](row, [line]) == "| [gradient](docs/benchmarks.md) | 0.67 s (PyTorch, eager) | 93 ms |\n"
+    assert pages["with_speed"](row, [LINE]) == row
+    assert pages["with_speed"]((DOCS.parent / "README.md").read_text("utf-8"), [line]).count("| 93 ms |") == 1
 
 
 @pytest.mark.parametrize(
