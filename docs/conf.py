@@ -15,6 +15,8 @@ import matplotlib  # noqa: E402
 
 matplotlib.use("Agg")
 
+from sphinx.util import logging  # noqa: E402
+
 import planarfriction  # noqa: E402
 from planarfriction.cli.app import app  # noqa: E402
 
@@ -112,8 +114,15 @@ html_copy_source = False
 copybutton_prompt_text = "$ "
 
 
+def count(app, failed):
+    """Say how much there is to read."""
+    pages = [page.read_text(encoding="utf-8").split() for page in HERE.glob("*.md")]
+    logging.getLogger("planarfriction").info("%d pages of %d words", len(pages), sum(map(len, pages)))
+
+
 def setup(app):
     """Tables of numbers in files have no words to colour."""
     from pygments.lexers.special import TextLexer
 
     app.add_lexer("csv", TextLexer)
+    app.connect("build-finished", count)
