@@ -192,6 +192,17 @@ def test_moments():
     assert len({round(each, 6) for each in expected.wrench[:, 0, 0]}) == 3
 
 
+def test_faint():
+    """Squares of squares of faint states leave single precision: their steps are those of double precision."""
+    patches = CoupledPatches([pf.ReducedModel(SHAPES[0], LAW, parts=1)])
+    state = np.outer(10.0 ** -np.arange(7.0, 40.0), [1.0, 1e-6, 1e-9])
+    twist, load, wrench, response = (np.repeat(each[:1], len(state), axis=0) for each in problem()[1][:4])
+    host = HostStep(1e-3 * twist[:, :1], load[:, :1], wrench[:, :1], 300.0 * response[:, :3, :3])
+    runs = [(state, host, np.full(len(state), 1e-3), None)]
+    ((expected, found, *_),) = compared(patches, wp.float32, runs)
+    assert found.twist == pytest.approx(expected.twist, rel=1e-4)
+
+
 def test_no_load(kernel):
     """A patch without load has no wrench and forgets; its neighbour does not."""
     state, host = problem()

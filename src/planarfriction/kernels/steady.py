@@ -34,9 +34,10 @@ STILL = 1e-100
 FAR = 1e30
 """Steady state [m] of a patch at rest, where it has none: no bristle comes near it, so that nothing decays."""
 
-FAINT = 1e-70
+FAINT = 1e-15
 """Square of a deflection, in the bristles' largest, from which on and up to whose inverse a state has an evenness: the
-squares of others leave the range of doubles, and the closure is 0 or 1 there whatever it is."""
+squares of others leave the range of single precision, and the closure is 0 or 1 there, to the last digits of doubles,
+whatever it is."""
 
 HEADER = QUARTIC + 15
 """Numbers in front of a map."""
