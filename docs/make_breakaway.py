@@ -141,7 +141,7 @@ def two_pads(name: str) -> dict[str, float]:
 
 
 def prices(steps: int = 20_000, rounds: int = 9) -> dict[str, dict[str, float]]:
-    """Return by model its states, and the times of a roll-out and of its gradient over the published model's."""
+    """Return by model its states, and the times of a rollout and of its gradient over the published model's."""
     twists, loads = mixed_twists(steps), np.full(steps, 2.0)
     models = {name: make(PUBLISHED_PATCHES["Circle"]()) for name, (make, _) in MODELS.items()}
 
