@@ -3,7 +3,7 @@ From a log to a simulator
 =========================
 
 A rig moves a pad over a surface and logs motion and wrench. This walk fits a friction law to the log, looks at what the
-data leave open, and puts the fitted pad into a simulation.
+data cannot determine, and puts the fitted pad into a simulation.
 """
 
 import numpy as np
