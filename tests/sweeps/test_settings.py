@@ -197,7 +197,7 @@ def test_mistakes_of_the_commands_are_one_line(file, capsys):
     assert not Path("sweep").exists()
 
 
-def test_the_command_sweeps_and_goes_on(file, capsys):
+def test_the_command_sweeps_and_goes_on(file, capsys, monkeypatch):
     arguments = ["sweep", file, "--set", "body.mass=0.1:0.3:3", "--set", "fingers.law.mu_c=0.5,0.8", "--out", "runs"]
     assert main(arguments) == 0
     first = capsys.readouterr()
@@ -210,6 +210,16 @@ def test_the_command_sweeps_and_goes_on(file, capsys):
     assert main(arguments) == 0
     again = capsys.readouterr()
     assert again.out == first.out and "6 of 6 runs (6 found)" in again.err
+    rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in first.out.splitlines() if "│" in line]
+    values = [[mass, mu] for mass in ("0.1", "0.2", "0.3") for mu in ("0.5", "0.8")]
+    assert [row[:2] for row in rows] == values  # a row for each run
+    drop = 1e6 * data.y.isel(time=-1).values.ravel()
+    assert "y [µm]" in first.out
+    np.testing.assert_allclose([float(row[6]) for row in rows], drop, rtol=0.006)  # three digits
+    monkeypatch.setattr("planarfriction.cli.sweep.MOST_ROWS", 5)
+    assert main(arguments) == 0
+    ranges = capsys.readouterr().out
+    assert "smallest" in ranges and f"{np.median(drop):.3g}" in ranges
 
 
 def test_the_command_measures_with_a_function_of_a_file(file, capsys):

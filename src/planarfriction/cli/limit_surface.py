@@ -46,10 +46,10 @@ def show(patch: pf.ContactPatch, *, surface: str, out: Path | None, alone: bool,
     centre = np.round(1e3 * shown.centre_of_pressure, 9) + 0.0  # no -0 and no rounding errors of symmetric patches
     rows = [
         ["loaded cells", f"{patch.cells}"],
-        ["centre of pressure [mm]", f"{centre[0]:.6g}, {centre[1]:.6g}"],
-        ["contact radius r [mm]", f"{1e3 * shown.contact_radius:.8g}"],
-        ["second moment <rho^2> [mm^2]", f"{1e6 * float(patch.second_moment()):.8g}"],
-        ["largest distance from the ellipsoid [-]", f"{_distance_from_ellipsoid(shown):.4f}"],
+        ["centre of pressure [mm]", f"{centre[0]:.4g}, {centre[1]:.4g}"],
+        ["contact radius r [mm]", f"{1e3 * shown.contact_radius:.4g}"],
+        ["second moment <rho^2> [mm^2]", f"{1e6 * float(patch.second_moment()):.4g}"],
+        ["largest distance from the ellipsoid [-]", f"{_distance_from_ellipsoid(shown):.3g}"],
     ]
     rows += _grid_errors(patch)
     print_table(f"Limit surface of {patch.name} ({surface})", ["mu f_N = 1", "value"], rows)

@@ -14,11 +14,14 @@ FINISHED = "success"
 
 def comparison(solutions: Mapping[str, pf.Solution]) -> list[list[str]]:
     """Return rows of text for a table with one column for each solution; differences are those from the first."""
+    from planarfriction.plots.style import unit_for
+
     every = list(solutions.values())
+    ends = {name: [_last(each, name) for each in every] for name in ("x", "y", "theta")}
+    length, angle = unit_for("length", ends["x"], ends["y"]), unit_for("angle", ends["theta"])
     rows = [
-        ["final x [mm]", *(f"{1e3 * _last(each, 'x'):.6g}" for each in every)],
-        ["final y [mm]", *(f"{1e3 * _last(each, 'y'):.6g}" for each in every)],
-        ["final angle [deg]", *(f"{np.degrees(_last(each, 'theta')):.6g}" for each in every)],
+        [f"final {called} [{unit.label}]", *(f"{unit.factor * end:.5g}" for end in ends[name])]
+        for name, called, unit in (("x", "x", length), ("y", "y", length), ("theta", "angle", angle))
     ]
     if len(every) > 1:
         differences = [largest_differences(each, every[0]) for each in every[1:]]

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+import numpy as np
 
 from planarfriction.cli.options import FILE, complete_scene, load_function, patch_option
 from planarfriction.families import SCENES
 
 if TYPE_CHECKING:
     import xarray as xr
+
+MOST_ROWS = 40
+"""Number of runs up to which each has a row of its own on the screen."""
+
+KINDS = {"m": "length", "m/s": "speed", "rad": "angle", "N": "force", "N m": "torque"}
+"""Kinds of quantities, by their SI units."""
 
 
 @click.command(
@@ -89,7 +97,7 @@ def sweep(
 
 
 def _show(data: xr.Dataset, out: Path) -> None:
-    """Write the dataset and say what is in it."""
+    """Write the dataset and print a row for each run, or the ranges of many runs."""
     from planarfriction.cli.console import note, print_table
     from planarfriction.scenes.solution import write_dataset
 
@@ -102,12 +110,31 @@ def _show(data: xr.Dataset, out: Path) -> None:
     else:
         note(f"wrote {write_dataset(data, out / 'sweep.nc')}")
     ends = data.isel(time=-1) if "time" in data.dims else data
-    rows = []
-    for name, each in ends.data_vars.items():
-        if each.dims == swept and each.dtype.kind in "fiu":
-            unit = f" [{each.attrs['units']}]" if "units" in each.attrs else ""
-            rows.append([f"{name}{unit}", *(f"{float(of):.6g}" for of in (each.min(), each.median(), each.max()))])
+    columns = dict(
+        _in_units(each) for each in ends.data_vars.values() if each.dims == swept and each.dtype.kind in "fiu"
+    )
     title = f"{data.status.size} runs over {', '.join(map(str, swept))}"
     if "time" in data.dims:
         title += f", at {float(data.time[-1]):g} s"
-    print_table(title, ["", "smallest", "median", "largest"], rows)
+    if data.status.size > MOST_ROWS:
+        known = {name: each[np.isfinite(each)] for name, each in columns.items()}
+        ranges = {name: np.quantile(each, [0.0, 0.5, 1.0]) for name, each in known.items() if each.size}
+        rows = [[name, *(f"{value:.3g}" for value in each)] for name, each in ranges.items()]
+        print_table(title, ["", "smallest", "median", "largest"], rows)
+        return
+    labels = itertools.product(*(data[name].values.tolist() for name in swept))
+    values = zip(*([f"{value:.3g}" for value in each.tolist()] for each in columns.values()), strict=True)
+    rows = [[*(f"{each:.4g}" if isinstance(each, float) else str(each) for each in label), *row]
+            for label, row in zip(labels, values, strict=True)]  # fmt: skip
+    print_table(title, [*map(str, swept), *columns], rows)
+
+
+def _in_units(each: xr.DataArray) -> tuple[str, np.ndarray]:
+    """Return the name of a variable with a unit in which its values read well, and all values in that unit."""
+    from planarfriction.plots.style import unit_for
+
+    values, unit = each.values.ravel(), each.attrs.get("units")
+    if unit in KINDS:
+        suited = unit_for(KINDS[unit], values[np.isfinite(values)])
+        values, unit = suited.factor * values, suited.label
+    return (f"{each.name} [{unit}]" if unit else str(each.name)), values
