@@ -196,6 +196,13 @@ def test_names_exist(page):
             assert resolve(name), f"{page.name}: {name}"
 
 
+@pytest.mark.parametrize("page", PAGES, ids=ids)
+def test_code_of_a_page_is_not_cut_off(page):
+    """A line of the site holds 88 characters of code."""
+    long = [line for block in blocks(page) for line in block.text.splitlines() if len(line) > 88]
+    assert not long, f"{page.name}: {long[0]}"
+
+
 EXPLANATION = ("physics", "exact-surfaces", "reduced-model", "solver", "embedding", "anisotropy")
 """Pages that give equations and say which code holds them."""
 
