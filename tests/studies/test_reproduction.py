@@ -264,6 +264,7 @@ def test_symbols_in_names():
     assert name_to_html("r, <rho^2> [mm^2], fx & exact") == (
         "<i>r</i>, ⟨<i>ρ</i>²⟩ [mm²], <i>f<sub>x</sub></i> &amp; exact"
     )
+    assert name_to_html("\\theta [deg]") == "<i>θ</i> [deg]"
     assert name_to_html("reduced, 21 x 21, extra") == "reduced, 21 × 21, extra"
 
 

@@ -44,6 +44,10 @@ def test_table_holds_the_published_times(result):
         assert all(float(value.split()[0]) > 0.0 for value in row[1:4])
 
 
+def test_a_quick_look_quotes_no_ratio(result):
+    assert "LSODA" not in result.verdict and "ms" in result.verdict
+
+
 def test_machine_is_stated(result):
     assert {"cpus", "platform", "numpy", "scipy", "numba"} <= result.numbers["machine"].keys()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +19,12 @@ if TYPE_CHECKING:
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Variables by which libraries of linear algebra, and PyTorch, learn how many threads to use."""
+
+
+def use_one_thread() -> None:
+    """Give libraries of linear algebra that are loaded after this one thread, unless OMP_NUM_THREADS says otherwise."""
+    for name in THREADS:
+        os.environ.setdefault(name, os.environ.get("OMP_NUM_THREADS", "1"))
 
 
 @click.command(
@@ -46,12 +53,10 @@ def bench(only: tuple[str, ...], full: bool, rounds: int | None, old: Path | Non
     """Measure (the help above is what users see)."""
     import dataclasses
     import json
-    import os
 
     from planarfriction.cli.console import print_table, work_progress
 
-    for name in THREADS:  # read when these libraries load, which is below
-        os.environ.setdefault(name, os.environ.get("OMP_NUM_THREADS", "1"))
+    use_one_thread()
     from planarfriction_studies import bench as benchmarks
     from planarfriction_studies.bench import comparison
 
@@ -239,6 +244,7 @@ def _show(benchmark: Any, as_json: bool, folder: Path | None) -> None:
 @click.option("--again", is_flag=True, help="Repeat finished experiments.")
 def reproduce(only: tuple[str, ...], list_only: bool, out: Path, quick: bool, full: bool, again: bool) -> int:
     """Reproduce the paper (the help above is what users see)."""
+    use_one_thread()
     from planarfriction.cli.console import note, print_table
     from planarfriction.errors import InvalidValueError
     from planarfriction.writing import make_folder

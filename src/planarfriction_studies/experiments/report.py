@@ -118,7 +118,7 @@ _GREEK = {"tau": "τ", "tau/r": "τ/r", "theta": "θ", "omega": "ω", "mu": "μ"
 
 SYMBOLS = {
     **{letter: f"<i>{letter}</i>" for letter in ("k", "p", "r", "R", "x", "y", "θ")},
-    **{name: f"<i>{letter}</i>" for name, letter in _GREEK.items()},
+    **{tex + name: f"<i>{letter}</i>" for name, letter in _GREEK.items() for tex in ("", "\\")},
     **{name.replace("_", ""): f"<i>{name[0]}<sub>{name[2]}</sub></i>" for name in ("f_x", "f_y", "v_x", "v_y")},
     "f_N": "<i>f<sub>N</sub></i>",
     "dtheta": "d<i>θ</i>",

@@ -1,1 +1,1 @@
-"""Beyond the paper: exact limit surfaces, another reduced model, few cells, loads, friction with a grain."""
+"""Beyond the paper: exact limit surfaces, another reduced model, few cells, loads, anisotropic friction."""

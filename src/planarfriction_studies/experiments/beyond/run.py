@@ -1,4 +1,4 @@
-"""Beyond the paper: exact limit surfaces, another reduced model, few cells, loads, friction with a grain."""
+"""Beyond the paper: exact limit surfaces, another reduced model, few cells, loads, anisotropic friction."""
 
 from __future__ import annotations
 

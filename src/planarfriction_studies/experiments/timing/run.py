@@ -75,6 +75,7 @@ def run(work: Work) -> Result:
             "published": facts.published_table("timing"),
             "circle": CIRCLE,
             "published_step": PUBLISHED_STEP_RATIO,
+            "quick": work.quick,
             "precision": [_precision(problem, each) for problem, each in points.items()],
             "agreed": max(each.difference for each in agreements if each.unit == "m"),
         },
