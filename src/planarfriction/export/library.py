@@ -14,7 +14,9 @@ from planarfriction import validation, writing
 from planarfriction.compiler import compiled_math
 from planarfriction.errors import InvalidValueError
 from planarfriction.export.c_source import Writer, of_compiled
-from planarfriction.export.loops import Array, Fixed, Loops, Scalar
+from planarfriction.export.c_values import Array, Fixed, Scalar
+from planarfriction.export.grip import grip_of
+from planarfriction.export.loops import Loops
 from planarfriction.export.passes import passes_of
 from planarfriction.export.pieces import Pieces, pieces_of
 from planarfriction.export.samples import samples_of
@@ -59,9 +61,18 @@ FILES = {"h": ".h", "c": ".c", "test.c": "_test.c", "cmake": ".cmake"}
 CASADI = {"casadi.c": "_casadi.c"}
 """End of the name of the file for CasADi."""
 
+GRIP = {"grip.h": "_grip.h", "grip.c": "_grip.c"}
+"""Ends of the names of the files of a controller."""
+
 
 def export_c(
-    model: Any, folder: Any, *, name: str = "friction", precision: str = "double", casadi: bool = False
+    model: Any,
+    folder: Any,
+    *,
+    name: str = "friction",
+    precision: str = "double",
+    casadi: bool = False,
+    controller: Any = None,
 ) -> tuple[Path, ...]:
     """Write a model as C source into a folder; return the files `<name>.h`, `.c`, `_test.c` and `.cmake`.
 
@@ -69,18 +80,20 @@ def export_c(
     own. Its step is the model's own (see `FrictionModel.step`), traced from the same formulas. The test is a program
     that compares the library with numbers of the model; the CMake file has a target for each.
     With `casadi`, `<name>_casadi.c` holds the step and its Jacobian as functions that `casadi.external` loads.
+    With `controller`, a `planarfriction.online.Hold`, `<name>_grip.h` and `.c` hold that with its observer.
 
-    Raises InvalidValueError for a name that is no C identifier, an unknown precision, and models without source (see
-    `pieces_of`); FileError if the folder cannot be written.
+    Raises InvalidValueError for a name that is no C identifier, an unknown precision, and models without source and
+    controllers without source (see `pieces_of`, `grip_of`); FileError if the folder cannot be written.
     """
     if not (isinstance(name, str) and name.isascii() and name.isidentifier() and len(name) <= LONGEST_NAME):
         raise InvalidValueError("name", f"be a C identifier of at most {LONGEST_NAME} characters", name)
     validation.choice("precision", precision, PRECISIONS)
     validation.instance("casadi", casadi, bool, "True or False")
-    if casadi and precision != "double":
-        raise InvalidValueError("precision", "be double for CasADi", precision)
-    folder, ends = validation.path("folder", folder), FILES | (CASADI if casadi else {})
-    texts = _texts(model, pieces_of(model, fixed=False), name, precision, tuple(ends))
+    if (casadi or controller is not None) and precision != "double":
+        raise InvalidValueError("precision", "be double for CasADi and controllers", precision)
+    grip = {} if controller is None else {"grip": grip_of(controller, name)}
+    folder, ends = validation.path("folder", folder), FILES | (CASADI if casadi else {}) | (GRIP if grip else {})
+    texts = _texts(model, pieces_of(model, fixed=False), name, precision, grip, tuple(ends))
     writing.make_folder(folder)
     files = tuple(folder / f"{name}{end}" for end in ends.values())
     with contextlib.ExitStack() as stack:  # all can be written, or none is
@@ -89,7 +102,7 @@ def export_c(
     return files
 
 
-def _texts(model: Any, pieces: Pieces, name: str, precision: str, kinds: tuple[str, ...]) -> list[str]:
+def _texts(model: Any, pieces: Pieces, name: str, precision: str, grip: dict, kinds: tuple[str, ...]) -> list[str]:
     """Return the text of each kind of file."""
     import jinja2
 
@@ -109,40 +122,45 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, kinds: tuple[s
     passes = passes_of(vector, pieces.step, pieces.count, results, "shares[k]")
     own = {each: "\n".join(of_compiled(getattr(compiled_math, each))) for each in ("exp", "sin")}
     own = {each: lines for each, lines in own.items() if passes and f"{each}_of(" in "".join(passes.each)}
-    values = functions | {
-        "name": name,
-        "version": planarfriction.__version__,
-        "model": f"{type(model).__name__} of {model.patch.name or 'a patch'}, {type(model.law).__name__}",
-        "digest": hashlib.sha256("\n".join([functions["step"], repr(tables)]).encode()).hexdigest()[:16],
-        "pieces": pieces,
-        "states": pieces.count * pieces.states,
-        "precision": precision,
-        "parameters": {each: (writer.constant(value), MEANINGS[each]) for each, value in pieces.parameters.items()},
-        "ranges": " && ".join(RANGES[each] for each in pieces.parameters),
-        "tables": tables,
-        "columns": _columns(pieces),
-        "stride": pieces.stride,
-        "pattern": _pattern(pieces),
-        "first": first,
-        "suffix": writer.suffix,
-        "largest": writer.constant(PRECISIONS[precision]),
-        "zero": writer.constant(0.0),
-        "one": writer.constant(1.0),
-        "slip": None if slip is None else _search(writer, slip),
-        "passes": passes,
-        "moves": moves,
-        "share": share,
-        "own": own,
-        "samples": samples_of(model, slip, writer, pieces.tables.get("rungs")),
-        "operations": pieces.count * sum("=" in line for line in step),
-        "functions": pieces.count * sum(any(f"{each}{writer.suffix}(" in line for each in _SLOW) for line in step),
-    }
+    values = (
+        functions
+        | grip
+        | {
+            "name": name,
+            "version": planarfriction.__version__,
+            "model": f"{type(model).__name__} of {model.patch.name or 'a patch'}, {type(model.law).__name__}",
+            "digest": hashlib.sha256("\n".join([functions["step"], repr(tables)]).encode()).hexdigest()[:16],
+            "pieces": pieces,
+            "states": pieces.count * pieces.states,
+            "precision": precision,
+            "parameters": {each: (writer.constant(value), MEANINGS[each]) for each, value in pieces.parameters.items()},
+            "ranges": " && ".join(RANGES[each] for each in pieces.parameters),
+            "tables": tables,
+            "columns": _columns(pieces),
+            "stride": pieces.stride,
+            "pattern": _pattern(pieces),
+            "first": first,
+            "suffix": writer.suffix,
+            "largest": writer.constant(PRECISIONS[precision]),
+            "zero": writer.constant(0.0),
+            "one": writer.constant(1.0),
+            "slip": None if slip is None else _search(writer, slip),
+            "passes": passes,
+            "moves": moves,
+            "share": share,
+            "own": own,
+            "samples": samples_of(model, slip, writer, pieces.tables.get("rungs")),
+            "operations": pieces.count * sum("=" in line for line in step),
+            "functions": pieces.count * sum(any(f"{each}{writer.suffix}(" in line for each in _SLOW) for line in step),
+        }
+    )
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("planarfriction.export", "."),
         undefined=jinja2.StrictUndefined,
         keep_trailing_newline=True,
     )
-    return [environment.get_template(f"library.{kind}.j2").render(values) for kind in kinds]
+    names = [f"{kind}.j2" if kind in GRIP else f"library.{kind}.j2" for kind in kinds]
+    return [environment.get_template(each).render(values) for each in names]
 
 
 def _columns(pieces: Pieces) -> int:

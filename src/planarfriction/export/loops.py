@@ -11,42 +11,37 @@ import ast
 import builtins
 import inspect
 import math
+import operator
 import re
 import textwrap
-from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
 
 from planarfriction.compiler import compiled_math
 from planarfriction.export.c_source import Writer
+from planarfriction.export.c_values import (
+    LEAVES,
+    Array,
+    Fixed,
+    Record,
+    Scalar,
+    kind_of,
+    kinds_of,
+    leaves,
+    mapped,
+    plain,
+)
+from planarfriction.export.trace import Number, Table, Trace, traced
+from planarfriction.export.twins import twin
+from planarfriction.kernels import surfaces
 
-
-class Scalar(NamedTuple):
-    """A number in C."""
-
-    text: str
-    kind: str = "real"
-    """"real" or "int"."""
-
-
-class Fixed(NamedTuple):
-    """A number that every function knows, so that none takes it as an argument."""
-
-    value: float
-
-
-class Array(NamedTuple):
-    """An array in C, by the expression of its first number."""
-
-    text: str
-    shape: tuple[int, ...]
-    kind: str = "real"
-    fixed: bool = False
-    """True for a table of the source, which no function takes as an argument."""
-
-
-_OPERATORS: dict[type, str] = {
-    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.USub: "-", ast.Not: "!", ast.And: "&&", ast.Or: "||",
-    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
+_OPERATORS: dict[type, tuple[str, Callable[..., Any]]] = {
+    ast.Add: ("+", operator.add), ast.Sub: ("-", operator.sub), ast.Mult: ("*", operator.mul),
+    ast.Div: ("/", operator.truediv), ast.USub: ("-", operator.neg), ast.Not: ("!", operator.not_),
+    ast.Lt: ("<", operator.lt), ast.LtE: ("<=", operator.le), ast.Gt: (">", operator.gt),
+    ast.GtE: (">=", operator.ge), ast.Eq: ("==", operator.eq), ast.NotEq: ("!=", operator.ne),
 }  # fmt: skip
 
 _LARGER = {min: "<", builtins.max: ">", compiled_math.minimum: "<", compiled_math.maximum: ">"}
@@ -55,49 +50,23 @@ _LARGER = {min: "<", builtins.max: ">", compiled_math.minimum: "<", compiled_mat
 class Loops:
     """Source of C functions, each in front of those that call it."""
 
-    def __init__(self, writer: Writer) -> None:
-        self.writer = writer
+    def __init__(self, writer: Writer, structs: dict[np.dtype, str] | None = None) -> None:
+        self.writer, self.structs = writer, structs or {}
         self.functions: list[str] = []
         self._made: dict[Any, tuple[str, list[bool], Any]] = {}
 
     def add(self, kernel: Any, arguments: tuple[Any, ...]) -> tuple[str, list[bool], Any]:
         """Write a kernel for arguments like these; return its name, which of their numbers it takes, and its result."""
-        key = kernel, _kinds(arguments)
+        straight = kernel.py_func.__module__ == surfaces.__name__
+        if straight:
+            arguments = tuple(Fixed(each) if isinstance(each, (int, float)) else each for each in arguments)
+        key = kernel, kinds_of(arguments)
         if key not in self._made:
-            own = _Function(self, kernel, arguments)
-            self.functions.append(own.source)
+            own = (_Traced if straight else _Translated)(self, kernel, arguments)
+            own.name += "_again" * sum(own.name == name for name, _, _ in self._made.values())
+            self.functions.append(own.source())
             self._made[key] = own.name, own.taken, own.result
         return self._made[key]
-
-
-def leaves(value: Any) -> Iterator[Any]:
-    """Yield the numbers and arrays of nested records."""
-    if isinstance(value, tuple) and not isinstance(value, (Scalar, Fixed, Array)):
-        for each in value:
-            yield from leaves(each)
-    else:
-        yield value
-
-
-def _mapped(value: Any, change: Callable[[Any], Any]) -> Any:
-    """Return nested records with their leaves changed, in order."""
-    if isinstance(value, tuple) and not isinstance(value, (Scalar, Fixed, Array)):
-        items = [_mapped(each, change) for each in value]
-        return type(value)(*items) if hasattr(value, "_fields") else tuple(items)
-    return change(value)
-
-
-def _kinds(value: Any) -> Any:
-    """Return what tells functions of such arguments apart."""
-    return tuple(
-        each if isinstance(each, Fixed) or getattr(each, "fixed", False) else _kind(each) for each in leaves(value)
-    )
-
-
-def _kind(value: Any) -> Any:
-    if isinstance(value, (Scalar, Array)):
-        return value.kind, getattr(value, "shape", None)
-    return "real" if isinstance(getattr(value, "value", value), float) else "int", None
 
 
 class _Function:
@@ -105,26 +74,31 @@ class _Function:
 
     def __init__(self, loops: Loops, kernel: Any, arguments: tuple[Any, ...]) -> None:
         own = kernel.py_func
-        self.loops, self.space, self.lines, self.locals = loops, own.__globals__, [], {}
+        self.loops, self.kernel, self.space, self.result = loops, kernel, own.__globals__, None
         self.name = f"{own.__module__.rpartition('.')[2]}_{own.__name__.strip('_')}"
-        tree: Any = ast.parse(textwrap.dedent(inspect.getsource(own))).body[0]
-        parameters, self.result, self.indent = [], None, "    "
-        self.names: dict[str, Any] = {}
-        for argument, value in zip(tree.args.args, arguments, strict=True):
-            self.names[argument.arg] = self._parameter(argument.arg, value, parameters)
-        for statement in tree.body:
-            self._do(statement)
+        self.lines: list[str] = []
+        self.locals: dict[str, str] = {}
+        self.indent, self._parameters = "    ", []
+        given = zip(inspect.signature(own).parameters, arguments, strict=True)
+        self.names: dict[str, Any] = {name: self._parameter(name, value, self._parameters) for name, value in given}
+        self._write()
         body = "\n".join(self.lines)
-        self.taken = [text is not None and bool(re.search(rf"\b{name}\b", body)) for name, text in parameters]
-        head = [text for (_, text), taken in zip(parameters, self.taken, strict=True) if taken]
-        kind = "void" if self.result is None else self.result.kind if isinstance(self.result, Scalar) else "void"
-        head += ["real *result"] if isinstance(self.result, tuple) and kind == "void" else []
+        self.taken = [text is not None and bool(re.search(rf"\b{name}\b", body)) for name, text in self._parameters]
+
+    def _write(self) -> None:
+        raise NotImplementedError
+
+    def source(self) -> str:
+        """Return the source of the function."""
+        head = [text for (_, text), taken in zip(self._parameters, self.taken, strict=True) if text and taken]
+        head += ["real *result"] if not isinstance(self.result, (Scalar, type(None))) else []
         declared = []
         for each in ("real", "int"):
             names = [name for name, own in self.locals.items() if own == each]
             declared += [f"    {each} {', '.join(names)};"] if names else []
         lines = self.lines[: -1 if self.lines[-1] == "    return;" else None]
-        self.source = "\n".join([f"static {kind} {self.name}({', '.join(head)})", "{", *declared, *lines, "}"])
+        kind = self.result.kind if isinstance(self.result, Scalar) else "void"
+        return "\n".join([f"static {kind} {self.name}({', '.join(head)})", "{", *declared, *lines, "}"])
 
     def _parameter(self, name: str, value: Any, parameters: list[tuple[str, str | None]]) -> Any:
         count = len(list(leaves(value)))
@@ -135,17 +109,64 @@ class _Function:
             if isinstance(each, Fixed) or getattr(each, "fixed", False):
                 parameters.append((own, None))
                 return each
-            kind, _ = _kind(each)
-            parameters.append((own, f"{kind} {'*' if isinstance(each, Array) else ''}{own}"))
-            return each._replace(text=own) if isinstance(each, Array) else Scalar(own, kind)
+            kind, _ = kind_of(each)
+            points = isinstance(each, (Array, Record))
+            parameters.append((own, f"{self.loops.structs.get(kind, kind)} {'*' if points else ''}{own}"))
+            return each._replace(text=own) if points else Scalar(own, kind)
 
         first = len(parameters)
-        return _mapped(value, named)
+        return mapped(value, named)
 
-    # ------------------------------------------------------------------ statements
+    def _returned(self, value: Any) -> None:
+        """Write numbers to the places of the result."""
+        for i, each in enumerate(leaves(value)):
+            self._line(f"result[{i}] = {self._of(each)};")
+        places = iter(f"result[{i}]" for i in range(len(list(leaves(value)))))
+        self.result = mapped(value, lambda _: Scalar(next(places)))
 
     def _line(self, text: str) -> None:
         self.lines.append(self.indent + text)
+
+    def _of(self, value: Any) -> str:
+        return value.text if isinstance(value, (Scalar, Array, Record)) else self.loops.writer.constant(plain(value))
+
+
+class _Traced(_Function):
+    """A kernel of straight lines."""
+
+    def _write(self) -> None:
+        rows: dict[str, list[Any]] = {}
+
+        def seen(trace: Trace, value: Any) -> Any:
+            if isinstance(value, Array) and not value.fixed:
+                return rows.setdefault(value.text, [0.0] * math.prod(value.shape))
+            if isinstance(value, Array):
+                return Table(trace, value.text)
+            return Number(trace, value.text, value.kind) if isinstance(value, Scalar) else plain(value)
+
+        def call(trace: Trace) -> Any:
+            nonlocal result
+            result = twin(self.kernel)(*(seen(trace, each) for each in self.names.values()))
+            return (() if result is None else result, *map(tuple, rows.values()))
+
+        result: Any = None
+        block = traced(call)
+        count = 0 if result is None else len(block.results) - sum(map(len, rows.values()))
+        outputs = [f"result[{i}]" for i in range(count)]
+        outputs += [f"{name}[{i}]" for name, row in rows.items() for i in range(len(row))]
+        self.lines += self.loops.writer.lines(block, outputs)
+        self.result = tuple(map(Scalar, outputs[:count])) or None
+
+
+class _Translated(_Function):
+    """A kernel with loops."""
+
+    def _write(self) -> None:
+        tree: Any = ast.parse(textwrap.dedent(inspect.getsource(self.kernel.py_func))).body[0]
+        for statement in tree.body:
+            self._do(statement)
+
+    # ------------------------------------------------------------------ statements
 
     def _block(self, statements: list[ast.stmt]) -> None:
         self.indent += "    "
@@ -164,7 +185,13 @@ class _Function:
         self._line("break;")
 
     def _if(self, node: ast.If) -> None:
-        self._line(f"if ({self._text(node.test)}) {{")
+        asked = self._value(node.test)
+        if not isinstance(asked, Scalar):
+            for each in node.body if asked else node.orelse:
+                self._do(each)
+            return
+        whole = asked.text.startswith("(") and asked.text.endswith(")")
+        self._line(f"if {asked.text if whole else f'({asked.text})'} {{")
         self._block(node.body)
         if node.orelse:
             self._line("} else {")
@@ -188,15 +215,11 @@ class _Function:
             self._line("return;")
             return
         value = self._value(node.value)
-        parts = list(leaves(value))
-        if isinstance(value, tuple) and not isinstance(value, (Scalar, Fixed)):
-            places = iter(f"result[{i}]" for i in range(len(parts)))
-            for i, each in enumerate(parts):
-                self._line(f"result[{i}] = {self._of(each)};")
-            self.result = _mapped(value, lambda _: Scalar(next(places)))
+        if isinstance(value, tuple) and not isinstance(value, LEAVES):
+            self._returned(value)
             self._line("return;")
         else:
-            self.result = Scalar("", _kind(value)[0])
+            self.result = Scalar("", kind_of(value)[0])
             self._line(f"return {self._of(value)};")
 
     def _assign(self, node: ast.Assign) -> None:
@@ -209,13 +232,13 @@ class _Function:
         """Assign a value to names and places, all at once."""
         pairs = [(target, value)] if not isinstance(target, ast.Tuple) else list(zip(target.elts, value, strict=True))
         if len(pairs) > 1 and self._depend(pairs):
-            pairs = [(each, _mapped(part, self._kept)) for each, part in pairs]
+            pairs = [(each, mapped(part, self._kept)) for each, part in pairs]
         for each, part in pairs:
-            if isinstance(each, ast.Subscript):
+            if not isinstance(each, ast.Name):
                 self._line(f"{self._text(each)} = {self._of(part)};")
-            elif isinstance(part, Array):
+            elif isinstance(part, (Array, Record)):
                 self.names[each.id] = part
-            else:
+            elif each.id != "_":
                 self._assigned(each.id, part)
 
     def _depend(self, pairs: list[tuple[Any, Any]]) -> bool:
@@ -233,7 +256,7 @@ class _Function:
         count = iter(range(len(parts)))
         self._declare(
             name,
-            _mapped(value, lambda each: Scalar(name if len(parts) == 1 else f"{name}_{next(count)}", _kind(each)[0])),
+            mapped(value, lambda each: Scalar(name if len(parts) == 1 else f"{name}_{next(count)}", kind_of(each)[0])),
         )
         for own, each in zip(leaves(self.names[name]), parts, strict=True):
             self._line(f"{own.text} = {self._of(each)};")
@@ -253,9 +276,6 @@ class _Function:
 
     # ------------------------------------------------------------------ expressions
 
-    def _of(self, value: Any) -> str:
-        return value.text if isinstance(value, (Scalar, Array)) else self.loops.writer.constant(_plain(value))
-
     def _text(self, node: Any) -> str:
         return self._of(self._value(node))
 
@@ -269,27 +289,42 @@ class _Function:
         return self.names.get(node.id, self.space.get(node.id, getattr(builtins, node.id, None)))
 
     def _value_of_attribute(self, node: ast.Attribute) -> Any:
-        return getattr(self._value(node.value), node.attr)
+        own = self._value(node.value)
+        if not isinstance(own, Record):
+            return getattr(own, node.attr)
+        kind = own.kind[node.attr]
+        name, number = f"{own.text}->{node.attr}", "real" if kind.base.kind == "f" else "int"
+        return Array(name, kind.shape, number) if kind.shape else Scalar(name, number)
 
     def _value_of_tuple(self, node: ast.Tuple) -> Any:
         return tuple(self._value(each) for each in node.elts)
 
     def _value_of_subscript(self, node: ast.Subscript) -> Any:
         own = self._value(node.value)
-        places = [self._value(each) for each in getattr(node.slice, "elts", [node.slice])]
+        last = getattr(node.slice, "elts", [node.slice])[-1]
+        parts = [*getattr(node.slice, "elts", [node.slice])[:-1], last.lower if isinstance(last, ast.Slice) else last]
+        places = [self._value(each) for each in parts]
         if not isinstance(own, Array):
             return own[places[0]]
-        at, rest = "", own.shape[len(places) :]
-        for place, length in zip(places, (*own.shape[1:], 1), strict=False):
-            at = f"({at}{self._of(place)}) * {length}" if length > 1 else f"{at}{self._of(place)}"
-            at += " + " if place is not places[-1] else ""
+        if own.kind in self.loops.structs:
+            return Record(f"({own.text} + {self._of(places[0])})", own.kind)
+        rest = own.shape[len(places) :]
+        if isinstance(last, ast.Slice):
+            end = own.shape[-1] if last.upper is None else self._value(last.upper)
+            rest = (end - places[-1],)
+        lengths = (math.prod(own.shape[i + 1 :]) for i in range(len(places)))
+        terms = [
+            self._of(each) if n == 1 else f"{n} * {self._of(each)}" for each, n in zip(places, lengths, strict=True)
+        ]
+        at = " + ".join(terms)
         return own._replace(text=f"({own.text} + {at})", shape=rest) if rest else Scalar(f"{own.text}[{at}]", own.kind)
 
     def _value_of_unaryop(self, node: ast.UnaryOp) -> Any:
         value = self._value(node.operand)
+        text, function = _OPERATORS[type(node.op)]
         if not isinstance(value, Scalar):
-            return -_plain(value)
-        return Scalar(f"({_OPERATORS[type(node.op)]}{value.text})", value.kind)
+            return function(plain(value))
+        return Scalar(f"({text}{value.text})", value.kind)
 
     def _value_of_binop(self, node: ast.BinOp) -> Any:
         a, b = self._value(node.left), self._value(node.right)
@@ -298,32 +333,38 @@ class _Function:
             return Scalar(f"({a.text} * {a.text})")
         return self._joined(type(node.op), a, b)
 
-    def _joined(self, operator: type, a: Any, b: Any) -> Any:
-        kinds = {_kind(a)[0], _kind(b)[0]}
+    def _joined(self, operation: type, a: Any, b: Any) -> Any:
+        kinds, (text, function) = {kind_of(a)[0], kind_of(b)[0]}, _OPERATORS[operation]
         if not isinstance(a, Scalar) and not isinstance(b, Scalar):
-            code = compile(ast.fix_missing_locations(ast.Expression(ast.BinOp(
-                ast.Constant(_plain(a)), operator(), ast.Constant(_plain(b))))), "", "eval")  # fmt: skip
-            return eval(code)
+            return function(plain(a), plain(b))
         if "real" in kinds:
-            a, b = (float(_plain(each)) if not isinstance(each, Scalar) else each for each in (a, b))
-        return Scalar(f"({self._of(a)} {_OPERATORS[operator]} {self._of(b)})", "real" if "real" in kinds else "int")
+            a, b = (each if isinstance(each, Scalar) else float(plain(each)) for each in (a, b))
+        compares = issubclass(operation, ast.cmpop) or "real" not in kinds
+        return Scalar(f"({self._of(a)} {text} {self._of(b)})", "int" if compares else "real")
 
     def _value_of_compare(self, node: ast.Compare) -> Any:
+        if isinstance(node.ops[0], ast.In):
+            left, own = self._text(node.left), self._value(node.comparators[0])
+            return Scalar(f"({' || '.join(f'{left} == {self._of(each)}' for each in own)})", "int")
         parts = [self._value(each) for each in (node.left, *node.comparators)]
         pairs = zip(parts, node.ops, parts[1:], strict=False)
-        texts = [self._joined(type(operator), a, b).text for a, operator, b in pairs]
-        return Scalar(" && ".join(texts), "int") if len(texts) == 1 else Scalar(f"({' && '.join(texts)})", "int")
+        found = [self._joined(type(operation), a, b) for a, operation, b in pairs]
+        return found[0] if len(found) == 1 else Scalar(f"({' && '.join(map(self._of, found))})", "int")
 
     def _value_of_boolop(self, node: ast.BoolOp) -> Any:
-        return Scalar(f"({f' {_OPERATORS[type(node.op)]} '.join(map(self._text, node.values))})", "int")
+        text = " && " if isinstance(node.op, ast.And) else " || "
+        return Scalar(f"({text.join(map(self._text, node.values))})", "int")
 
     def _value_of_ifexp(self, node: ast.IfExp) -> Any:
-        asked, yes, no = self._kept(self._value(node.test)), self._value(node.body), self._value(node.orelse)
+        asked = self._kept(self._value(node.test))
+        if not isinstance(asked, Scalar):
+            return self._value(node.body if asked else node.orelse)
+        yes, no = self._value(node.body), self._value(node.orelse)
         others = iter(list(leaves(no)))
-        return _mapped(yes, lambda each: self._chosen(self._of(asked), each, next(others)))
+        return mapped(yes, lambda each: self._chosen(self._of(asked), each, next(others)))
 
     def _chosen(self, asked: str, a: Any, b: Any) -> Scalar:
-        return Scalar(f"({asked} ? {self._of(a)} : {self._of(b)})", _kind(a)[0])
+        return Scalar(f"({asked} ? {self._of(a)} : {self._of(b)})", kind_of(a)[0])
 
     def _value_of_call(self, node: ast.Call) -> Any:
         function, given = self._value(node.func), tuple(map(self._value, node.args))
@@ -335,6 +376,10 @@ class _Function:
             return Scalar(f"{name}{self.loops.writer.suffix}({', '.join(map(self._of, given))})")
         if isinstance(function, type):
             return function(*given)
+        if function is np.empty:
+            name = f"a{len(self.locals)}"
+            self.locals[f"{name}[{given[0]}]"] = "real"
+            return Array(name, (plain(given[0]),))
         name, taken, result = self.loops.add(function, given)
         texts = [self._of(each) for each, wanted in zip(leaves(given), taken, strict=True) if wanted]
         if isinstance(result, Scalar):
@@ -345,8 +390,4 @@ class _Function:
         own = f"r{len(self.lines)}"
         self.locals[f"{own}[{len(list(leaves(result)))}]"] = "real"
         self._line(f"{name}({', '.join([*texts, own])});")
-        return _mapped(result, lambda each: each._replace(text=each.text.replace("result", own)))
-
-
-def _plain(value: Any) -> Any:
-    return value.value if isinstance(value, Fixed) else value
+        return mapped(result, lambda each: each._replace(text=each.text.replace("result", own)))
