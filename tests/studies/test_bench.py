@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
+from planarfriction.cli import main
 from planarfriction.errors import InvalidValueError
 from planarfriction_studies import bench
 from planarfriction_studies.bench.measurement import line
@@ -64,3 +66,11 @@ def test_what_an_experiment_found_is_put_below_its_mark(pages):
     found = pages["with_verdicts"](page, {"drift": "It drifts."})
     assert found == page.replace("Old\nwords.", "It drifts.")
     assert pages["with_verdicts"](found, {"drift": "It drifts."}) == found
+
+
+@pytest.mark.warp
+def test_warp_prints_nothing_beside_the_json(capsys):
+    warp = pytest.importorskip("warp", reason="needs the extra [warp]")
+    warp.config.log_level = 0  # as a user's process has it; Warp says what it loads on stdout
+    assert main(["bench", "--only", "warp.step.reduced", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)[0]["name"] == "warp.step.reduced"

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import logging
 import statistics
 import time
 from collections.abc import Callable
@@ -152,6 +153,7 @@ def mujoco_warp(full: bool, scene: MujocoScene) -> Measurement:
     import mujoco_warp as mjw
     import warp as wp
 
+    wp.config.log_level = logging.ERROR  # it reports what it compiles
     text = scene.text(Native(cone="pyramidal", impratio=1.0, condim=1), 2e-3, "Euler")
     spec = mujoco.MjSpec.from_string(text)
     patches = [adapter.PatchContact(scene.model, site=site, geoms=geoms) for site, geoms in scene.patches]

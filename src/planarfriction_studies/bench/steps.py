@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import logging
 from collections.abc import Callable
 from typing import Any
 
@@ -188,6 +189,7 @@ def warp_step(full: bool, kind: type[ReducedModel] | type[ReducedModelPublished]
     front: Any = importlib.import_module("planarfriction.warp")
     import warp as wp
 
+    wp.config.log_level = logging.ERROR  # it reports what it compiles
     count, model = 1000, kind(disc(), law())
     friction, twists = front.Model(model, contacts=count, device="cpu"), mixed_twists(count)
     states, new, wrench = friction.rest(), friction.rest(), wp.zeros((count, 3), device="cpu")
@@ -207,6 +209,7 @@ def warp_coupled(full: bool) -> Measurement:
     front: Any = importlib.import_module("planarfriction.warp")
     import warp as wp
 
+    wp.config.log_level = logging.ERROR  # it reports what it compiles
     count, dt, model = 1000, 1e-3, ReducedModel(disc(), law())
     friction = front.CoupledPatches([model] * 4, worlds=count, device="cpu")
     shapes = (count, 4, 3), (count, 4), (count, 4, 3), (count, 12, 12)
