@@ -145,7 +145,7 @@ class _FirstSlip:
     def __init__(self, parts: Parts, unit: float) -> None:
         count = len(parts)
         self.parts, self.unit = parts, unit
-        self.numbers, self.done = np.full((count, 6), np.nan), np.zeros(count, bool)
+        self.numbers, self.done = np.full((count, 3, 3), np.nan), np.zeros(count, bool)
         self.crossed, self.began, self.seen = np.full((3, count), np.nan)
         self.alarms, self._slips, self._path, self.rest = np.zeros(count), np.zeros(count, bool), np.zeros(count), 0.0
 
@@ -159,9 +159,10 @@ class _FirstSlip:
         over = (arrived >= self.crossed) | (~np.isnan(self.seen) & ~slips)
         now = over & ~self.done
         radius = self.unit * self.parts.radius * 5.0**self.parts.growth
-        mean = np.stack([e.mu_c, e.radius], axis=-1) / np.stack([self.parts.mu_c, radius], axis=-1)
-        sd = np.sqrt(np.diagonal(e.covariance, axis1=-2, axis2=-1))[:, (0, 2)]
-        self.numbers[now] = np.concatenate([np.log(mean), sd, e.determined[:, (0, 2)]], axis=-1)[now]
+        mu_c = self.parts.mu_c
+        error = np.log([e.mu_c / mu_c, e.mu_s / (mu_c * self.parts.mu_ratio), e.radius / radius]).T
+        sd = np.sqrt(np.diagonal(e.covariance, axis1=-2, axis2=-1))
+        self.numbers[now] = np.stack([error, sd, e.determined], axis=-1)[now]
         self.done |= over
         # an alarm is false if the part has moved by less than 20 um since it was last seen to stick
         self.alarms += slips & ~self._slips & (np.abs(path - self._path) < 2e-5)
@@ -169,7 +170,7 @@ class _FirstSlip:
         self._slips = slips
 
     def found(self) -> dict[str, np.ndarray]:
-        """Return the errors of the logs of mu_c and radius, their deviations, what was determined, delays, alarms."""
+        """Return errors of the logs of mu_c, mu_s, radius, deviations, determined ones `[P, 3, 3]`; delays, alarms."""
         late = self.seen - self.began - self.parts.delay
         return {"first": self.numbers, "late": late, "alarms": self.alarms}
 
@@ -221,17 +222,20 @@ def _task(task: str, base: Parts, seed: int, kind: int) -> tuple[Parts, Any, flo
 def _shares(runs: dict[tuple[str, bool], dict[str, np.ndarray]]) -> dict[str, Any]:
     """Return the numbers of the table."""
     hold, rule = runs["hold", True], runs["hold", False]
-    error, sd, sure = hold["first"][:, 0], hold["first"][:, 2], hold["first"][:, 4] > 0.0
-    seen = np.isfinite(error)
-    right = np.abs(error) <= np.log(1.05)
-    table: dict[str, Any] = {
-        "slipped": seen.mean(),
-        "coverage_95": _share(np.abs(error[seen]) <= 1.96 * sd[seen]),
-        "mu_c_within_5_percent": _share((right | ~sure)[seen]),
-        "mu_c_determined": _share(sure[seen]),
-        "mu_c_median_error": np.median(np.abs(error[seen])) if seen.any() else 0.0,
+    seen = np.isfinite(hold["first"][:, 0, 0])
+    table: dict[str, Any] = {"slipped": seen.mean()}
+    for name, (error, sd, sure) in zip(("mu_c", "mu_s", "radius"), hold["first"][seen].transpose(1, 2, 0), strict=True):
+        prefix = "" if name == "mu_c" else f"{name}_"
+        right = np.abs(error) <= np.log(1.05)
+        table |= {
+            f"{prefix}coverage_95": _share(np.abs(error) <= 1.96 * sd),
+            f"{name}_within_5_percent": _share(right | (sure == 0.0)),
+            f"{name}_determined": _share(sure),
+            f"{name}_median_error": np.median(np.abs(error)) if len(error) else 0.0,
+        }
+    table |= {
         "detected_within_20_ms": _share(hold["late"][seen] <= 0.02),
-        "false_alarms_per_minute": hold["alarms"].sum() / (len(error) * HOLD_STEPS * DT / 60.0),
+        "false_alarms_per_minute": hold["alarms"].sum() / (len(seen) * HOLD_STEPS * DT / 60.0),
         "drops": int(_dropped(hold).sum()),
         "rule_drops": int(_dropped(rule).sum()),
         "grip_saved": 1.0 - hold["grip"].sum() / rule["grip"].sum(),
