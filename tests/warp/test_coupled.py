@@ -177,19 +177,22 @@ def test_parameters():
 
 
 def test_moments():
-    """The pressure of a patch of three states follows moments, in a patch of another size too."""
-    model = pf.ReducedModelPublished(SHAPES[0], LAW, surface=pf.LimitSurfaceEllipsoid(SHAPES[0]))
-    both = problem()[1]
-    host = HostStep(*(each[:, :1] for each in both[:3]), both.twist_response[:, :3, :3], both.load_response[:, :1, :3])
-    host = host._replace(moments=np.array([[[0.003, -0.002]], [[0.0, 0.01]], [[0.0, 0.0]]]))
-    kernel = front.CoupledPatches([model], worlds=3, parameters={"scale": 1.5}, dtype=wp.float64, device="cpu")
-    results, state = kernel.results(), np.zeros((3, 3))
-    kernel.step(array(wp.float64, state), given(wp.float64, host), 1e-3, results)
-    larger = pf.ContactPatch.disc(0.015, cells=15)
-    same = CoupledPatches([pf.ReducedModelPublished(larger, LAW, surface=pf.LimitSurfaceEllipsoid(larger))])
-    expected = same.step(state, host, 1e-3)
-    assert results.wrench.numpy() == pytest.approx(expected.wrench, rel=1e-6)
-    assert len({round(each, 6) for each in expected.wrench[:, 0, 0]}) == 3
+    """Pressures follow moments, in patches of another size too; not that of a patch that holds its own."""
+    shape, larger = SHAPES[0], pf.ContactPatch.disc(0.015, cells=15)
+    host = problem()[1]
+    moments = np.array([[[0.003, -0.002]], [[0.0, 0.01]], [[0.0, 0.0]]]) * [[1.0], [-0.5]]
+    given_ = {"worlds": 3, "parameters": {"scale": 1.5}, "dtype": wp.float64, "device": "cpu"}
+    for follows in (None, [False, True]):
+        kernel = front.CoupledPatches([pf.ReducedModel(shape, LAW, parts=1), pf.ReducedModel(shape, LAW)],
+                                      follows=follows, **given_)  # fmt: skip
+        results, start = kernel.results(), np.zeros((3, *kernel.state_shape))
+        kernel.step(array(wp.float64, start), given(wp.float64, host._replace(moments=moments)), 1e-3, results)
+        kernel.check()
+        same = CoupledPatches([pf.ReducedModel(larger, LAW, parts=1), pf.ReducedModel(larger, LAW)])
+        held = moments * [[follows is None], [True]]
+        expected = same.step(start, host._replace(moments=held), 1e-3)
+        assert results.wrench.numpy() == pytest.approx(expected.wrench, rel=1e-6)
+        assert len({round(each, 6) for each in expected.wrench[:, 1, 0]}) == 3
 
 
 def test_faint():
@@ -235,7 +238,7 @@ def test_bad_arrays(kernel):
     for words, change in {
         "normal_force must have shape": {"normal_force": single},
         "load_response must have shape": {"load_response": host.twist_response},
-        "moments must be None.* model 1": {"moments": array(wp.float64, np.zeros((3, 2, 2)))},
+        "moments must have shape": {"moments": array(wp.float64, np.zeros((3, 2)))},
     }.items():
         with pytest.raises(pf.FrictionError, match=words):
             kernel.step(state, host._replace(**change), 1e-3, results)
@@ -250,6 +253,7 @@ def test_bad_arrays(kernel):
     [
         ({"models": []}, "models must hold at least one"),
         ({"worlds": 0}, "worlds must"),
+        ({"follows": [True]}, "follows must hold one for each of 2 models, got 1"),
         ({"parameters": {"mu": 1.0}}, "mu"),
         ({"parameters": {"mu_c": np.ones(2)}}, r"mu_c must be a number or have shape \(3,\)"),
     ],

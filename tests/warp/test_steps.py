@@ -92,10 +92,12 @@ def test_parameters():
         assert wrench.numpy()[i] == pytest.approx(expected, rel=1e-9)
 
 
-def test_moments():
-    """The pressure of a patch of three states follows moments, in a patch of another size too."""
+@pytest.mark.parametrize("name", ["few", "published", "parts"])
+def test_moments(name):
+    """The pressure of a patch follows moments, in a patch of another size too."""
     scale, rng = np.array([1.0, 2.0, 0.5, 1.0]), np.random.default_rng(0)
-    friction = Model(MODELS["published"](), contacts=4, parameters={"scale": scale}, device="cpu", dtype=wp.float64)
+    model = MODELS[name]()
+    friction = Model(model, contacts=4, parameters={"scale": scale}, device="cpu", dtype=wp.float64)
     twist, load = rng.normal(size=(4, 3)) * [1e-3, 1e-3, 0.3], np.array([1.0, 2.0, 3.0, 0.0])
     moments, (new, wrench) = load[:, None] * rng.normal(size=(4, 2)) * 5e-3, outputs(friction)
     given = arrays(wp.float64, twist, load)
@@ -103,14 +105,13 @@ def test_moments():
         friction.step(new, *given, 1e-3, new, wrench, moments=wp.array(moments, dtype=wp.float64, device="cpu"))
     friction.check()
     for i, size in enumerate(scale):
-        own = pf.ReducedModelPublished(pf.ContactPatch.disc(0.01 * size), LAW)
+        options = {"parts": model.parts} if name == "parts" else {}
+        own = type(model)(pf.ContactPatch.disc(0.01 * size), LAW, **options)
         state = own.rest()
         for _ in range(3):
             state, expected = own.step(state, twist[i], load[i], 1e-3, moments=moments[i])
-        assert wrench.numpy()[i] == pytest.approx(expected, rel=1e-9)
-    few = Model(MODELS["few"](), contacts=4, device="cpu", dtype=wp.float64)
-    with pytest.raises(pf.FrictionError, match="moments must be None"):
-        few.step(few.rest(), *given, 1e-3, *outputs(few), moments=wp.array(moments, dtype=wp.float64, device="cpu"))
+        # two of three parts press along a line, where the softness of `kernels.tilt` magnifies rounding
+        assert wrench.numpy()[i] == pytest.approx(expected, rel=1e-5 if name == "parts" else 1e-9)
 
 
 def test_written_parameters():

@@ -113,7 +113,7 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, grip: dict, ki
     functions = _functions(writer, pieces, first)
     places, words = model.compiled.points()
     moves, places = not words, dict(zip(("place_x", "place_y"), places.T, strict=True))
-    functions["tilt"] = _tilt(pieces.count)
+    functions["tilt"] = tilt_of(pieces.count)
     tables = _tables(writer, pieces.tables | places, functions) | ({} if slip is None else _tables(writer, slip.tables))
     step = functions["step"].splitlines()
     vector = Writer(precision, own=precision == "double")
@@ -191,7 +191,7 @@ def _functions(writer: Writer, pieces: Pieces, first: str) -> dict[str, str]:
     return {name: unused[name] + text for name, text in texts.items()}
 
 
-def _tilt(count: int) -> str:
+def tilt_of(count: int) -> str:
     """Return the functions that shift shares of the load to a centre of pressure, always in double precision."""
     loops, shares = Loops(Writer()), Array("shares", (count,))
     x, y = (Array(name, (count,), fixed=True) for name in ("place_x", "place_y"))

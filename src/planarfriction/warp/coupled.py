@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,11 +12,10 @@ import warp as wp
 from planarfriction import coupling, validation
 from planarfriction.coupling import CoupledStep, HostStep
 from planarfriction.errors import InvalidValueError
-from planarfriction.export.pieces import pieces_of
 from planarfriction.models import FrictionModel
 from planarfriction.warp import arrays
 from planarfriction.warp.kernels import Problems, coupled_kernel_of
-from planarfriction.warp.source import coupled_source_of
+from planarfriction.warp.source import coupled_source_of, described
 
 WRONG = {1: "parameters", 2: "state and host"}
 """Bits of `CoupledPatches.status`."""
@@ -35,6 +34,8 @@ class CoupledPatches:
         `ReducedModelPublished` with a law of LuGre bristles.
     worlds
         Number of worlds.
+    follows
+        True for each patch whose pressure follows the moments of a host, by default all.
     parameters
         Numbers of the laws by name, and `scale`, the size of a patch as a multiple of its model's: a number, or arrays
         [worlds] or [worlds, k]. What is not given is the models'.
@@ -51,6 +52,7 @@ class CoupledPatches:
         models: Sequence[FrictionModel],
         *,
         worlds: int,
+        follows: Sequence[bool] | None = None,
         parameters: Mapping[str, Any] | None = None,
         device: Any = None,
         dtype: Any = wp.float32,
@@ -63,13 +65,12 @@ class CoupledPatches:
         self.device, self.dtype = wp.get_device(device), dtype
         known = list({id(model): model for model in self.models}.values())
         which = [next(i for i, each in enumerate(known) if each is model) for model in self.models]
-        pieces = [pieces_of(model) for model in known]
+        if follows is not None and len(follows) != len(which):
+            raise InvalidValueError("follows", f"hold one for each of {len(which)} models", len(follows))
+        kinds = [described(model) for model in known]
+        pieces = [each.pieces for each in kinds]
         radii = [float(np.sqrt((model.patch.positions**2).sum(1).mean())) or 1.0 for model in self.models]
-        points = [model.compiled.points()[0] for model in self.models]
-        self.follows = tuple(len(each) == 1 for each in points)
-        """True for patches whose pressure can follow moments."""
-        centres = [each[0] if len(each) == 1 else [] for each in points]
-        source = coupled_source_of(pieces, which, radii, centres, precision)
+        source = coupled_source_of(kinds, which, follows or [True] * len(which), radii, precision)
         self.state_shape = (sum(math.prod(model.state_shape) for model in self.models),)
         """Shape of the state of the patches of a world."""
         self.names = tuple((*pieces[kind].parameters, "scale") for kind in which)
@@ -105,6 +106,7 @@ class CoupledPatches:
         *,
         tolerance: float = coupling.TOLERANCE,
         iterations: int | None = None,
+        skip: wp.array[Any] | None = None,
     ) -> None:
         """Solve the steps of all worlds, in one kernel without allocation or synchronisation.
 
@@ -113,38 +115,10 @@ class CoupledPatches:
         that goes into its twists, if that is more than the `tolerance` [m/s]. A world with numbers that are not finite
         or out of range keeps its state, has no wrenches and -1 `iterations` (see `check`).
 
-        Pressures follow moments of patches with three states.
+        Worlds whose `skip` is not 0 are left out.
 
-        Raises InvalidValueError for arrays of another shape, precision or device, moments of other patches, and a step
-        or a tolerance out of range.
-        """
-        if host.moments is not None:
-            self.check_follows(range(len(self.models)))
-        self.launch(state, host, dt, results, tolerance, iterations)
-
-    def check_follows(self, patches: Iterable[int]) -> None:
-        """Check that the pressure of `patches` can follow moments here.
-
-        Raises InvalidValueError for patches of models with more than three states.
-        """
-        for p in patches:
-            if not self.follows[p]:
-                rule = "be None, and pressure fixed: of patches with more than three states it does not follow in Warp"
-                raise InvalidValueError("moments", rule, f"model {p}: {type(self.models[p]).__name__}")
-
-    def launch(
-        self,
-        state: wp.array[Any],
-        host: HostStep,
-        dt: float,
-        results: CoupledStep,
-        tolerance: float = coupling.TOLERANCE,
-        iterations: int | None = None,
-        skip: wp.array[Any] | None = None,
-    ) -> None:
-        """Step as `step` does, but not worlds whose `skip` is not 0; of patches only those that can follow moments do.
-
-        Raises InvalidValueError as `step` does, for arrays and numbers.
+        Raises InvalidValueError for arrays of another shape, precision or device, and a step or a tolerance out of
+        range.
         """
         if results.state is state:
             raise InvalidValueError("results.state", "be another array than state", "the same")

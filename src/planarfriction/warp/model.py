@@ -8,11 +8,9 @@ from typing import Any
 import warp as wp
 
 from planarfriction import validation
-from planarfriction.errors import InvalidValueError
-from planarfriction.export.pieces import pieces_of
 from planarfriction.warp import arrays
 from planarfriction.warp.kernels import Batch, kernel_of
-from planarfriction.warp.source import source_of
+from planarfriction.warp.source import described, source_of
 
 WRONG = {1: "parameters", 2: "state, twist and normal_force"}
 """Bits of `Model.status`."""
@@ -51,10 +49,8 @@ class Model:
         device: Any = None,
         dtype: Any = wp.float32,
     ) -> None:
-        pieces = pieces_of(model)
-        points = model.compiled.points()[0]
-        self._follows = len(points) == 1
-        source = source_of(pieces, points[0].tolist() if self._follows else [], arrays.precision_of(dtype))
+        own = described(model)
+        pieces, source = own.pieces, source_of(own, arrays.precision_of(dtype))
         self.contacts = validation.count("contacts", contacts, at_most=2**31 - 1)
         self.device, self.dtype = wp.get_device(device), dtype
         self.names = (*pieces.parameters, "scale")
@@ -92,11 +88,10 @@ class Model:
         `wrench` [contacts, 3] at the end of the step. A contact without normal force forgets its state. A contact with
         numbers that are not finite or out of range keeps its state and has no wrench (see `check`).
 
-        The pressure of patches with three states follows the `moments` [contacts, 2] [N m] of the normal forces about
-        the origin (see `FrictionModel.step`).
+        The pressure follows the `moments` [contacts, 2] [N m] of the normal forces about the origin (see
+        `FrictionModel.step`).
 
-        Raises InvalidValueError for arrays of another shape, precision or device, moments of other patches, and a step
-        that is negative.
+        Raises InvalidValueError for arrays of another shape, precision or device, and a step that is negative.
         """
         self._launch((), state, twist, normal_force, dt, new_state, wrench, moments)
 
@@ -130,8 +125,6 @@ class Model:
     def _launch(
         self, steps: tuple[int, ...], state: Any, twist: Any, load: Any, dt: float, new: Any, wrench: Any, moments: Any
     ) -> None:
-        if moments is not None and not self._follows:
-            raise InvalidValueError("moments", "be None for a model with more than three states", "an array")
         along = (*steps, self.contacts)
         batch = Batch()
         batch.contacts, batch.steps, batch.rows = self.contacts, *(steps or (1,)), self.parameters.shape[0]

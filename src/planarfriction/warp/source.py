@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction.export.c_source import Writer
-from planarfriction.export.library import PRECISIONS, RANGES
-from planarfriction.export.pieces import Pieces
+from planarfriction.export.library import PRECISIONS, RANGES, tilt_of
+from planarfriction.export.pieces import Pieces, pieces_of
 from planarfriction.export.trace import Block, Number, Trace, traced
 from planarfriction.export.twins import twin
 from planarfriction.kernels import coupling
+from planarfriction.models import FrictionModel
 
 ROUNDING = {"double": (coupling.ROUNDING,) * 2, "float": (3e-7, 1e-5)}
 """Errors of a twist, in the largest speed that goes into it, by precision: below the first no step gets, and below the
@@ -29,32 +30,46 @@ class Source(NamedTuple):
     """Tables of whole numbers, one after another."""
 
 
-def source_of(pieces: Pieces, point: Sequence[float], precision: str) -> Source:
-    """Return the source of a step in single or double precision ("float", "double").
+class Described(NamedTuple):
+    """A model for the source."""
 
-    `point` is the centre [m] of a patch whose pressure can follow moments, empty for others.
+    pieces: Pieces
+    points: np.ndarray
+    """Cells or parts that share the load [n, 2] [m]."""
+    moves: bool
+    """True if the patch moves where their pressure cannot follow moments any further."""
+
+
+def described(model: FrictionModel) -> Described:
+    """Return the pieces of a model and the points that share its load.
+
+    Raises InvalidValueError for models without source (see `export_c`).
     """
-    (own,), numbers, places = _described([pieces], precision, slopes=False)
-    values = {"point": list(map(Writer(precision).constant, point)), "reach": own["largest"]}
-    return Source(_rendered("step.cpp.j2", own=own, **values), numbers, places)
+    points, words = model.compiled.points()
+    return Described(pieces_of(model), points, not words)
+
+
+def source_of(model: Described, precision: str) -> Source:
+    """Return the source of a step in single or double precision ("float", "double")."""
+    (own,), numbers, places = _described([model], precision, slopes=False)
+    return Source(_rendered("step.cpp.j2", own=own), numbers, places)
 
 
 def coupled_source_of(
-    models: Sequence[Pieces],
-    which: Sequence[int],
-    radii: Sequence[float],
-    points: Sequence[Sequence[float]],
-    precision: str,
+    models: Sequence[Described], which: Sequence[int], follows: Sequence[bool], radii: Sequence[float], precision: str
 ) -> Source:
     """Return the source of a step in contact space.
 
-    `which` are the models of the patches, `radii` their lever arms [m], `points` their centres [m], empty of patches
-    whose pressure cannot follow moments.
+    `which` are the models of the patches, `follows` tells whose pressure follows moments, `radii` are lever arms [m].
     """
     kinds, numbers, places = _described(models, precision, slopes=True)
-    columns = [len(models[kind].parameters) + 1 for kind in which]
-    states = [models[kind].count * models[kind].states for kind in which]
-    starts = {name: np.cumsum([0, *each]).tolist() for name, each in (("columns", columns), ("states", states))}
+    pieces = [models[kind].pieces for kind in which]
+    counts = {
+        "columns": [len(each.parameters) + 1 for each in pieces],
+        "states": [each.count * each.states for each in pieces],
+        "points": [each.count for each in pieces],
+    }
+    starts = {name: np.cumsum([0, *each]).tolist() for name, each in counts.items()}
     writer = Writer(precision)
     names = "SHORTENINGS", "JOINT", "ROUND", "STAGES", "SHORTER"
     text = _rendered(
@@ -64,8 +79,7 @@ def coupled_source_of(
         precision=precision,
         starts=starts,
         radii=[writer.constant(each) for each in radii],
-        points=[[writer.constant(each) for each in point] for point in points],
-        reach=writer.constant(PRECISIONS[precision]),
+        follows=follows,
         rounding=list(map(writer.constant, ROUNDING[precision])),
         shortening="\n".join(writer.lines(traced(_shortening), ["too_far", "share"], indent=" " * 16)),
         **{name.lower(): writer.constant(getattr(coupling, name)) for name in names},
@@ -79,24 +93,27 @@ def _shortening(trace: Trace) -> Any:
 
 
 def _described(
-    models: Sequence[Pieces], precision: str, slopes: bool
+    models: Sequence[Described], precision: str, slopes: bool
 ) -> tuple[list[dict[str, Any]], np.ndarray, np.ndarray]:
     """Return what a template needs of each model, and the tables of all of them."""
     writer, described = Writer(precision), []
     all_real: list[np.ndarray] = []
     all_whole: list[np.ndarray] = []
-    for pieces in models:
+    for pieces, points, moves in models:
         outputs = [f"next[{i}]" for i in range(pieces.states)] + [f"w[{i}]" for i in range(12 if slopes else 3)]
         block = _slopes_by_twist(pieces) if slopes else pieces.step
         lines = list(writer.lines(block, outputs, indent=" " * 12))
         read = {name: each for name, each in pieces.tables.items() if any(f"{name}[" in line for line in lines)}
         whole = {name: each for name, each in read.items() if each.dtype.kind == "i"}
-        real = {"share": pieces.tables["share"]} | {name: each for name, each in read.items() if name not in whole}
+        real = dict(zip(("place_x", "place_y"), points.T, strict=True)) | {"share": pieces.tables["share"]}
+        real |= {name: each for name, each in read.items() if name not in whole}
         described.append(
             {
                 "precision": precision,
                 "pieces": pieces,
                 "slopes": slopes,
+                "moves": moves,
+                "tilt": tilt_of(pieces.count).replace("static ", "CUDA_CALLABLE ").replace(")\n{", ") const\n{"),
                 "ranges": [RANGES[each] for each in pieces.parameters],
                 "largest": writer.constant(PRECISIONS[precision]),
                 "numbers": _placed(real, all_real),

@@ -49,16 +49,15 @@ class Friction:
     resets them too, of single worlds if asked.
 
     Raises `InvalidValueError` for an unsuitable integrator or cone, noslip iterations, sleeping, disabled actuation,
-    too little user data, names that are not in the model, pairs with friction of their own, models without source (see
-    `export_c`), and pressure that is to follow but cannot.
+    too little user data, names that are not in the model, pairs with friction of their own, and models without source
+    (see `export_c`).
 
     Parameters
     ----------
     m
         A model of MuJoCo.
     patches
-        Patches in it. The pressure of those whose model has three states may follow the contact forces; for others,
-        say `pressure="fixed"`.
+        Patches in it.
     worlds
         Number of environments.
     parameters
@@ -86,8 +85,8 @@ class Friction:
         _check(m, self.placed)
         worlds = data.nworld if data is not None else validation.count("worlds", worlds)
         own = _parameters(m, self.placed, worlds) | dict(parameters or {})
-        self.coupled = CoupledPatches([patch.model for patch in patches], worlds=worlds, parameters=own)
-        self._check_pressure()
+        models, follows = [patch.model for patch in patches], [each.follows for each in self.placed]
+        self.coupled = CoupledPatches(models, worlds=worlds, follows=follows, parameters=own)
         self.model = mjw.put_model(m) if model is None else model
         """Model of MuJoCo Warp."""
         self.data: Any = data
@@ -101,15 +100,6 @@ class Friction:
         self._memory = self.data.userdata if prepared else wp.zeros((worlds, size), dtype=float)
         self._at = memory(patches, m.nv, prepared or size)
         self._make(worlds)
-
-    def _check_pressure(self) -> None:
-        """Refuse patches whose pressure is to follow the contact forces, but cannot."""
-        for placed, follows in zip(self.placed, self.coupled.follows, strict=True):
-            if placed.follows and not follows:
-                rule = (
-                    f'be "fixed" between {" and ".join(placed.patch.geoms)}: in Warp that of three states alone follows'
-                )
-                raise InvalidValueError("pressure", rule, placed.patch.pressure)
 
     # ------------------------------------------------------------------ what the data hold
 
@@ -205,7 +195,7 @@ class Friction:
                 responses.respond,
                 *(patches, contacts, dynamics, frames, scratch, problem, int(i == 0), dt, d.qvel, d.qfrc_smooth),
             )
-            self.coupled.launch(self._state, self._host, self._dt, results, skip=scratch.done)
+            self.coupled.step(self._state, self._host, self._dt, results, skip=scratch.done)
             launch(
                 responses.settle,
                 *(contacts, dynamics, frames, scratch, problem, results.wrench, results.iterations, dt),
@@ -270,10 +260,8 @@ class Friction:
             "support": [each.bodies[0] for each in self.placed],
             "owner": [each.bodies[1] for each in self.placed],
             "at_contact": [int(each.at_contact) for each in self.placed],
-            "follows": [int(each.follows) for each in self.placed],
         }
         device, positions = self.coupled.device, [each.model.patch.positions for each in self.patches]
-        points = [each.model.compiled.points()[0] for each in self.patches]
         found = {name: wp.array(each, dtype=int, device=device) for name, each in columns.items()}
         radius = np.array([np.sqrt((each**2).sum(1).mean()) for each in positions])
         return _filled(
@@ -283,7 +271,6 @@ class Friction:
                 "count": len(self.patches),
                 "states": self.coupled.state_shape[0],
                 "radius": wp.array(radius, dtype=float, device=device),
-                "point": wp.array([each[0] for each in points], dtype=wp.vec2, device=device),
             },
         )
 

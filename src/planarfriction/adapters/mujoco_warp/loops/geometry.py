@@ -29,10 +29,7 @@ class Patches:
     owner: wp.array(dtype=int)
     support: wp.array(dtype=int)
     at_contact: wp.array(dtype=int)
-    follows: wp.array(dtype=int)
     radius: wp.array(dtype=float)
-    point: wp.array(dtype=wp.vec2)
-    """Centres of patches whose pressure is fixed."""
 
 
 @wp.struct

@@ -269,8 +269,8 @@ def write_loads(
                             out.load_response[w, p, e] = out.load_response[w, p, e] - float(share * s.answers[w, j, e])
         out.load[w, p] = wp.max(float(load), 0.0)
         if first_pass != 0:
-            s.pressed[w, p] = patches.point[p]
-            if patches.follows[p] != 0 and load > wp.float64(0.0):
+            s.pressed[w, p] = wp.vec2()
+            if load > wp.float64(0.0):
                 s.pressed[w, p] = moments / float(load)
         out.moments[w, p, 0] = s.pressed[w, p][1] * out.load[w, p]
         out.moments[w, p, 1] = -s.pressed[w, p][0] * out.load[w, p]
