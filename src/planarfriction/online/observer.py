@@ -153,7 +153,10 @@ class FrictionObserver:
         return estimate_of(self.take(measurement))
 
     def take(self, measurement: Measurement) -> np.ndarray:
-        """Take a sample of every part; return the compiled filter's records of what is known, one a part."""
+        """Take a sample of every part; return the compiled filter's records of what is known, one a part.
+
+        Raises InvalidValueError as `update` does.
+        """
         validation.instance("measurement", measurement, Measurement, "a Measurement")
         batch, state = self.state.shape[:-1], self.state.reshape(-1, kernels.STATE)
         velocity, samples = measurement.slip_velocity, np.empty((*batch, 8))
