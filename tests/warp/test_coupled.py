@@ -263,6 +263,22 @@ def test_bad_options(options, words):
         front.CoupledPatches(**{"models": PATCHES.models, "worlds": 3, "device": "cpu"} | options)
 
 
+def test_no_allocation(kernel, monkeypatch):
+    """A step neither makes an array nor waits, so that a CUDA graph can hold it."""
+    state, host = problem()
+    state, host, results = array(wp.float64, state), given(wp.float64, host), kernel.results()
+
+    def forbidden(*_, **__):
+        raise AssertionError("an allocation or synchronisation")
+
+    monkeypatch.setattr(wp.array, "__init__", forbidden)
+    for name in ("synchronize", "synchronize_device", "synchronize_stream", "copy"):
+        monkeypatch.setattr(wp, name, forbidden)
+    kernel.step(state, host, 1e-3, results)
+    with pytest.raises(AssertionError, match="allocation"):
+        kernel.results()
+
+
 def test_gpus(kernel, tmp_path):
     """The kernel compiles for GPUs on machines that have none."""
     wp.compile_aot_module(kernel.kernel.module, arch=[80], module_dir=tmp_path)
