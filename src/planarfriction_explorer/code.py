@@ -20,11 +20,12 @@ T_END = 1.0
 def python(state: State) -> str:
     """Return a script that prints the wrench of limit surface and ellipsoid, then that of the law in a simulation."""
     law, imported = _law(state.law)
+    twist, load = _typed(state)
     return f"""import planarfriction as pf
 {imported}
 patch = {_patch(state.drawing)}
 law = {law}
-twist, normal_force = {state.twist!r}, {state.normal_force!r}
+twist, normal_force = {twist}, {load}
 
 for surface in (pf.LimitSurfaceExact(patch), pf.LimitSurfaceEllipsoid(patch)):
     print(law.numbers.mu_c * normal_force * surface.wrench(twist))
@@ -46,7 +47,25 @@ def toml(state: State) -> str:
 def scene(state: State) -> Scene:
     """Return the scene that moves the patch with the twist of the state."""
     model = DistributedModel(state.drawing.patch, state.law)
-    return driven(model, twist=state.twist, normal_force=state.normal_force, at="origin", t_end=T_END)
+    twist, load = _typed(state)
+    return driven(model, twist=twist, normal_force=load, at="origin", t_end=T_END)
+
+
+def mujoco(state: State) -> str:
+    """Return a geom of MuJoCo whose sliding and torsional friction are the half axes of the ellipsoid."""
+    mu, torsion = state.law.numbers.mu_c, state.law.numbers.mu_c * state.drawing.patch.contact_radius()
+    return f"""<!-- MuJoCo alone: an ellipsoid with the half axes mu_c f_N and mu_c r f_N -->
+<geom condim="4" friction="{mu:.6g} {torsion:.6g} 0"/>
+
+<!-- The limit surface of this patch: planarfriction.adapters.mujoco.PatchContact,
+     with patch and law of the Python tab and pf.ReducedModel(patch, law) -->
+"""
+
+
+def _typed(state: State) -> tuple[tuple[float, ...], float]:
+    """Return twist and load with the six digits that somebody would type: a drag gives seventeen."""
+    twist = tuple(float(f"{each:.6g}") for each in state.twist)
+    return twist, float(f"{state.normal_force:.6g}")
 
 
 def _described(drawing: Drawing) -> dict[str, Any]:

@@ -18,15 +18,19 @@ TOOLS = {"Centre of rotation": "turn", "Velocity": "slide", "Brush": "brush", "E
 OWN = "own map"
 """Choice of the patch while it is none of the published ones."""
 
-UNITS = {
-    "v_s": "m/s",
-    "sigma_0": "1/m",
-    "sigma_1": "s/m",
-    "sigma_2": "s/m",
-    "creep_speed": "m/s",
-    "relaxation_time": "s",
+PARAMETERS = {
+    "mu_c": ("", "Kinetic friction over normal force"),
+    "mu_s": ("", "Static friction over normal force, at least mu_c"),
+    "v_s": ("m/s", "Stribeck velocity: sliding at which friction has fallen from mu_s towards mu_c"),
+    "gamma": ("", "Exponent of the Stribeck curve"),
+    "sigma_0": ("1/m", "Stiffness of the bristles per normal force"),
+    "sigma_1": ("s/m", "Damping of the bristles per normal force"),
+    "sigma_2": ("s/m", "Viscous friction per normal force"),
+    "elasto_plastic": ("", "Share of the full deflection below which bristles do not slip; empty: plain LuGre"),
+    "creep_speed": ("m/s", "Speed of creep under a constant force"),
+    "relaxation_time": ("s", "Time in which bristles relax"),
 }
-"""Units of the parameters of laws that have one."""
+"""Unit and meaning of the parameters of laws."""
 
 
 class Controls:
@@ -43,6 +47,8 @@ class Controls:
         self.pressure = widgets.FloatSlider(label="Pressure of the brush", start=0.1, end=1.0, step=0.1, value=1.0)
         self.law = widgets.Select(label="Law", options=list(LAWS), value=LAWS.name_of(state.law))
         self.load = widgets.FloatInput(label="Normal force [N]", value=state.normal_force, step=0.5)
+        self.mass = widgets.FloatInput(label="Mass of the part [g]", value=1e3 * state.mass, step=10.0)
+        self.lever = widgets.FloatInput(label="Off the middle by [mm]", value=1e3 * state.lever, step=1.0)
         vx, vy, omega = state.twist
         self.vx = widgets.FloatSlider(label="vx [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vx)
         self.vy = widgets.FloatSlider(label="vy [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vy)
@@ -62,10 +68,11 @@ class Controls:
         """Put up fields for the parameters of the law; empty ones have a default that depends on others."""
         fields = []
         for name, value in law_parameters(law).items():
-            unit = f" [{UNITS[name]}]" if name in UNITS else ""
+            unit, meaning = PARAMETERS.get(name, ("", ""))
             fields.append(
                 pn.widgets.FloatInput(
-                    label=name + unit,
+                    label=f"{name} [{unit}]" if unit else name,
+                    description=meaning or None,
                     value=value,
                     css_classes=["parameter", name],
                     tags=[name],
@@ -114,6 +121,8 @@ class Controls:
             self.law,
             self.parameters,
             self.load,
+            _heading("Held by two such contacts"),
+            pn.Row(self.mass, pn.Spacer(width=8), self.lever, sizing_mode="stretch_width"),
             _heading("Motion of the origin"),
             *(self.vx, self.vy, self.omega),
             stylesheets=[looks.SIDE],

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import panel as pn
-from bokeh.models import ColumnDataSource, LabelSet, NumeralTickFormatter
+from bokeh.models import ColumnDataSource, NumeralTickFormatter
 from bokeh.plotting import figure
 
 from planarfriction.plots.style import DISTRIBUTED, FEW, MOMENTS, PARTS, PUBLISHED
@@ -35,7 +35,7 @@ class LadderTab:
         self._live = Live(failed=self._say)
         self.status = pn.pane.HTML("")
         self.table = pn.pane.HTML("", styles=looks.grows(340))
-        self._source = ColumnDataSource({key: [] for key in ("seconds", "error", "name", "colour", "align", "offset")})
+        self._source = ColumnDataSource({key: [] for key in ("seconds", "error", "colour")})
         self.layout = pn.Column(
             pn.pane.HTML(_WORDS, sizing_mode="stretch_width"),
             self.status,
@@ -71,14 +71,10 @@ class LadderTab:
 
     def _show_rungs(self, rungs: list[Rung]) -> None:
         self.table.object = table(rungs) if rungs else ""
-        reference = next(iter(RUNGS))  # the most costly as a rule, at the right
         ran = [each for each in rungs if not math.isnan(each.error)]
         self._source.data = {
             "seconds": [1e3 * each.seconds for each in ran],
             "error": [100.0 * each.error for each in ran],
-            "name": [each.name for each in ran],
-            "align": ["right" if each.name == reference else "left" for each in ran],
-            "offset": [-9 if each.name == reference else 9 for each in ran],
             "colour": [_COLOURS[each.name] for each in ran],
         }
 
@@ -89,7 +85,9 @@ class LadderTab:
 def table(rungs: list[Rung]) -> str:
     """Return the ladder as HTML."""
     head = "".join(f"<th>{text}</th>" for text in _HEAD)
-    rows = "".join(f"<tr><td>{each.name}</td>{_cells(each)}</tr>" for each in rungs)
+    names = [f"<span style='color:{_COLOURS[each.name]}'>●</span> {each.name}" for each in rungs]
+    names = [f"<span style='color:{_COLOURS[each.name]}'>●</span> {each.name}" for each in rungs]
+    rows = "".join(f"<tr><td>{name}</td>{_cells(each)}</tr>" for name, each in zip(names, rungs, strict=True))
     return f"{looks.TABLE}<table id='ladder'><tr>{head}</tr>{rows}</table>"
 
 
@@ -111,16 +109,7 @@ def _chart(source: ColumnDataSource) -> Any:
         y_axis_label="error [% of μc fN]",
     )
     looks.tidy(plot)
-    plot.y_range.range_padding = 0.25  # room for the names
-    plot.x_range.range_padding = 0.4
+    plot.x_range.range_padding = plot.y_range.range_padding = 0.1
     plot.xaxis.formatter = NumeralTickFormatter(format="0.[00]")
     plot.scatter("seconds", "error", size=12, color="colour", source=source)
-    look: dict[str, Any] = {
-        "x_offset": {"field": "offset"},
-        "text_align": {"field": "align"},
-        "y_offset": 5,
-        "text_font_size": "12px",
-        "text_color": "#333333",
-    }
-    plot.add_layout(LabelSet(x="seconds", y="error", text="name", source=source, **look))
     return plot

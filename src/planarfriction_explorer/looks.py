@@ -24,6 +24,9 @@ CODE = """textarea {font-family: ui-monospace, "DejaVu Sans Mono", monospace; fo
 ALERT = "background:#FBE3E0;border:1px solid #C0392B;border-radius:6px;padding:8px 12px;font-size:15px"
 """Style of the line that says what is wrong."""
 
+HINT = "background:#E8F1F8;border:1px solid #0072B2;border-radius:6px;padding:8px 12px;font-size:15px"
+"""Style of the line that says what to do next."""
+
 TABLE = """<style>
 table {font-variant-numeric: tabular-nums; border-collapse: collapse}
 th {font-weight: 600; text-align: right; padding: 3px 0 3px 14px; color: #555; vertical-align: bottom}

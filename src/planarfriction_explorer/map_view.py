@@ -74,3 +74,14 @@ class MapView:
         self._sources["centre"].data = pictures.points_of_interest(state)
         self._sources["slip"].data = pictures.slip_arrows(state)
         self._sources["wrench"].data = pictures.wrench_arrows(state, answer)
+
+
+def legend() -> str:
+    """Return what the shades and marks of the map stand for."""
+    bar = (
+        f"display:inline-block;width:70px;height:10px;background:linear-gradient(90deg, {', '.join(Cividis256[::51])})"
+    )
+    return (
+        f"<div style='font-size:13px'>0 <span style='{bar}'></span> 1 of the highest pressure. Thin arrows: slip. "
+        "Thick arrows: forces, as in the table. <span style='color:#D00000'>⊕</span>: centre of rotation.</div>"
+    )

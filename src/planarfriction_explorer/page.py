@@ -17,7 +17,7 @@ from planarfriction_explorer.controls import OWN, Controls
 from planarfriction_explorer.drawing import Drawing
 from planarfriction_explorer.ladder_tab import LadderTab
 from planarfriction_explorer.live import Paced
-from planarfriction_explorer.map_view import MapView
+from planarfriction_explorer.map_view import MapView, legend
 from planarfriction_explorer.scene_tab import SceneTab
 from planarfriction_explorer.state import State
 
@@ -49,12 +49,13 @@ class Page:
         self.numbers = pn.pane.HTML("", css_classes=["numbers"], sizing_mode="stretch_width")
         self.grid = pn.pane.HTML("", sizing_mode="stretch_width")
         self.message = pn.pane.HTML("", visible=False, sizing_mode="stretch_width")
-        self.python, self.toml = _code_area("python"), _code_area("toml")
+        self.python, self.toml, self.mujoco = map(_code_area, ("python", "toml", "mujoco"))
         self.tabs = pn.Tabs(
             ("Python", _copied(self.python)),
             ("Scene file (TOML)", _copied(self.toml)),
             ("Models", self.ladder.layout),
             ("Run a scene", self.scenes.layout),
+            ("MuJoCo", _copied(self.mujoco)),
             dynamic=True,
             sizing_mode="stretch_width",
             stylesheets=[looks.CARD],
@@ -75,6 +76,8 @@ class Page:
         on(controls.file, self._read)
         on(controls.law, self._choose_law)
         on(controls.load, lambda load: self._change(normal_force=load))
+        on(controls.mass, lambda grams: self._change(mass=1e-3 * grams))
+        on(controls.lever, lambda millimetres: self._change(lever=1e-3 * millimetres))
         for slider in (controls.vx, controls.vy, controls.omega):
             on(slider, lambda _: self._slide())
         controls.clear.on_click(lambda _: self._try(self._clear))
@@ -97,8 +100,14 @@ class Page:
         self._refresh()
 
     def _read(self, content: bytes) -> None:
-        size = 1e-3 * self.controls.cell_size.value
-        self._draw(Drawing.read(self.controls.file.filename or "map", content, size))
+        """Show a map as wide as the one before it, since a file does not say how large its cells are."""
+        before, name = self.state.drawing, self.controls.file.filename or "map"
+        found = Drawing.read(name, content, before.cell_size)
+        size = max(before.pressures.shape) / max(found.pressures.shape) * before.cell_size
+        self._draw(found.scaled(size))
+        rows, columns = found.pressures.shape
+        what = f"{found.name}: {rows} x {columns} cells of {1e3 * size:.3g} mm each"
+        self._say(f"{what}. Set the cell size of your sensor.")
 
     def _clear(self) -> None:
         self.controls.tool.value = "brush"
@@ -159,8 +168,11 @@ class Page:
                 self.message.visible = False
                 act()
             except FrictionError as error:
-                self.message.object = f"<div id='message' style='{looks.ALERT}'>{html.escape(str(error))}</div>"
-                self.message.visible = True
+                self._say(str(error), looks.ALERT)
+
+    def _say(self, words: str, look: str = looks.HINT) -> None:
+        self.message.object = f"<div id='message' style='{look}'>{html.escape(words)}</div>"
+        self.message.visible = True
 
     def _redraw(self, *, quick: bool = False) -> None:
         """Draw the pictures that depend on the map alone."""
@@ -178,7 +190,8 @@ class Page:
             self.answer = found = answer(self.state)
         except FrictionError:
             self.answer, self._figure, self.surface.visible = None, {}, False
-            self.python.value = self.toml.value = self.numbers.object = self.grid.object = ""
+            self.python.value = self.toml.value = self.mujoco.value = ""
+            self.numbers.object = self.grid.object = ""
             self.ladder.clear()
             if self.state.drawing.pressures.any():
                 raise
@@ -194,7 +207,8 @@ class Page:
         if self.answer is not None:
             self.surface.param.update(object=pictures.moved(self._figure, self.answer), visible=True)
             self.python.value, self.toml.value = code.python(self.state), code.toml(self.state)
-            self.grid.object = pictures.grid_line(self.state)
+            self.mujoco.value = code.mujoco(self.state)
+            self.grid.object = pictures.holding_line(self.state) + pictures.grid_line(self.state)
 
     def _follow_ladder(self) -> None:
         """Run the comparison of the models while its tab is open."""
@@ -212,6 +226,7 @@ class Page:
             hint,
             self.controls.tool,
             pn.pane.Bokeh(self.map.figure, css_classes=["map"], sizing_mode="scale_width", aspect_ratio=1.0, margin=0),
+            pn.pane.HTML(legend(), sizing_mode="stretch_width"),
             stylesheets=[looks.CARD],
             styles=looks.grows(330),
         )

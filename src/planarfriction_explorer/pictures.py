@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import html
 from typing import Any
 
 import numpy as np
 
 from planarfriction import geometry
+from planarfriction.errors import InvalidValueError
 from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceTable
 from planarfriction.plots.limit_surface import scaled_samples
 from planarfriction.plots.style import DISTRIBUTED, ELLIPSOID, EXACT
@@ -185,6 +187,20 @@ def numbers_table(state: State, found: Answer, seconds: float) -> str:
         f"<p>The ellipsoid is off by {found.force_error:.3f} of μ<sub>c</sub> f<sub>N</sub> in the wrench and by "
         f"{found.angle_error:.1f}° in the twist here; over all directions by up to {max(force, found.force_error):.3f} "
         f"and {max(angle, found.angle_error):.1f}°.</p><p><small>Answered in {1e3 * seconds:.1f} ms</small></p></div>"
+    )
+
+
+def holding_line(state: State) -> str:
+    """Return a line that says whether two such contacts hold the part, and how hard each has to press."""
+    try:
+        needed = state.needed_load
+    except InvalidValueError as error:
+        return f"<p id='hold'>{html.escape(str(error))}.</p>"
+    holds = "holds" if state.normal_force > needed else "<span style='color:#C0392B'>slips</span>"
+    what = f"{1e3 * state.mass:g} g, {MM * state.lever:g} mm beside the origin"
+    return (
+        f"<p id='hold'>Will it hold? A part ({what}) between two such contacts <b>{holds}</b>: each has to press with "
+        f"<b>{needed:.3g} N</b>, and presses with {state.normal_force:g} N.</p>"
     )
 
 

@@ -9,10 +9,12 @@ from typing import Any
 
 from planarfriction import validation
 from planarfriction.laws import LAWS, FrictionLaw, LuGre
+from planarfriction.planning import holding_load
+from planarfriction.planning.holding import GRAVITY
 from planarfriction_explorer.drawing import Drawing
 
-FIRST_PATCH = "Circle"
-"""Patch of a new page."""
+FIRST_PATCH = "NonConvex1"
+"""Patch of a new page: two pads, whose limit surface is far from an ellipsoid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,12 +27,18 @@ class State:
     """Friction law."""
     normal_force: float = 1.0
     """Load [N]."""
-    twist: tuple[float, float, float] = (0.01, 0.0, 1.0)
+    twist: tuple[float, float, float] = (0.002, -0.008, 1.0)
     """Twist `(vx, vy, omega)` of the body at the origin of the contact frame [m/s, m/s, rad/s]."""
+    mass: float = 0.05
+    """Mass of a part that two such contacts hold against gravity [kg]."""
+    lever: float = 0.01
+    """Distance of its centre of mass from the origin, across gravity [m]."""
 
     def __post_init__(self) -> None:
         load = validation.positive_load("normal_force", self.normal_force)
         object.__setattr__(self, "normal_force", load)
+        object.__setattr__(self, "mass", validation.positive("mass", self.mass))
+        object.__setattr__(self, "lever", validation.number("lever", self.lever))
         object.__setattr__(self, "twist", tuple(validation.vector("twist", self.twist, 3).tolist()))
 
     def changed(self, **values: Any) -> State:
@@ -50,6 +58,12 @@ class State:
         """Return the state with the law `kind` of those `parameters`; what is left out or None has its default."""
         given = {name: value for name, value in parameters.items() if value is not None}
         return self.changed(law=LAWS.choose(kind)(**given))
+
+    @property
+    def needed_load(self) -> float:
+        """Return the normal force [N] of each of two contacts below which the part slips, with `mu_s`."""
+        weight = 0.5 * GRAVITY * self.mass
+        return holding_load((0.0, -weight, -weight * self.lever), self.drawing.patch, self.law.numbers.mu_s)
 
     @property
     def centre_of_rotation(self) -> tuple[float, float] | None:

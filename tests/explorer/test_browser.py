@@ -186,6 +186,7 @@ def test_a_drag_gives_the_velocity_and_friction_points_against_it(visitor):
 
 
 def test_a_brush_paints_and_an_eraser_takes_away(visitor):
+    visitor.after(lambda: visitor.choose("patch", "Circle"))
     visitor.tool("Eraser")
     visitor.after(lambda: visitor.drag((-3.0, 0.0), (3.0, 0.0)))
     visitor.page.wait_for_timeout(1000)

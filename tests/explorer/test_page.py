@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from planarfriction.errors import FrictionError, InvalidValueError
+from planarfriction.planning import holding_load
 from planarfriction_explorer.answers import answer
 
 pn = pytest.importorskip("panel", reason="needs Panel, the extra [explore]")
@@ -38,7 +39,7 @@ def shown(page: Page) -> np.ndarray:
 def test_what_stands_on_the_page_is_the_answer_to_what_is_set(page):
     page.controls.patch.value = "NonConvex2"
     page.controls.load.value = 2.5
-    page.controls.vy.value = -7.0
+    page.controls.vx.value, page.controls.vy.value = 10.0, -7.0
     page.controls.omega.value = -2.0
     assert page.state.twist == pytest.approx((0.01, -0.007, -2.0)) and page.state.normal_force == 2.5
     found = answer(page.state)
@@ -66,8 +67,9 @@ def test_a_file_is_loaded_and_a_wrong_one_leaves_the_map_as_it_is(page):
     page.controls.file.filename, page.controls.file.value = "pad.csv", b"1,x\n"
     assert "pad.csv: line 1" in page.message.object and page.message.visible and page.state.drawing is before
     page.controls.file.value = b"0,1\n2,0\n"
-    assert not page.message.visible
     np.testing.assert_array_equal(page.state.drawing.pressures, [[0.0, 1.0], [2.0, 0.0]])
+    assert page.state.drawing.width == pytest.approx(before.width)
+    assert "2 x 2 cells of 10 mm" in page.message.object and page.message.visible
 
 
 def test_a_law_has_its_fields_and_a_value_that_breaks_a_rule_is_one_line(page):
@@ -89,6 +91,19 @@ def test_a_law_that_is_chosen_again_has_its_values(page):
     assert page.controls.law_values()["mu_s"] == 1.2
     page.controls.law.value = "dahl"
     assert page.state.law.mu_c == 0.4
+
+
+def test_the_page_says_whether_a_part_is_held_with_its_mass_and_friction(page):
+    page.controls.mass.value, page.controls.lever.value = 80.0, 5.0
+    page._show_slow()
+    weight = 0.04 * 9.81
+    needed = holding_load((0.0, -weight, -0.005 * weight), page.state.drawing.patch, page.state.law.mu_s)
+    assert f"<b>{needed:.3g} N</b>" in page.grid.object and "<b>holds</b>" in page.grid.object
+    page.controls.parameters[0].value, page.controls.parameters[1].value = 0.2, 0.2
+    page._show_slow()
+    assert "slips</span>" in page.grid.object
+    page.controls.mass.value = -1.0
+    assert "mass must be &gt; 0" in page.message.object
 
 
 def test_a_page_that_nobody_holds_is_freed():

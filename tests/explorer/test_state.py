@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 import tomllib
 
 import numpy as np
@@ -129,11 +130,12 @@ def test_coulomb_friction_lies_on_the_limit_surface_of_its_cells():
 
 
 def test_the_ellipsoid_is_exact_in_pure_spin_and_within_its_stated_error():
-    centred = answer(State(twist=(0.0, 0.0, 2.0)))
+    circle = State(Drawing.published("Circle"))
+    centred = answer(circle.changed(twist=(0.0, 0.0, 2.0)))
     assert centred.force_error < 3e-3 and centred.angle_error < 1e-6  # its radius: see above
-    worst = State().drawing.largest_errors
+    worst = circle.drawing.largest_errors
     shares = np.linspace(-2.0, 2.0, 9)
-    found = [answer(State(twist=(0.01 * share, 0.0, 1.0))) for share in shares]
+    found = [answer(circle.changed(twist=(0.01 * share, 0.0, 1.0))) for share in shares]
     assert 0.1 < max(each.force_error for each in found) < 1.05 * worst[0]  # 100 directions miss little of the largest
     assert 5.0 < max(each.angle_error for each in found) < 1.05 * worst[1]
 
@@ -223,6 +225,24 @@ def test_the_code_gives_the_numbers_on_the_screen(origin, tmp_path, monkeypatch)
     np.testing.assert_allclose(scene.contacts[0].model.patch.weights(), drawing.patch.weights(), rtol=1e-15)
     np.testing.assert_allclose(scene.contacts[0].model.patch.positions, drawing.patch.positions, rtol=1e-12)
     assert float(scene.contacts[0].normal_force(0.3)) == 2.5
+
+
+def test_the_first_page_shows_where_an_ellipsoid_fails():
+    found = answer(State())
+    assert found.force_error > 0.4 and Drawing.published("Circle").largest_errors[0] < 0.2
+
+
+def test_a_drag_is_code_of_six_digits():
+    state = State(twist=(0.1 / 3.0, -0.0, 2.0 / 3.0))
+    assert "twist, normal_force = (0.0333333, -0.0, 0.666667), 1.0" in code.python(state)
+    assert code.scene(state).velocity(0.3)[2] == 0.666667
+
+
+def test_the_geom_of_mujoco_has_the_half_axes_of_the_ellipsoid():
+    state = State(law=pf.LuGre(mu_c=0.5))
+    radius = state.drawing.patch.contact_radius()
+    found = re.search(r'friction="(\S+) (\S+) 0"', code.mujoco(state))
+    assert found and np.array(found.groups(), dtype=float) == pytest.approx([0.5, 0.5 * radius], rel=1e-5)
 
 
 @pytest.mark.parametrize("kind", LAWS)
