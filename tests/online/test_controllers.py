@@ -150,3 +150,9 @@ def test_a_hinge_releases_what_does_not_hang_yet(observer, torque, falls):
     for _ in range(100):
         hinge._grip(hinge.state, found(**sample), *hinge._settings)
     assert hinge.state["grip"] / first == pytest.approx(np.exp(-0.1) if falls else 1.0, rel=1e-6)
+
+
+def test_a_slip_velocity_is_the_mean_since_the_one_before(observer):
+    slide = SlideBy(observer, -0.02)
+    gripped(slide, {"velocity": (0.0, -0.01, 2.0)}, span=0.007)
+    assert slide.state["slid"][0] == pytest.approx((0.0, -0.01 * 0.008, 2.0 * 0.008))
