@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import dataclasses
+import html
 import io
 import re
 from typing import NamedTuple
@@ -66,17 +67,17 @@ def test_large_parts_of_a_record_are_shown_by_their_size():
     )
 
 
-def pictures(html: str) -> list[Image.Image]:
-    found = re.findall(r"data:image/png;base64,([^\"]+)", html)
+def pictures(page: str) -> list[Image.Image]:
+    found = re.findall(r"data:image/png;base64,([^\"]+)", page)
     return [Image.open(io.BytesIO(base64.b64decode(each))) for each in found]
 
 
 def test_notebooks_show_a_patch_with_its_pressure():
     patch = pf.ContactPatch.from_pressure(np.array([[9.0, 0.0], [1.0, 1.0]]), 1e-3, name="<b>")
-    html = patch._repr_html_()
-    (picture,) = pictures(html)
-    assert "&lt;b&gt;" in html and "<b><b>" not in html
-    assert "2 x 2 mm" in html and "(-0.41, 0.32) mm" in html
+    shown = patch._repr_html_()
+    (picture,) = pictures(shown)
+    assert "&lt;b&gt;" in shown and "<b><b>" not in shown
+    assert "2 x 2 mm" in shown and "(-0.41, 0.32) mm" in shown
     pixels = np.asarray(picture.convert("RGB"), dtype=float)
     height, width, _ = pixels.shape
     corner = {(r, c): pixels[int(height * r), int(width * c)] for r in (0.3, 0.7) for c in (0.3, 0.7)}
@@ -97,6 +98,19 @@ def test_notebooks_show_every_kind_of_patch_surface_and_solution(solution):
     shown = solution._repr_html_()
     assert len(pictures(shown)) == 1 and "in-hand" in shown and "reached the end" in shown
     assert not pictures(dataclasses.replace(solution, scene=None)._repr_html_())
+
+
+@pytest.mark.parametrize("law", [pf.LuGre(mu_c=0.4, v_s=2e-3), pf.Dahl(0.4), pf.CoulombStribeck(0.4)])
+def test_notebooks_show_laws_models_and_scenes(law):
+    shown = law._repr_html_()
+    assert type(law).__name__ in shown and ">0.4<" in shown and len(pictures(shown)) == 1
+    assert (">0.002 m/s<" in shown) == (law == pf.LuGre(mu_c=0.4, v_s=2e-3))
+    for patch in (DISC, SOFT):
+        model = pf.ReducedModelPublished(patch, law)
+        assert repr(patch.name) in html.unescape(model._repr_html_()) and len(pictures(model._repr_html_())) == 1
+    scene = pf.scenes.in_hand(pf.ReducedModelPublished(DISC, pf.LuGre()))
+    shown = html.unescape(scene._repr_html_())
+    assert f"{scene.body.mass:g} kg" in shown and f"contact {scene.contacts[0].name!r}" in shown
 
 
 def test_dir_lists_what_is_public_and_nothing_else():

@@ -11,6 +11,7 @@ from planarfriction import formulas, validation
 from planarfriction.equality import Checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
+from planarfriction.pictures import picture
 
 
 class FrictionLaw(Checked):
@@ -23,6 +24,9 @@ class FrictionLaw(Checked):
     `rate` and `force` describe a single bristle without a patch: along a line for arrays of any shape, or in several
     dimensions, where `axis` is the axis of the components.
     """
+
+    def _repr_html_(self) -> str:
+        return picture("law in a notebook", self)
 
     @property
     def numbers(self) -> LawNumbers:

@@ -19,6 +19,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.tilt import centre_of, moments_of
+from planarfriction.pictures import picture
 
 
 @by_parts
@@ -69,6 +70,9 @@ class FrictionModel(ByValue):
         parts = [f"{self.patch.name!r} of {self.patch.cells} cells", _named(self.law)]
         parts += unusual(self, but=("patch", "law"))
         return f"{type(self).__name__}({', '.join(parts)})"
+
+    def _repr_html_(self) -> str:
+        return picture("model in a notebook", self)
 
     @property
     def reduction(self) -> FrictionModel:

@@ -1,8 +1,9 @@
-"""Notebook views of a patch, a limit surface and a solution: a small picture and a few numbers beside it."""
+"""Notebook views of records: a small picture and a few numbers beside it."""
 
 from __future__ import annotations
 
 import base64
+import dataclasses
 import html
 import io
 from typing import Any
@@ -12,11 +13,15 @@ import numpy as np
 import planarfriction as pf
 from planarfriction import geometry
 from planarfriction.errors import FrictionError
+from planarfriction.identify.parameters import LAW
 from planarfriction.plots import style
 from planarfriction.plots.motion import draw_motion
 
 _LOAD = 1.0
 """Load [N] at which a patch is shown whose shape depends on it."""
+
+_SPEEDS = 5.0
+"""Speeds of the picture of a law, over its v_s."""
 
 _DIRECTIONS = 120
 """Twists whose wrenches make the section of a limit surface."""
@@ -49,6 +54,45 @@ def surface_html(surface: pf.limit_surface.LimitSurface) -> str:
     except FrictionError:  # no load for a shape that depends on it
         rows["shape"] = "depends on the load: give a normal_force"
     return _beside(figure, type(surface).__name__, rows)
+
+
+def law_html(law: Any) -> str:
+    """Return the friction of steady sliding over the speed, with the parameters of a law."""
+    given = {each.name: getattr(law, each.name) for each in dataclasses.fields(law)}
+    rows = {name: _parameter(name, value) for name, value in given.items() if value is not None}
+    figure = style.new_figure(1.8, 1.2)
+    axes = figure.add_subplot()
+    speed = np.linspace(0.0, _SPEEDS * law.numbers.v_s, 200)
+    axes.plot(1e3 * speed, law.steady_friction(speed), color=style.PALETTE[0], linewidth=1.5)
+    axes.set(xlabel="mm/s", ylabel="f/f_N", ylim=(0.0, None))
+    return _beside(figure, type(law).__name__, rows)
+
+
+def model_html(model: Any) -> str:
+    """Return the pressure of the patch of a model, with its law and its state."""
+    load = _LOAD if model.patch.depends_on_load else None
+    try:
+        figure = _pressure(model.patch, model.patch.weights(load))
+    except FrictionError:  # a shape that there is not at this load
+        figure = None
+    rows = {
+        "patch": f"{model.patch.name!r} of {model.patch.cells} cells",
+        "law": repr(model.law),
+        "state": f"{list(model.state_shape)} [{model.state_units}]",
+    }
+    return _beside(figure, type(model).__name__, rows)
+
+
+def scene_html(scene: pf.Scene) -> str:
+    """Return the body, the contacts and the duration of a scene, with the pressure of its first contact."""
+    rows = {
+        "duration": f"{scene.t_end:g} s, from {scene.start}",
+        "body": f"{scene.body.mass:g} kg, {scene.body.inertia:.3g} kg m²",
+    }
+    rows |= {f"contact {each.name!r}": repr(each).partition(": ")[2].rstrip(")") for each in scene.contacts}
+    patch = scene.contacts[0].model.patch if scene.contacts else None
+    figure = None if patch is None or patch.depends_on_load else _pressure(patch, patch.weights())
+    return _beside(figure, f"Scene {scene.name!r}", rows)
 
 
 def solution_html(solution: pf.Solution) -> str:
@@ -110,6 +154,11 @@ def _size(patch: pf.ContactPatch) -> str:
         width, height = patch.grid.columns * patch.grid.cell_width, patch.grid.rows * patch.grid.cell_height
     unit = style.unit_for("length", max(width, height))
     return f"{unit.factor * width:.3g} x {unit.factor * height:.3g} {unit.label}"
+
+
+def _parameter(name: str, value: Any) -> str:
+    unit = LAW[name].unit if name in LAW else ""
+    return f"{value:g} {unit}".removesuffix(" -") if isinstance(value, (int, float)) else f"{value}"
 
 
 def _length(value: float) -> str:

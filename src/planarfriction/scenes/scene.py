@@ -18,6 +18,7 @@ from planarfriction import validation
 from planarfriction.equality import ByValue, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
+from planarfriction.pictures import picture
 from planarfriction.scenes.signal import Signal, as_signal, breaks_between, sample_count
 
 STARTS = ("rest", "equilibrium", "sliding")
@@ -322,6 +323,9 @@ class Scene(ByValue):
         driven = ", force given" if self.force is not None else ", velocity given" if self.velocity is not None else ""
         body = f"{self.body.mass:g} kg, {self.body.inertia:.3g} kg m^2"
         return f"Scene({self.name!r}: {self.t_end:g} s, body of {body}{driven}; {contacts}{more})"
+
+    def _repr_html_(self) -> str:
+        return picture("scene in a notebook", self)
 
     def breaks(self, t_end: float | None = None) -> np.ndarray:
         """Return 0, the times [s] at which any signal jumps or bends, and `t_end` (default: the scene's).
