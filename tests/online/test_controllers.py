@@ -103,7 +103,7 @@ def test_wrong_settings_are_refused():
 
 
 def found(count=1, **changes) -> np.ndarray:
-    """What an observer found of a part that slips under 1 N, a millisecond after the sample before."""
+    """Estimate of a part that slips under 1 N, a millisecond after the sample before."""
     one = np.zeros(count, friction_filter.ESTIMATE)
     given = {"mu_c": 0.5, "radius": 5e-3, "slip": 1.0, "gauge": 0.25, "dt": 1e-3, "normal_force": 4.0}
     for name, value in (given | {"wrench": (0.0, 1.0, 0.0), "velocity": np.nan} | changes).items():

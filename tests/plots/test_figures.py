@@ -16,7 +16,7 @@ from matplotlib.colors import to_hex
 from mpl_toolkits.mplot3d import Axes3D
 
 import planarfriction as pf
-from planarfriction import plots
+from planarfriction import plots, shown
 from planarfriction.errors import InvalidValueError, MissingExtraError
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.plots import histories, motion, style
@@ -27,6 +27,7 @@ from planarfriction.plots.limit_surface import (
     sample_limit_surface,
     scaled_samples,
 )
+from planarfriction.shown import unit_for
 from planarfriction_studies.experiments import looks
 from tests.support import synthetic
 from tests.support.pictures import faults
@@ -436,11 +437,11 @@ def test_pyplot_is_left_alone():
 
 
 @settings(deadline=None, max_examples=25)
-@given(kind=st.sampled_from(sorted(style._UNITS)), exponent=st.floats(-8.0, 4.0), sign=st.sampled_from([-1.0, 1.0]))
+@given(kind=st.sampled_from(sorted(shown._UNITS)), exponent=st.floats(-8.0, 4.0), sign=st.sampled_from([-1.0, 1.0]))
 def test_units_suit_the_numbers(kind, exponent, sign):
     value = sign * 10.0**exponent
-    unit = style.unit_for(kind, np.array([0.0, value]), np.array([0.5 * value]))
-    assert unit == style.unit_for(kind, np.array([value]))
+    unit = unit_for(kind, np.array([0.0, value]), np.array([0.5 * value]))
+    assert unit == unit_for(kind, np.array([value]))
     names = {"N mm": 1e3, "N µm": 1e6, "mm/s": 1e3, "µm/s": 1e6, "nm/s": 1e9, "deg": 180 / np.pi, "µrad": 1e6}
     names |= {"m": 1, "mm": 1e3, "µm": 1e6, "nm": 1e9, "m/s": 1, "N": 1, "kN": 1e-3, "mN": 1e3, "N m": 1}
     names |= {"GPa": 1e-9, "MPa": 1e-6, "kPa": 1e-3, "Pa": 1, "µN": 1e6, "nN": 1e9, "kN m": 1e-3, "N nm": 1e9}
@@ -449,8 +450,8 @@ def test_units_suit_the_numbers(kind, exponent, sign):
 
 
 def test_zero_is_shown_in_the_usual_unit():
-    assert style.unit_for("length", np.zeros(3)).label == "mm"
-    assert style.unit_for("torque").label == "N mm"
+    assert unit_for("length", np.zeros(3)).label == "mm"
+    assert unit_for("torque").label == "N mm"
 
 
 @pytest.mark.parametrize(

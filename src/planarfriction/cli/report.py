@@ -14,7 +14,7 @@ FINISHED = "success"
 
 def comparison(solutions: Mapping[str, pf.Solution]) -> list[list[str]]:
     """Return rows of text for a table with one column for each solution; differences are those from the first."""
-    from planarfriction.plots.style import unit_for
+    from planarfriction.shown import unit_for
 
     every = list(solutions.values())
     ends = {name: [_last(each, name) for each in every] for name in ("x", "y", "theta")}

@@ -131,7 +131,7 @@ def _show(data: xr.Dataset, out: Path) -> None:
 
 def _in_units(each: xr.DataArray) -> tuple[str, np.ndarray]:
     """Return the name of a variable with a unit in which its values read well, and all values in that unit."""
-    from planarfriction.plots.style import unit_for
+    from planarfriction.shown import unit_for
 
     values, unit = each.values.ravel(), each.attrs.get("units")
     if unit in KINDS:

@@ -29,6 +29,7 @@ from planarfriction.plots.panels import (
     still_speed,
 )
 from planarfriction.plots.track import Track
+from planarfriction.shown import unit_for
 
 WIDTH, HEIGHT = 9.6, 5.4
 """Size of a frame [inch]."""
@@ -133,7 +134,7 @@ class Film:
         largest = float(forces.max())
         side = float(np.diff(self.views[0], axis=-1).min())
         self.millimetres_per_newton = ARROW * side / largest if largest > 0.0 else 0.0
-        unit = style.unit_for("force", largest)
+        unit = unit_for("force", largest)
         words = f"friction on the body (longest {unit.factor * largest:.3g} {unit.label})"
         handles: list[Any] = [Line2D([], [], color=style.PALETTE[2], linewidth=2.2, label=words), self.centre]
         if len(self.track.contacts) > 1:  # one has its colours beside its cells
@@ -146,7 +147,7 @@ class Film:
         moved = self.track.poses - self.track.poses[0]
         parts = []
         for words, kind, column in (("moved by x", "length", 0), ("y", "length", 1), ("turned by", "angle", 2)):
-            unit = style.unit_for(kind, moved[:, column])
+            unit = unit_for(kind, moved[:, column])
             parts.append(f"{words} {round(unit.factor * moved[frame, column], 2) + 0.0:.2f} {unit.label}")  # no -0.00
         return ", ".join(parts)
 

@@ -11,6 +11,7 @@ import planarfriction as pf
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError, shown
 from planarfriction.plots import style
+from planarfriction.shown import Unit, unit_for
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,7 +63,7 @@ def draw_histories(figure: Any, solutions: pf.Solution | Mapping[str, pf.Solutio
     known = as_runs(solutions)
     runs = {label: each.data for label, each in known.items()}
     colours = _colours(list(known.values()))
-    clock = style.unit_for("time", *(data["time"] for data in runs.values()))
+    clock = unit_for("time", *(data["time"] for data in runs.values()))
     panels = figure.subplots(4, 2, sharex=True)
     for column, quantities in enumerate((_BODY, _CONTACT)):
         lines = [_lines(runs, get) for *_, get in quantities]
@@ -116,10 +117,10 @@ def _lines(runs: Mapping[str, xr.Dataset], get: Callable) -> list[_Line]:
 
 
 def _draw_panel(
-    axes: Any, title: str, kind: str, lines: list[_Line], alike: list[np.ndarray], clock: style.Unit, colours: list[Any]
+    axes: Any, title: str, kind: str, lines: list[_Line], alike: list[np.ndarray], clock: Unit, colours: list[Any]
 ) -> None:
     """Draw one panel; `alike` are the values of all panels of its kind in this column, which share their unit."""
-    unit = style.unit_for(kind, *alike)
+    unit = unit_for(kind, *alike)
     for line in lines:
         look = _look(line.run, line.contact, colours) | ({"marker": "o"} if len(line.time) == 1 else {})
         axes.plot(clock.factor * line.time, unit.factor * line.values, **look)

@@ -9,6 +9,7 @@ import numpy as np
 import planarfriction as pf
 from planarfriction import formulas
 from planarfriction.plots import style
+from planarfriction.shown import unit_for
 
 KINDS = {"N": "force", "N m": "torque", "m": "length", "rad": "angle"}
 """Unit of a channel -> kind of quantity."""
@@ -68,7 +69,7 @@ def _places(result: pf.identify.Identification) -> list[np.ndarray]:
 
 def _draw_channel(left: Any, right: Any, result: pf.identify.Identification, i: int, places: list[np.ndarray]) -> None:
     name, unit = result.channels[i]
-    shown = style.unit_for(KINDS[unit], *(np.nan_to_num(each["measured"][:, i]) for each in result.histories))
+    shown = unit_for(KINDS[unit], *(np.nan_to_num(each["measured"][:, i]) for each in result.histories))
     for number, (each, time) in enumerate(zip(result.histories, places, strict=True)):
         for key, words, colour, width in (
             ("measured", "measured", "0.6", 2.2),
@@ -134,7 +135,7 @@ def _draw_held_out(axes: Any, result: pf.identify.Identification, i: int) -> Non
         axes.text(0.5, 0.5, f"{name} was not measured", ha="center", transform=axes.transAxes)
         return
     measured, held_out = measured[seen], held_out[seen]
-    shown = style.unit_for(KINDS[unit], measured)
+    shown = unit_for(KINDS[unit], measured)
     every = max(1, len(measured) // MOST_POINTS)
     axes.plot(shown.factor * measured[::every], shown.factor * held_out[::every], ".", color="0.6", markersize=2.0)
     edges = shown.factor * np.array([measured.min(), measured.max()])

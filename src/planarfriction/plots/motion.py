@@ -18,6 +18,7 @@ from planarfriction.plots import style
 from planarfriction.plots.histories import draw_histories
 from planarfriction.plots.patch import cell_boxes
 from planarfriction.plots.track import body_poses, contact_poses
+from planarfriction.shown import unit_for
 
 INSTANTS = 12
 """Number of outlines in a strobe."""
@@ -139,7 +140,7 @@ def _remark(strobe: _Strobe) -> str:
         return ""
     if length == angle == 0.0:
         return "it does not move"
-    far, turn = style.unit_for("length", length), style.unit_for("angle", angle)
+    far, turn = unit_for("length", length), unit_for("angle", angle)
     moves = f"moves by up to {far.factor * length:.2g} {far.label}"
     return f"{moves}, turns by up to {turn.factor * angle:.2g} {turn.label}"
 

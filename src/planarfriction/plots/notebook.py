@@ -16,6 +16,7 @@ from planarfriction.errors import FrictionError
 from planarfriction.identify.parameters import LAW
 from planarfriction.plots import style
 from planarfriction.plots.motion import draw_motion
+from planarfriction.shown import unit_for
 
 _LOAD = 1.0
 """Load [N] at which a patch is shown whose shape depends on it."""
@@ -152,7 +153,7 @@ def _size(patch: pf.ContactPatch) -> str:
         width, height = np.ptp(patch.positions, axis=0) + (0.0 if patch.cell_size is None else patch.cell_size)
     else:
         width, height = patch.grid.columns * patch.grid.cell_width, patch.grid.rows * patch.grid.cell_height
-    unit = style.unit_for("length", max(width, height))
+    unit = unit_for("length", max(width, height))
     return f"{unit.factor * width:.3g} x {unit.factor * height:.3g} {unit.label}"
 
 
@@ -162,7 +163,7 @@ def _parameter(name: str, value: Any) -> str:
 
 
 def _length(value: float) -> str:
-    unit = style.unit_for("length", value)
+    unit = unit_for("length", value)
     return f"{unit.factor * value:.4g} {unit.label}"
 
 

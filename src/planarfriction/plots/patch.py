@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 import planarfriction as pf
 from planarfriction import validation
 from planarfriction.plots import style
+from planarfriction.shown import Unit, unit_for
 
 MOST_EDGES = 5000
 """Cells whose edges are drawn: those of more would hide them."""
@@ -78,7 +79,7 @@ def _height(patch: pf.ContactPatch) -> float:
 
 
 def _draw_cells(axes, patch: pf.ContactPatch, grid: pf.Grid, pressure: np.ndarray, normal_force: float | None):
-    unit = style.unit_for("pressure", pressure)
+    unit = unit_for("pressure", pressure)
     edges: Any = {"edgecolor": "white", "linewidth": 0.25} if len(pressure) < MOST_EDGES else {"edgecolor": "face"}
     cells = PolyCollection(list(1e3 * cell_boxes(patch, grid)), cmap=style.PRESSURE_MAP, **edges)
     cells.set_array(unit.factor * pressure)
@@ -93,7 +94,7 @@ def _draw_cells(axes, patch: pf.ContactPatch, grid: pf.Grid, pressure: np.ndarra
 
 def _draw_points(axes, patch: pf.ContactPatch, force: np.ndarray, normal_force: float | None):
     share = force / force.max() if force.any() else np.zeros_like(force)
-    unit = style.unit_for("force", force) if normal_force is not None else style.Unit(1.0, "-")
+    unit = unit_for("force", force) if normal_force is not None else Unit(1.0, "-")
     look = {"cmap": style.PRESSURE_MAP, "vmin": 0.0, "edgecolor": "0.3", "linewidth": 0.6}
     points = axes.scatter(*(1e3 * patch.positions.T), s=30 + 170 * share, c=unit.factor * force, **look)
     axes.margins(0.2)
@@ -103,11 +104,11 @@ def _draw_points(axes, patch: pf.ContactPatch, force: np.ndarray, normal_force: 
 
 def _title(patch: pf.ContactPatch, weights: np.ndarray, normal_force: float | None) -> str:
     loaded = int((weights > 0.0).sum())
-    radius = style.unit_for("length", patch.contact_radius(normal_force))
+    radius = unit_for("length", patch.contact_radius(normal_force))
     what = ("point" if patch.grid is None else "cell") + "s" * (loaded != 1)
     text = f"{patch.name}: {loaded} loaded {what}, r = {radius.factor * patch.contact_radius(normal_force):.3g} "
     text += radius.label
     if normal_force is not None:
-        force = style.unit_for("force", normal_force)
+        force = unit_for("force", normal_force)
         text += f", load {force.factor * normal_force:.6g} {force.label}"
     return style.wrapped(text, 62)

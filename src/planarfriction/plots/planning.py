@@ -13,6 +13,7 @@ from planarfriction.planning.motions import slide_of
 from planarfriction.plots import style
 from planarfriction.plots.track import body_poses
 from planarfriction.scenes import Solution, simulate
+from planarfriction.shown import unit_for
 
 INSTANTS = 8
 """Outlines that are drawn."""
@@ -26,7 +27,7 @@ def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
     grip, turn, slide = figure.subplots(3, 1, sharex=True)
     end = plan.scene.t_end
     times = np.append(plan.signal.times, end)
-    force = style.unit_for("force", plan.signal.values)
+    force = unit_for("force", plan.signal.values)
     grip.plot(times, force.factor * plan.signal(times), "o-", color=style.PALETTE[0], markersize=3)
     grip.axhline(force.factor * plan.report.holding, color="0.4", linewidth=0.9, linestyle=style.LINE_STYLES[2])
     grip.annotate("holds the body at the end", (end, force.factor * plan.report.holding), color="0.3",
@@ -35,7 +36,7 @@ def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
     solutions = [simulate(scene, save_every=end / 400.0) for scene in plan.frictions]
     slides = [_slide(plan, solution) for solution in solutions]
     angles = [np.asarray(each.histories["theta"].values) - plan.scene.body.angle for each in solutions]
-    angle, length = style.unit_for("angle", *angles), style.unit_for("length", *slides)
+    angle, length = unit_for("angle", *angles), unit_for("length", *slides)
     factors = [1.0, *(each for each in (plan.report.frictions[0], plan.report.frictions[-1]) if len(solutions) > 1)]
     for i, (solution, factor) in enumerate(zip(solutions, factors, strict=True)):  # first as it is, then the others
         time = np.asarray(solution.histories["time"].values)
