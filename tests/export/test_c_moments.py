@@ -39,8 +39,11 @@ def run(made, state, twist, load, dt, moments):
     return state, wrench, code
 
 
-@pytest.mark.parametrize("precision", ["double", "float"])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    ("name", "precision"),
+    [(name, "double") for name in NAMES]
+    + [pytest.param(name, "float", marks=[] if name == "few" else pytest.mark.slow) for name in NAMES],
+)
 def test_steps(name, precision):
     made = library(name, precision)
     given = inputs(made)
