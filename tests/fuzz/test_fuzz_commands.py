@@ -79,9 +79,11 @@ def arguments(name: str, draw: random.Random) -> list[str]:
 def test_commands(draw: random.Random) -> None:
     name = draw.choice([*app.commands, "run", "limit-surface", "identify", PLAN])
     given = [*name.split(), *arguments(name, draw)]
-    if name in ("bench", "explore", "reproduce", "simulators", "warm") and not {"--list", "--help", "nothing"} & set(
-        given
-    ):
+    if name in ("bench", "explore", "referee", "reproduce", "simulators", "warm") and not {
+        "--list",
+        "--help",
+        "nothing",
+    } & set(given):
         return  # minutes of work, or a server that goes on
 
     def run() -> None:

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from planarfriction.cli.options import FILE, complete_scene, load_function, patch_option
 from planarfriction.families import SCENES
 
 if TYPE_CHECKING:
+    import numpy as np
     import xarray as xr
 
 MOST_ROWS = 40
@@ -117,6 +117,8 @@ def _show(data: xr.Dataset, out: Path) -> None:
     if "time" in data.dims:
         title += f", at {float(data.time[-1]):g} s"
     if data.status.size > MOST_ROWS:
+        import numpy as np
+
         known = {name: each[np.isfinite(each)] for name, each in columns.items()}
         ranges = {name: np.quantile(each, [0.0, 0.5, 1.0]) for name, each in known.items() if each.size}
         rows = [[name, *(f"{value:.3g}" for value in each)] for name, each in ranges.items()]
@@ -131,6 +133,8 @@ def _show(data: xr.Dataset, out: Path) -> None:
 
 def _in_units(each: xr.DataArray) -> tuple[str, np.ndarray]:
     """Return the name of a variable with a unit in which its values read well, and all values in that unit."""
+    import numpy as np
+
     from planarfriction.shown import unit_for
 
     values, unit = each.values.ravel(), each.attrs.get("units")
