@@ -62,6 +62,10 @@ class Fresh(NamedTuple):
     make: Callable[[], Any]
 
 
+MEASURING = "FrictionObserver", "Hold", "Hinge", "SlideBy", "TurnBy"
+"""Classes that take measurements."""
+
+
 class Target(NamedTuple):
     """Something that a user calls."""
 
@@ -108,7 +112,7 @@ def objects() -> dict[str, Any]:
         "refined": 2,
         "x_min": 0.0, "y_min": 0.0, "cell_width": 0.001, "cell_height": 0.001, "columns": 5, "rows": 5,
         "load": 1, "speed": 0.01, "spin": 1.0, "segments": 5, "samples": 20, "save_every": 0.01, "stop_speed": 1e-4,
-        "start": "rest", "margin": 0.5, "ramp": 0.01, "fall": 2.0,
+        "controller": None, "start": "rest", "margin": 0.5, "ramp": 0.01, "fall": 2.0,
         "rtol": 1e-4, "atol": 1e-3, "t": 0.05, "elasto_plastic": 0.9, "creep_speed": 1e-5, "relaxation_time": 0.01,
         "breakaway_ratio": 0.5, "k_per_newton": None, "radius_max": 0.02, "error": None, "speeds": 6,
         "load_error": 0.01,
@@ -185,8 +189,8 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "bias": (0.03, 0.03, 3e-4),
     },
     **{
-        f"online.{name}.update": {"measurement": pf.online.Measurement(0.1, (0.0, 1.0, 0.0), 4.0, (0.0, 0.01, 0.0))}
-        for name in ("FrictionObserver", "Hold", "Hinge", "SlideBy", "TurnBy")
+        f"online.{name}": {"measurement": pf.online.Measurement(0.1, (0.0, 1.0, 0.0), 4.0, (0.0, 0.01, 0.0))}
+        for name in ("FrictionObserver.take", *(f"{each}.update" for each in MEASURING))
     },
     **{
         f"online.{name}": {"observer": Fresh(lambda: objects()["FrictionObserver"]), "goal": 0.02}

@@ -49,7 +49,8 @@ def scene_gradient(
     """
     functions = {"cotangent": cotangent, "wrench_cotangent": wrench_cotangent}
     for name, function in functions.items():
-        if not callable(function) and (function is not None or cotangent is wrench_cotangent):
+        wrong = isinstance(function, type) or not callable(function)
+        if wrong and (function is not None or cotangent is wrench_cotangent):
             raise InvalidValueError(name, "be a function of time and motion, or wrenches", function)
     motion = KeptMotion(scene, SceneInputs(scene, parameters, signals, initial), options)
     bars = [
