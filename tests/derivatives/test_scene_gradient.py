@@ -269,6 +269,8 @@ def test_wrong_input_is_named():
         scene_gradient(scene, lambda time, motion: motion, signals=["force"])
     with pytest.raises(InvalidValueError, match="cotangent must be a function of time and motion"):
         scene_gradient(scene, np.zeros(6))
+    with pytest.raises(InvalidValueError, match="cotangent must be a function of time and motion"):
+        scene_gradient(scene, float)
     with pytest.raises(InvalidValueError, match="wrench_cotangent must be a function of time and motion, or wrenches"):
         scene_gradient(scene, None, wrench_cotangent=np.zeros(3))
     with pytest.raises(InvalidValueError, match=r"wrench_cotangent of the cost must have shape"):
