@@ -252,7 +252,6 @@ def draw(kept: dict[str, Any]) -> style.PlotFigure:
         "better", (0.06, 0.06), (0.2, 0.16), xycoords="axes fraction", color="0.4", arrowprops={"arrowstyle": "->"}
     )
     for axes in (left, right):
-        axes.axhline(0.5, color="0.5", lw=0.8, ls=":")
         style.tidy(axes)
     figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=len(MODELS), frameon=False)
     return figure

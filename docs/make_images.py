@@ -84,7 +84,7 @@ def bristle() -> plots.style.PlotFigure:
         ("slides: less friction, the faster it is", (120.0, 0.63), (75.0, 0.5)),
     ):
         axes.annotate(words, at, text, arrowprops={"arrowstyle": "->"})
-    axes.set(xlabel="displacement [um]", ylabel="friction / load", xlim=(0.0, 200.0), ylim=(0.0, 0.85))
+    axes.set(xlabel="displacement [µm]", ylabel="friction / load", xlim=(0.0, 200.0), ylim=(0.0, 0.85))
     plots.style.tidy(axes)
     return figure
 

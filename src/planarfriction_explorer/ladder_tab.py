@@ -86,7 +86,6 @@ def table(rungs: list[Rung]) -> str:
     """Return the ladder as HTML."""
     head = "".join(f"<th>{text}</th>" for text in _HEAD)
     names = [f"<span style='color:{_COLOURS[each.name]}'>●</span> {each.name}" for each in rungs]
-    names = [f"<span style='color:{_COLOURS[each.name]}'>●</span> {each.name}" for each in rungs]
     rows = "".join(f"<tr><td>{name}</td>{_cells(each)}</tr>" for name, each in zip(names, rungs, strict=True))
     return f"{looks.TABLE}<table id='ladder'><tr>{head}</tr>{rows}</table>"
 

@@ -329,6 +329,8 @@ class _Translated(_Function):
     def _value_of_binop(self, node: ast.BinOp) -> Any:
         a, b = self._value(node.left), self._value(node.right)
         if isinstance(node.op, ast.Pow):
+            if plain(b) != 2:
+                raise NotImplementedError(f"power {b} in {self.name}: squares alone are translated")
             a = self._kept(a)
             return Scalar(f"({a.text} * {a.text})")
         return self._joined(type(node.op), a, b)

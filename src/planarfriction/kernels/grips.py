@@ -41,7 +41,7 @@ STICKS = 0.05
 """Time without slip after which a part has stuck [s]."""
 
 STUCK = 1.0
-"""Rate at which it falls if a part that shall slip has stuck [1/s]."""
+"""Rate at which it falls if a part that is to slip has stuck [1/s]."""
 
 AIM = 0.3
 """Share of the tolerance by which a part is caught before the goal: late samples let it go on."""
@@ -64,7 +64,7 @@ SPEED_GAIN, PLACE_GAIN = 8.0, 16.0
 
 @kernel
 def trapezoid(xp, time, size, duration):
-    """Compute place, speed and acceleration at a time [s] of a way of a `size` whose ramps take a quarter each."""
+    """Compute place, speed, acceleration at a time [s] of a displacement by `size` whose ramps take a quarter each."""
     ramp = 0.25 * duration
     top = size / (duration - ramp)
     t = xp.minimum(xp.maximum(time, 0.0), duration)

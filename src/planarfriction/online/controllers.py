@@ -15,7 +15,7 @@ from planarfriction.online.gripper import GRAVITY, Measurement
 from planarfriction.online.observer import Estimate, FrictionObserver, estimate_of
 
 trapezoid = functools.partial(grips.trapezoid.py_func, np)
-"""Place, speed and acceleration at times [s] of a way of a size whose ramps take a quarter each of the duration."""
+"""Place, speed and acceleration at times [s] of a displacement whose ramps take a quarter each of the duration."""
 
 
 class GripController:
