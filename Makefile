@@ -28,8 +28,12 @@ demo: $(VENV)/.package
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
+# A process that crashes ends the run and names its test; replaced, it makes pytest-xdist 3.8 wait forever at the end
+# (pytest-dev/pytest-xdist#1378).
+PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
+
 test: $(VENV)/.test
-	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ARGS)
+	$(PYTEST) $(ARGS)
 
 # What compiled loops and BLAS may round differently elsewhere: surfaces, models, steps, solver, derivatives.
 NUMERIC := compiler derivatives kernels limit_surface models solvers test_coupling.py test_formulas.py
@@ -38,18 +42,18 @@ NUMERIC := compiler derivatives kernels limit_surface models solvers test_coupli
 QUICKEST := kernels limit_surface solvers test_coupling.py test_formulas.py
 
 test-generic: $(VENV)/.test
-	NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES= $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(NUMERIC:%=tests/%) $(ARGS)
+	NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES= $(PYTEST) $(NUMERIC:%=tests/%) $(ARGS)
 
 # Loops whose indices are checked compile into their own machine code, of which the whole half takes an hour; pointers
 # have no bounds to check.
 BOUNDED := tests/kernels tests/test_coupling_hard.py
 
 test-bounds: $(VENV)/.test
-	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(BOUNDED) $(ARGS)
+	NUMBA_BOUNDSCHECK=1 $(PYTEST) $(BOUNDED) $(ARGS)
 
 # The lowest versions that pyproject.toml promises, without the optional front ends.
 test-lowest: $(LOWEST)/.test
-	$(LOWEST)/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ARGS)
+	$(PYTEST:$(BIN)/%=$(LOWEST)/bin/%) $(ARGS)
 
 MINUTES ?= 60
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import ast
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from numba import njit
 
+from planarfriction.compiler import SOURCES
 from planarfriction.compiler.memory import (
     Doubles,
     Integers,
@@ -127,3 +130,18 @@ def test_a_new_block_has_the_shapes_of_its_layout():
     assert made.matrix.shape == (2, 3) and made.count.dtype == np.int64 and made.vector is VALUES
     made.count[0] = 5
     assert made.matrix.tolist() == [[0.0] * 3] * 2
+
+
+def freed_too_early(function: ast.FunctionDef) -> Iterator[str]:
+    """Yield the arrays of a function that are made in it and reached by a pointer: Numba frees them at once."""
+    given = {each.arg for each in function.args.args}
+    for node in ast.walk(function):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "pointer":
+            yield from {each.id for each in ast.walk(node.args[0]) if isinstance(each, ast.Name)} - given
+
+
+@pytest.mark.parametrize("file", SOURCES.files, ids=lambda file: file.stem)
+def test_pointers_are_to_arrays_that_a_caller_keeps_alive(file):
+    """The last use of an array is where its pointer is taken, and memory in use would be given to another thread."""
+    functions = [each for each in ast.walk(ast.parse(file.read_text())) if isinstance(each, ast.FunctionDef)]
+    assert {each.name: found for each in functions if (found := [*freed_too_early(each)])} == {}

@@ -124,8 +124,8 @@ def _roll(lever, law, inputs, b, n, w, wrench, states):
 
 
 @kernel
-def _rollout(lever, inputs, span, z, wrench, states, w):
-    n, rows = z.shape[2] // 2, inputs.rows[0]
+def _rollout(lever, inputs, span, z, wrench, states, scratch):
+    w, n, rows = pointer(scratch), z.shape[2] // 2, inputs.rows[0]
     blocks = inputs.shapes.shape[2] // LANES
     for b in range(span[0], span[1]):
         law = law_of(rows[row_of(rows, b)])
@@ -144,7 +144,7 @@ def rollout(lever, inputs, span, z, wrench, states):
     The state before each step goes into `states` [1, B, T, 2 n], unless that is empty.
     """
     scratch = np.empty(inputs.shapes.shape[2] // LANES * BLOCK)
-    _rollout(lever, inputs, span, z, wrench, states, pointer(scratch))
+    _rollout(lever, inputs, span, z, wrench, states, scratch)
 
 
 # ---------------------------------------------------------------------- the adjoint
@@ -189,8 +189,8 @@ def _pull(lever, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
 
 
 @kernel
-def _gradient(lever, inputs, states, wrench_bar, span, bars, w):
-    n, rows = bars.state.shape[2] // 2, inputs.rows[0]
+def _gradient(lever, inputs, states, wrench_bar, span, bars, scratch):
+    w, n, rows = pointer(scratch), bars.state.shape[2] // 2, inputs.rows[0]
     blocks = inputs.shapes.shape[2] // LANES
     for b in range(span[0], span[1]):
         law, before, pulls = law_of(rows[row_of(rows, b)]), states[0], wrench_bar[row_of(wrench_bar, b)]
@@ -209,7 +209,7 @@ def _gradient(lever, inputs, states, wrench_bar, span, bars, w):
 def gradient(lever, inputs, states, wrench_bar, span, bars):
     """Add the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
     scratch = np.empty(inputs.shapes.shape[2] // LANES * BLOCK)
-    _gradient(lever, inputs, states, wrench_bar, span, bars, pointer(scratch))
+    _gradient(lever, inputs, states, wrench_bar, span, bars, scratch)
 
 
 # ---------------------------------------------------------------------- forwards
@@ -236,8 +236,8 @@ def _push(lever, law, by, block, twist, turn, dt, load, push, lanes):
 
 
 @kernel
-def _tangent(lever, inputs, span, z, changes, wrenches, slopes, w):
-    n, rows = z.shape[2] // 2, inputs.rows[0]
+def _tangent(lever, inputs, span, z, changes, wrenches, slopes, scratch):
+    w, n, rows = pointer(scratch), z.shape[2] // 2, inputs.rows[0]
     weights, all_by_load = inputs.shapes[0], inputs.by_load[0]
     blocks = weights.shape[1] // LANES
     lanes = weights.shape[1] // blocks
@@ -272,7 +272,7 @@ def tangent(lever, inputs, span, z, changes, wrenches, slopes):
     `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state in place.
     """
     scratch = np.empty(inputs.shapes.shape[2] // LANES * BLOCK)
-    _tangent(lever, inputs, span, z, changes, wrenches, slopes, pointer(scratch))
+    _tangent(lever, inputs, span, z, changes, wrenches, slopes, scratch)
 
 
 # ---------------------------------------------------------------------- bound to the levers
