@@ -1,6 +1,7 @@
 # make demo: the main job, with everything it needs.   make test: the tests.   The rest is for development.
 # make test-generic: the tests of numbers once more, compiled for any x86-64 or ARM processor instead of this one.
 # make test-bounds: tests of compiled loops once more, with every index checked; BOUNDED=tests/limit_surface: other ones.
+# make test-memory: tests of compiled code once more, with the checks of glibc's malloc.
 # make test-lowest: the tests with the lowest versions of everything.
 # make fuzz MINUTES=60: attacks with random examples, an hour long; ATTACKS=coupling: those alone whose name begins so.
 # make dist: wheel and source distribution in dist, checked; TAG=v1.2.3: that of a release, which has to be the version.
@@ -18,7 +19,7 @@ TOOLS := .venv-tools
 # survive from run to run. What is installed changes with pyproject.toml only.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-generic test-bounds test-lowest fuzz docs lint lint-workflows lint-recipe bench bench-compare doctor dist dist-install clean
+.PHONY: demo test test-generic test-bounds test-memory test-lowest fuzz docs lint lint-workflows lint-recipe bench bench-compare doctor dist dist-install clean
 
 demo: $(VENV)/.package
 	$(BIN)/planarfriction run in-hand --model both --out out/ --plot
@@ -50,6 +51,12 @@ BOUNDED := tests/kernels tests/test_coupling_hard.py
 
 test-bounds: $(VENV)/.test
 	NUMBA_BOUNDSCHECK=1 $(PYTEST) $(BOUNDED) $(ARGS)
+
+# Memory that is used after it was freed, or written beyond its end, shows as other numbers or ends the run.
+MEMORY := fuzz derivatives models solvers kernels scenes planning online limit_surface identify tensors test_coupling.py
+
+test-memory: $(VENV)/.test
+	LD_PRELOAD=libc_malloc_debug.so.0 MALLOC_CHECK_=3 MALLOC_PERTURB_=165 $(PYTEST) $(MEMORY:%=tests/%) $(ARGS)
 
 # The lowest versions that pyproject.toml promises, without the optional front ends.
 test-lowest: $(LOWEST)/.test
