@@ -3,7 +3,7 @@ A friction law from a log
 =========================
 
 A contact is moved, force and torque are logged with noise, and a fit finds the law: each number with its
-interval, and with a word on what the data leave open. Here the log is simulated, so that the truth is known.
+interval, and which parameters the data cannot determine. Here the log is simulated, so that the truth is known.
 """
 
 import matplotlib.pyplot as plt

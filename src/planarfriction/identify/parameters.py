@@ -134,9 +134,9 @@ class Coordinates:
     def prior(self, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute a weak pull to the start, `[F + K]`, and its derivatives `[F + K, F + K]`.
 
-        It keeps at the start what the data leave open. In units of the noise of one residual it is one for every factor
-        of `PRIOR`, so that a parameter known to 10 % is moved by a thousandth of its error. The linear coordinates of
-        the contact, whose scale is a guess, are left alone.
+        It keeps parameters that the data cannot determine at their start. In units of the noise of one residual it is
+        one for every factor of `PRIOR`, so that a parameter known to 10 % is moved by a thousandth of its error. The
+        linear coordinates of the contact, whose scale is a guess, are left alone.
         """
         width = np.where(self.rig, 1.0, np.where(self.logarithmic, PRIOR, np.inf))
         for name in ("gamma", "mu_s"):

@@ -88,8 +88,8 @@ class Identification(ByValue):
 
         Names and meaning are those of `pf.randomise`, for patches with the fitted `model`: size and place become
         `scale`, `centre_x` and `centre_y` relative to it. Draws of values > 0 are symmetric as factors, within the
-        bounds of the fit; one that the data leave open varies by a factor of 20 (one standard deviation). `gamma` and
-        the constants of soft fingers, on which stored maps depend, stay as estimated.
+        bounds of the fit; one that the data cannot determine varies by a factor of 20 (one standard deviation). `gamma`
+        and the constants of soft fingers, on which stored maps depend, stay as estimated.
 
         Raises InvalidValueError unless `count` is a count.
         """
