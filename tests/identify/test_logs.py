@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import planarfriction as pf
+from planarfriction.cli.output import write_solution
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import Log, Slide, differentiated
 from planarfriction.identify.logs import unwrapped
+from planarfriction.identify.problem import FitOptions, LogProblem
+from planarfriction.identify.rig import first_noise
 from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, fitted, noisy, truth
 
 TIME = np.arange(400) * 1e-2
@@ -196,3 +201,27 @@ def test_a_log_of_zeros_is_refused(spun):
     nothing = Log(spun.time, spun.twist, np.zeros_like(spun.wrench), LOAD, "dead")
     with pytest.raises(pf.FrictionError, match="wrench of dead must not be 0 throughout"):
         identify(nothing, PATCH)
+
+
+# ---------------------------------------------------------------------- twists that are held
+
+
+def stepped(tmp_path, hold):
+    """A patch that starts, turns, slides and stops, every 10 ms, with a twist that is held or joined: its file."""
+    time = np.arange(301) * 1e-2
+    speeds = np.interp(time, [0.0, 0.5, 1.5, 2.0], [0.0, 1.0, 1.0, 0.0])[:, None] * [0.01, 0.003, 1.0]
+    model = pf.DistributedModel(PATCH, LAW)
+    scene = pf.scenes.driven(model, twist=pf.Signal(time, speeds, hold), t_end=3.0)
+    return write_solution(pf.simulate(scene, save_every=1e-2), tmp_path, "log")[1]
+
+
+@pytest.mark.parametrize(("hold", "held"), [("previous", True), ("linear", False)])
+def test_a_log_knows_if_its_twists_are_means(tmp_path, hold, held):
+    """The angle beside them shows it: read otherwise, the law that made the log leaves five times as much."""
+    log = Log.from_csv(stepped(tmp_path, hold))
+    assert log.held == held
+    known, left = np.array([LAW.mu_c, LAW.mu_s]), []
+    for each in (log, dataclasses.replace(log, held=not held)):
+        problem = LogProblem([each], PATCH, ("mu_c", "mu_s"), LAW, FitOptions(nuisance=(), refine=4), "distributed")
+        left.append(np.square(problem.residual(known, problem.even_sigma(first_noise([log])))).mean())
+    assert 10.0 * left[0] < left[1]

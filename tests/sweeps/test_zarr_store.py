@@ -16,7 +16,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction import sweeps
-from planarfriction.errors import SweepInterrupted
+from planarfriction.errors import FileError, SweepInterrupted
 from planarfriction.sweeps.zarr_store import ZarrBookkeeper
 from planarfriction.writing import making_folder
 from tests.sweeps.test_running import GRIPS, MASSES, MODEL, end, grip, reference
@@ -110,6 +110,14 @@ def test_a_lost_chunk_or_a_kill_before_all_arrays_were_made_is_mended(zarr, tmp_
     told: list[sweeps.Progress] = []
     same(pf.sweep(grip, VALUES, out=path, progress=told.append), reference())
     assert (told[-1].found, told[-1].damaged) == ((5, 1) if lines else (0, 0))
+
+
+def test_a_lost_array_is_one_line(zarr, tmp_path):
+    path = tmp_path / "all.zarr"
+    pf.sweep(grip, VALUES, out=path)
+    shutil.rmtree(path / "omega")
+    with pytest.raises(FileError, match=r"all\.zarr: has lost omega: name another path"):
+        pf.sweep(grip, VALUES, out=path)
 
 
 def nothing(solution: pf.Solution) -> dict:

@@ -24,6 +24,9 @@ LEAST_SAMPLES = 10
 EVEN = 1e-3
 """Largest distance of a sample from an even grid of times, as a share of the sampling time: time stamps are rounded."""
 
+MEAN = 1e-3
+"""Largest error of an angle that is summed from means, as a share of that of the trapezoidal rule."""
+
 LEVER = 1e-9
 """Torque over force [m] up to which the torque is rounding: no contact and no offset is as small as a nanometre."""
 
@@ -79,6 +82,8 @@ class Log(ByValue):
     """Name for messages and plots."""
     turns: int = 0
     """Number of whole-turn jumps that were removed from the measured angle."""
+    held: bool = False
+    """True if the twist of a sample is the mean since the one before: held by a controller, or differences of poses."""
 
     if TYPE_CHECKING:  # what is given may be more than what is kept
 
@@ -90,6 +95,7 @@ class Log(ByValue):
             normal_force: ArrayLike,
             name: str = "log",
             turns: int = 0,
+            held: bool = False,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -150,7 +156,8 @@ class Log(ByValue):
         """Read a log from a CSV file with a heading: columns t, vx, vy, omega (or x, y, theta), fx, fy, tau,
         normal_force [SI].
 
-        Other columns and lines that begin with # are ignored. `time` and `fn` are accepted for t and normal_force,
+        Other columns and lines that begin with # are ignored, but for a theta beside the twist, which shows if that is
+        `held`. `time` and `fn` are accepted for t and normal_force,
         capital letters for small ones, and semicolons and tabs for commas. `normal_force` [N] replaces a missing column
         of that name; `window` is that of `from_motion`. If columns are named `contact.vx`, as in the files of
         `planarfriction run`, those of `contact` are read, or those of the only contact.
@@ -173,7 +180,8 @@ class Log(ByValue):
             loads = np.array(normal_force)
         try:
             if motion is TWIST:
-                return cls(columns["t"], moved, wrench, loads, path.stem)
+                held = "theta" in found and is_mean(columns["t"], moved[:, 2], columns["theta"])
+                return cls(columns["t"], moved, wrench, loads, path.stem, held=held)
             return cls.from_motion(columns["t"], moved, wrench, loads, window=window, name=path.stem)
         except InvalidValueError as error:
             raise FileError(f"{path}: {error}") from None
@@ -191,7 +199,8 @@ class Log(ByValue):
         twist, index = solution.contact_twist(contact), solution.contact_index(contact)
         time, *wrench, load = (np.asarray(solution.histories[name].values) for name in ("time", *WRENCH, *LOAD))
         name = f"{solution.scene.name}, {solution.scene.contacts[index].name}"
-        return cls(time, twist, np.stack(wrench, -1)[:, index], load[:, index], name)
+        held = is_mean(time, twist[:, 2], solution.data["theta"].values)
+        return cls(time, twist, np.stack(wrench, -1)[:, index], load[:, index], name, held=held)
 
 
 def as_logs(name: str, log: Log | Sequence[Log]) -> tuple[Log, ...]:
@@ -235,6 +244,13 @@ def increasing(time: ArrayLike, name: str = "time", at_least: int = 0) -> np.nda
         row = int(np.argmax(steps <= 0.0)) + 1
         raise InvalidValueError(name, "increase", f"{result[row]:g} after {result[row - 1]:g} s")
     return result
+
+
+def is_mean(time: np.ndarray, omega: np.ndarray, angle: np.ndarray) -> bool:
+    """Return True if each `omega` `[T]` is the mean since the sample before, and not the spin at its own instant."""
+    steps, turned = np.diff(time), np.diff(angle)
+    missed = np.abs(turned - steps * omega[1:]).max()
+    return bool(missed < MEAN * np.abs(turned - 0.5 * steps * (omega[1:] + omega[:-1])).max())
 
 
 def columns_of(log: Log) -> Mapping[str, np.ndarray]:
@@ -281,7 +297,8 @@ def unwrapped(time: np.ndarray, angle: np.ndarray, name: str = "theta") -> tuple
 def find_columns(path: Path, headings: Sequence[str], *, contact: str | None, with_load: bool) -> dict[str, str]:
     """Find the heading of each column of a log: `t`, twist or else motion, wrench, and normal force if it is there.
 
-    Names are read without regard to case and may carry a unit in brackets; `ALIASES` are known. If columns are named
+    An angle beside a twist is found too: it shows if the twist is a mean (see `Log.held`). Names are read without
+    regard to case and may carry a unit in brackets; `ALIASES` are known. If columns are named
     "contact.vx", those of `contact` are taken, or of the only contact that has them all.
 
     Raises FileError for a column that is missing, that is there twice, or that has another unit.
@@ -311,6 +328,9 @@ def find_columns(path: Path, headings: Sequence[str], *, contact: str | None, wi
         unit = _parts(heading)[1]
         if unit is not None and unit.lower().replace(" ", "") not in UNITS[name]:
             raise FileError(f"{path}: column {shown(repr(heading))} must be in SI units, got {shown(unit)}")
+    angle = named.get(f"{prefix}theta") or named.get("theta")
+    if angle is not None and (_parts(angle)[1] or "rad").strip() == "rad":
+        found.setdefault("theta", angle)
     return found
 
 

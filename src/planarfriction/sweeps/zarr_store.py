@@ -29,6 +29,9 @@ _JOURNAL = "runs.jsonl"
 """File with a line for each run that is in the store, written after its chunks. It lies in the folder of the array
 `run`, which readers of zarr do not list."""
 
+_ARRAYS = "arrays"
+"""Attribute of the store with the names of the arrays that runs have filled: one that is not there has been lost."""
+
 _ALL_CHUNKS = {"array.write_empty_chunks": True}
 """Setting of zarr under which a chunk that is not there has been lost: by default one without values is not written."""
 
@@ -133,6 +136,9 @@ class ZarrBookkeeper(Bookkeeper):
         self._read_journal()
         swept = len(self.grid.shape)
         begun = any(record.status != FAILED for _, record in self._listed.values())
+        lost = sorted({*self._group.attrs.get(_ARRAYS, ())} - {*names}) if begun else []
+        if lost:
+            raise FileError(f"{self.path}: has lost {', '.join(lost)}: name another path")
         for name in names:
             if name in (*self.grid.labels, *OWN):
                 continue
@@ -186,6 +192,7 @@ class ZarrBookkeeper(Bookkeeper):
                 attributes=dict(each.attrs),
                 config={"write_empty_chunks": True},
             )
+        self._group.attrs[_ARRAYS] = list(variables)
         self._layout = dict(variables)
 
     # ------------------------------------------------------------------ runs
