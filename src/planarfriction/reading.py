@@ -109,8 +109,11 @@ class Table:
             if self.names.count(name) > 1:
                 raise FileError(f"{path}: line {line} has two columns {shown(repr(name))}")
 
-    def numbers(self, names: Sequence[str]) -> np.ndarray:
-        """Return the columns `names`, finite, `[rows, len(names)]`; raises FileError with the line and the column."""
+    def numbers(self, names: Sequence[str], spare: Sequence[str] = ()) -> np.ndarray:
+        """Return the columns `names`, finite, `[rows, len(names)]`; raises FileError with the line and the column.
+
+        Columns that are `spare` too hold NaN where a cell is no finite number.
+        """
         for name in names:
             if not (isinstance(name, str) and name in self.names):
                 near = difflib.get_close_matches(name[:200], self.names, n=1) if isinstance(name, str) else []
@@ -121,10 +124,18 @@ class Table:
         for line, row in self._rows:
             if len(row) != len(self.names):
                 raise FileError(f"{self._path}: line {line} has {len(row)} columns, the header has {len(self.names)}")
-            values.extend(number(self._path, line, f"column {name!r}", row[column]) for name, column in columns)
+            values.extend(self._number(line, name, row[column], name in spare) for name, column in columns)
         if not values:
             raise FileError(f"{self._path}: has a header line but no rows")
         return np.array(values).reshape(-1, len(names))
+
+    def _number(self, line: int, name: str, cell: str, spare: bool) -> float:
+        try:
+            return number(self._path, line, f"column {name!r}", cell)
+        except FileError:
+            if spare:
+                return math.nan
+            raise
 
 
 def number(path: str | Path, line: int, place: str, cell: str) -> float:

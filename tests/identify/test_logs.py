@@ -13,7 +13,8 @@ import planarfriction as pf
 from planarfriction.cli.output import write_solution
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import Log, Slide, differentiated
-from planarfriction.identify.logs import unwrapped
+from planarfriction.identify.checks import Sliding
+from planarfriction.identify.logs import is_mean, unwrapped
 from planarfriction.identify.problem import FitOptions, LogProblem
 from planarfriction.identify.rig import first_noise
 from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, fitted, noisy, truth
@@ -217,7 +218,7 @@ def stepped(tmp_path, hold):
 
 @pytest.mark.parametrize(("hold", "held"), [("previous", True), ("linear", False)])
 def test_a_log_knows_if_its_twists_are_means(tmp_path, hold, held):
-    """The angle beside them shows it: read otherwise, the law that made the log leaves five times as much."""
+    """The angle beside them shows it: read otherwise, the law that made the log leaves ten times the squares."""
     log = Log.from_csv(stepped(tmp_path, hold))
     assert log.held == held
     known, left = np.array([LAW.mu_c, LAW.mu_s]), []
@@ -225,3 +226,53 @@ def test_a_log_knows_if_its_twists_are_means(tmp_path, hold, held):
         problem = LogProblem([each], PATCH, ("mu_c", "mu_s"), LAW, FitOptions(nuisance=(), refine=4), "distributed")
         left.append(np.square(problem.residual(known, problem.even_sigma(first_noise([log])))).mean())
     assert 10.0 * left[0] < left[1]
+
+
+def test_a_wrapped_angle_shows_means_too():
+    """As a tracker gives it, from -pi to pi: of means, and of spins at the samples' own instants."""
+    omega = 5.0 + np.sin(7.0 * TIME)
+    assert is_mean(TIME, omega, wrapped(np.concatenate([[0.0], np.cumsum(omega[1:] * 1e-2)])))
+    assert not is_mean(TIME, omega, wrapped(5.0 * TIME + (1.0 - np.cos(7.0 * TIME)) / 7.0))
+
+
+@pytest.mark.parametrize("cell", ["", "n/a", "inf"])
+def test_an_angle_that_is_no_number_is_ignored(tmp_path, cell):
+    """Beside a twist it is a column like any other."""
+    path = stepped(tmp_path, "previous")
+    lines = [line.split(",") for line in path.read_text().splitlines() if not line.startswith("#")]
+    at = next(i for i, name in enumerate(lines[0]) if name.split(" ")[0] == "theta")
+    lines[5][at] = cell
+    path.write_text("\n".join(",".join(line) for line in lines))
+    assert not Log.from_csv(path).held
+
+
+SPIN = np.linspace(1.0, 2.0, 50)
+"""Spin of a log [rad/s]."""
+
+
+def turning(**more):
+    """A log that turns ever faster."""
+    twist, wrench = SPIN[:, None] * [0.0, 0.0, 1.0], np.full((50, 3), -0.1)
+    return Log(TIME[:50], twist, wrench, 1.0, **more)
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [("held", "yes"), ("held", 2), ("held", np.nan), ("held", np.ones(3)), ("turns", -1), ("turns", 0.5)],
+)
+def test_a_log_refuses_other_kinds(name, wrong):
+    with pytest.raises(InvalidValueError, match=name):
+        turning(**{name: wrong})
+
+
+def test_the_name_of_a_log_is_a_text():
+    with pytest.raises(InvalidValueError, match="name"):
+        turning(name=3)
+    with pytest.raises(InvalidValueError, match="name"):
+        Log.from_motion(TIME[:50], np.zeros((50, 3)), np.zeros((50, 3)), 1.0, name=10**5000)
+
+
+@pytest.mark.parametrize(("held", "angle"), [(True, SPIN[1:].sum() * 1e-2), (False, 1.5 * 0.49)])
+def test_checks_know_how_far_a_held_log_has_turned(held, angle):
+    """The sum of means, or the trapezoid."""
+    assert Sliding.of(turning(held=held), PATCH).turned[-1] == pytest.approx(angle, rel=1e-12)

@@ -145,7 +145,8 @@ class Sliding:
         enough = [each >= share * np.quantile(each, 0.95) for each, share in ((speed, FAST), (force, STRONG))]
         rows = np.flatnonzero(np.all([*enough, speed > 0.0, force > 0.0, log.normal_force > 0.0], axis=0))
         rows = rows[:: max(1, -(-len(rows) // MOST))]
-        steps = 0.5 * (log.twist[1:, 2] + log.twist[:-1, 2]) * np.diff(log.time)
+        since = log.twist[1:, 2] if log.held else log.twist[:-1, 2]
+        steps = 0.5 * (log.twist[1:, 2] + since) * np.diff(log.time)
         turned = np.concatenate([[0.0], np.cumsum(steps)])
         return cls(log.twist[rows], log.wrench[rows], turned[rows], few.positions, weights, log.channels)
 

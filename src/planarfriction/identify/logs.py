@@ -67,7 +67,7 @@ class Log(ByValue):
     friction points against the motion.
 
     Raises InvalidValueError for fewer than ten samples, wrong shapes, numbers that are not finite, times that do not
-    increase, and negative normal forces.
+    increase, negative normal forces, and a `name`, `turns` or `held` of another kind.
     """
 
     time: np.ndarray
@@ -83,7 +83,8 @@ class Log(ByValue):
     turns: int = 0
     """Number of whole-turn jumps that were removed from the measured angle."""
     held: bool = False
-    """True if the twist of a sample is the mean since the one before: held by a controller, or differences of poses."""
+    """True if the twist of a sample is the mean since the one before: held by a controller, or differences of poses.
+    Files and simulations show it by their angle, so only where the contact turns."""
 
     if TYPE_CHECKING:  # what is given may be more than what is kept
 
@@ -99,6 +100,9 @@ class Log(ByValue):
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        validation.instance("name", self.name, str, "a text")
+        validation.instance("held", self.held, bool, "True or False")
+        validation.count("turns", self.turns, at_least=0)
         time = increasing(self.time, f"time of {self.name}", LEAST_SAMPLES)
         twist, wrench = (validation.array(name, getattr(self, name), (len(time), 3)) for name in ("twist", "wrench"))
         load = validation.numbers("normal_force", self.normal_force)
@@ -144,6 +148,7 @@ class Log(ByValue):
 
         Raises InvalidValueError for such jumps, wrong shapes and times that do not grow.
         """
+        validation.instance("name", name, str, "a text")
         time = increasing(time)
         motion = validation.array("motion", motion, (len(time), 3))
         motion[:, 2], turns = unwrapped(time, motion[:, 2], f"theta of {name}")
@@ -156,11 +161,11 @@ class Log(ByValue):
         """Read a log from a CSV file with a heading: columns t, vx, vy, omega (or x, y, theta), fx, fy, tau,
         normal_force [SI].
 
-        Other columns and lines that begin with # are ignored, but for a theta beside the twist, which shows if that is
-        `held`. `time` and `fn` are accepted for t and normal_force,
-        capital letters for small ones, and semicolons and tabs for commas. `normal_force` [N] replaces a missing column
-        of that name; `window` is that of `from_motion`. If columns are named `contact.vx`, as in the files of
-        `planarfriction run`, those of `contact` are read, or those of the only contact.
+        Other columns and lines that begin with # are ignored, but for a theta of numbers beside the twist, which shows
+        if that is `held`. `time` and `fn` are accepted for t and normal_force, capital letters for small ones, and
+        semicolons and tabs for commas. `normal_force` [N] replaces a missing column of that name; `window` is that of
+        `from_motion`. If columns are named `contact.vx`, as in the files of `planarfriction run`, those of `contact`
+        are read, or those of the only contact.
 
         Raises FileError, in one line that names the line and the column of what is wrong, and InvalidValueError for a
         wrong argument, used or not.
@@ -172,8 +177,9 @@ class Log(ByValue):
             normal_force = validation.non_negative("normal_force", normal_force)
         table = Table(path)
         found = find_columns(path, table.names, contact=contact, with_load=normal_force is None)
-        columns = dict(zip(found, table.numbers(list(found.values())).T, strict=True))
         motion = TWIST if "vx" in found else MOTION
+        spare = [found["theta"]] if motion is TWIST and "theta" in found else []
+        columns = dict(zip(found, table.numbers(list(found.values()), spare).T, strict=True))
         moved, wrench = (np.stack([columns[name] for name in names], -1) for names in (motion, WRENCH))
         loads = columns.get("normal_force")
         if loads is None:
@@ -247,10 +253,14 @@ def increasing(time: ArrayLike, name: str = "time", at_least: int = 0) -> np.nda
 
 
 def is_mean(time: np.ndarray, omega: np.ndarray, angle: np.ndarray) -> bool:
-    """Return True if each `omega` `[T]` is the mean since the sample before, and not the spin at its own instant."""
+    """Return True if each `omega` `[T]` is the mean since the sample before, and not the spin at its own instant.
+
+    The angle `[T]` may be wrapped to one turn; one that is not known (NaN) shows nothing.
+    """
     steps, turned = np.diff(time), np.diff(angle)
-    missed = np.abs(turned - steps * omega[1:]).max()
-    return bool(missed < MEAN * np.abs(turned - 0.5 * steps * (omega[1:] + omega[:-1])).max())
+    of_mean, of_ends = turned - steps * omega[1:], turned - 0.5 * steps * (omega[1:] + omega[:-1])
+    missed, usual = (np.abs(each - TURN * np.round(each / TURN)).max() for each in (of_mean, of_ends))
+    return bool(missed < MEAN * usual)
 
 
 def columns_of(log: Log) -> Mapping[str, np.ndarray]:
@@ -298,8 +308,8 @@ def find_columns(path: Path, headings: Sequence[str], *, contact: str | None, wi
     """Find the heading of each column of a log: `t`, twist or else motion, wrench, and normal force if it is there.
 
     An angle beside a twist is found too: it shows if the twist is a mean (see `Log.held`). Names are read without
-    regard to case and may carry a unit in brackets; `ALIASES` are known. If columns are named
-    "contact.vx", those of `contact` are taken, or of the only contact that has them all.
+    regard to case and may carry a unit in brackets; `ALIASES` are known. If columns are named "contact.vx", those of
+    `contact` are taken, or of the only contact that has them all.
 
     Raises FileError for a column that is missing, that is there twice, or that has another unit.
     """
@@ -329,7 +339,7 @@ def find_columns(path: Path, headings: Sequence[str], *, contact: str | None, wi
         if unit is not None and unit.lower().replace(" ", "") not in UNITS[name]:
             raise FileError(f"{path}: column {shown(repr(heading))} must be in SI units, got {shown(unit)}")
     angle = named.get(f"{prefix}theta") or named.get("theta")
-    if angle is not None and (_parts(angle)[1] or "rad").strip() == "rad":
+    if angle is not None and (_parts(angle)[1] or "rad").strip().lower() == "rad":
         found.setdefault("theta", angle)
     return found
 

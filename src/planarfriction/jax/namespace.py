@@ -23,9 +23,9 @@ def _real(name: str, value: Any, like: Any = None) -> jax.Array:
             checked = validation.numbers(name, value)
             if isinstance(value, (int, float)) and not isinstance(value, np.generic):
                 value = float(checked)  # a plain number takes the precision of what it meets
-            elif not (
-                isinstance(value, (np.ndarray, np.generic)) and value.dtype.char in "efd" and value.dtype.isnative
-            ):
+            elif isinstance(value, (np.ndarray, np.generic)) and value.dtype.char in "efd" and value.dtype.isnative:
+                value = np.asarray(value)  # plain, which a masked array is not even if it masks nothing
+            else:
                 value = jnp.asarray(checked, float)
     array = jnp.asarray(value)
     if jnp.issubdtype(array.dtype, jnp.floating):
