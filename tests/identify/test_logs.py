@@ -236,14 +236,16 @@ def test_a_wrapped_angle_shows_means_too():
 
 
 @pytest.mark.parametrize("cell", ["", "n/a", "inf"])
-def test_an_angle_that_is_no_number_is_ignored(tmp_path, cell):
-    """Beside a twist it is a column like any other."""
+@pytest.mark.parametrize(("cells", "held"), [(slice(5, 6), True), (slice(1, None), False)])
+def test_an_angle_that_is_no_number_is_ignored(tmp_path, cell, cells, held):
+    """Beside a twist it is a column like any other; what there is of it still shows means."""
     path = stepped(tmp_path, "previous")
     lines = [line.split(",") for line in path.read_text().splitlines() if not line.startswith("#")]
     at = next(i for i, name in enumerate(lines[0]) if name.split(" ")[0] == "theta")
-    lines[5][at] = cell
+    for line in lines[cells]:
+        line[at] = cell
     path.write_text("\n".join(",".join(line) for line in lines))
-    assert not Log.from_csv(path).held
+    assert Log.from_csv(path).held == held
 
 
 SPIN = np.linspace(1.0, 2.0, 50)

@@ -94,6 +94,17 @@ def test_an_empty_hand_shows_the_bias():
     assert samples[-1].time.max() < gripper.measurement.time.min()
 
 
+@pytest.mark.parametrize("samples", ["100", 0, 1.5])
+def test_an_empty_hand_refuses_at_once(samples):
+    """When it is called, and not when the first sample is asked for."""
+    with pytest.raises(InvalidValueError, match="samples must"):
+        Gripper(parts(), 20.0).empty_hand(samples)
+
+
+def test_an_empty_hand_counts_with_any_whole_number():
+    assert len(list(Gripper(parts(), 20.0).empty_hand(3.0))) == 3
+
+
 def test_the_slip_sensor_counts_and_loses_nothing():
     gripper = Gripper(parts(), 1.5, sensors=QUIET)
     time, _, _, slip = run(gripper, 1.5, 0.1)

@@ -207,6 +207,13 @@ def test_line_closed_forms(cells, direction):
     assert patch.positions == pytest.approx(patch.grid.centres().reshape(patch.grid.rows, -1, 2)[rows, columns])
 
 
+@pytest.mark.parametrize("far", [1e17, 1e50])
+def test_a_grid_knows_on_which_side_the_farthest_points_are(far):
+    rows, columns = Grid(0.0, 0.0, 1e-3, 1e-3, 2, 2).locate([[far, far], [-far, -far]])
+    assert rows[0] < 0 and columns[0] > 1
+    assert rows[1] > 1 and columns[1] < 0
+
+
 def test_line_profiles_run_from_the_top_and_from_the_left():
     down = pf.ContactPatch.line(0.02, 3, profile=[3, 2, 1])
     assert down.positions[:, 1] == pytest.approx([0.02 / 3, 0, -0.02 / 3], abs=1e-18)

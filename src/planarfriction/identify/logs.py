@@ -255,11 +255,12 @@ def increasing(time: ArrayLike, name: str = "time", at_least: int = 0) -> np.nda
 def is_mean(time: np.ndarray, omega: np.ndarray, angle: np.ndarray) -> bool:
     """Return True if each `omega` `[T]` is the mean since the sample before, and not the spin at its own instant.
 
-    The angle `[T]` may be wrapped to one turn; one that is not known (NaN) shows nothing.
+    The angle `[T]` may be wrapped to one turn; samples of it that are not known (NaN) are left out.
     """
     steps, turned = np.diff(time), np.diff(angle)
     of_mean, of_ends = turned - steps * omega[1:], turned - 0.5 * steps * (omega[1:] + omega[:-1])
-    missed, usual = (np.abs(each - TURN * np.round(each / TURN)).max() for each in (of_mean, of_ends))
+    known = np.isfinite(turned)
+    missed, usual = (np.abs(each - TURN * np.round(each / TURN))[known].max(initial=0.0) for each in (of_mean, of_ends))
     return bool(missed < MEAN * usual)
 
 

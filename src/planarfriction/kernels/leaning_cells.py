@@ -1,7 +1,7 @@
 """Cells whose friction forwards and backwards is not the same: bristles that decay towards `c = a g(|u|)/sigma_0`.
 
 A twist that is held holds c, so `z - c` steps as the bristle of a cell without c does, and the traction is that of one
-less `sigma_0 c` (docs/physics.md, "Anisotropic friction").
+less `sigma_0 c` (docs/anisotropy.md, "Asymmetric friction").
 """
 
 from __future__ import annotations

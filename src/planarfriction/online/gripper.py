@@ -220,14 +220,17 @@ class Gripper:
         return Measurement(late[:, 0].copy(), late[:, 1:4].copy(), late[:, 4].copy(), late[:, 5:].copy())
 
     def empty_hand(self, samples: int = 100) -> Iterator[Measurement]:
-        """Yield what the sensors said before the hand gripped: bias and noise, from which an observer learns the bias.
+        """Return what the sensors said before the hand gripped: bias and noise, from which an observer learns the bias.
 
         Raises InvalidValueError for a number of samples that is not >= 1.
         """
-        first = len(self._past) + validation.count("samples", samples, 1)
-        for k in range(samples):
-            sensed = self._sensed()
-            yield Measurement(np.full(len(sensed), DT * (k - first)), sensed[:, :3], sensed[:, 3])
+        samples = validation.count("samples", samples, 1)
+        first = len(self._past) + samples
+        return (self._empty(DT * (k - first)) for k in range(samples))
+
+    def _empty(self, time: float) -> Measurement:
+        sensed = self._sensed()
+        return Measurement(np.full(len(sensed), time), sensed[:, :3], sensed[:, 3])
 
     def _sensed(self) -> np.ndarray:
         """Return bias and noise of the wrenches and the grip force `[P, 4]`."""

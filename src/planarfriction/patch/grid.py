@@ -34,6 +34,10 @@ def warn_of_the_unit(name: str, positions: np.ndarray, cell_size: tuple[float, f
         warnings.warn(f"patch {name!r} is {width:.3g} m wide, {than} m: are its lengths in metres?", stacklevel=4)
 
 
+FARTHEST = 2.0**62
+"""Largest row or column in size: an integer of NumPy still."""
+
+
 @described
 @dataclass(frozen=True)
 class Grid(Checked):
@@ -106,4 +110,5 @@ class Grid(Checked):
             raise InvalidValueError("positions", "have shape [..., 2]", f"shape {list(positions.shape)}")
         from_top = self.rows - (positions[..., 1] - self.y_min) / self.cell_height
         from_left = (positions[..., 0] - self.x_min) / self.cell_width
-        return np.floor(from_top).astype(int), np.floor(from_left).astype(int)
+        row, column = (np.floor(np.clip(each, -FARTHEST, FARTHEST)).astype(int) for each in (from_top, from_left))
+        return row, column

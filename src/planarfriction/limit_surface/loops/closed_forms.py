@@ -1,6 +1,6 @@
 """Closed forms of `Phi(V) = int |v|` over segments, triangles, rectangles and rings: gradient and second derivatives.
 
-Derived in docs/exact-surfaces.md, "Exact limit surfaces".
+Derived in docs/exact-surfaces.md, "Limit surfaces in closed form".
 
 `V = (x, y, s)` at the centre of pressure in any scale of lengths; the velocity of a place p is
 `v = (x - s py, y + s px) = s J d`, `d = p - c`, with the centre of rotation `c = (-y, x)/s` and J a quarter turn. So
