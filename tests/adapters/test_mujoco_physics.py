@@ -13,6 +13,7 @@ mujoco = pytest.importorskip("mujoco")
 
 from planarfriction.scenes import in_hand, in_hand_load, simulate  # noqa: E402
 from planarfriction_studies.bench import coulomb_disc, mujoco_scenes  # noqa: E402
+from tests.support.linkage import linkage  # noqa: E402
 from tests.support.mujoco_misfit import step_checked  # noqa: E402
 
 pytestmark, SLOW = pytest.mark.mujoco, pytest.mark.slow
@@ -33,6 +34,15 @@ def test_a_grip_beside_the_centre_of_mass_neither_creeps_nor_turns(pad, dt):
     # the weight, on two pads, and its torque about them; bristles yield so little that nothing else counts
     assert np.hypot(*friction.wrenches(d)[:, :2].T).sum() == pytest.approx(0.2 * 9.81, rel=1e-6)
     assert abs(friction.wrenches(d)[:, 2]).sum() == pytest.approx(0.2 * 9.81 * 4e-3, rel=1e-3)
+
+
+def test_a_gripper_of_four_bar_linkages_holds():
+    scene = linkage()
+    m, d, friction = scene.ours()
+    held = scene.run(m, d, lambda: friction.step(d))[100:, -7:]  # its fingers have yielded to the weight
+    assert np.ptp(held[:, :3], axis=0).max() <= 1e-8
+    assert 2.0 * np.degrees(np.ptp(held[:, 4:], axis=0).max()) <= 1e-6
+    assert friction.report(d).converged
 
 
 @pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast"])

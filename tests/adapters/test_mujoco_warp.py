@@ -20,7 +20,8 @@ mjw = pytest.importorskip("mujoco_warp", reason="needs the extra [mujoco-warp]")
 
 from planarfriction.adapters import mujoco as adapter  # noqa: E402
 from planarfriction.adapters.mujoco_warp import Friction, PatchContact, prepare  # noqa: E402
-from planarfriction_studies.bench.mujoco_scenes import Native, capsule, disc, grip, plate, shaken  # noqa: E402
+from planarfriction_studies.bench.mujoco_scenes import Native, capsule, disc, grip, plate, shaken, tray  # noqa: E402
+from tests.support.linkage import linkage  # noqa: E402
 
 pytestmark = pytest.mark.mujoco_warp
 SLOW = pytest.mark.slow
@@ -140,6 +141,43 @@ def test_what_is_held_does_not_creep(scene):
     height = ours[:, 0, both.m.jnt_qposadr[first] + 2]
     speed = np.polyfit(DT * np.arange(len(height) // 2), height[len(height) // 2 :], 1)[0]
     assert abs(speed) < 1e-8
+
+
+@SLOW
+def test_a_gripper_of_four_bar_linkages_holds():
+    """Within 1 um and 0.001 degrees for 10 s, 12 mm beside the centre of mass, once its fingers have yielded."""
+    both = Both(linkage())
+    ours, theirs = both.run(both.scene.time)
+    np.testing.assert_allclose(ours[:, 0], theirs, atol=1e-5)
+    block = int(both.m.jnt_qposadr[both.m.body("block").jntadr[0]])
+    moved = np.ptp(ours[round(0.2 / DT) :, 0, block : block + 7], axis=0)
+    assert moved[:3].max() < 1e-6 and 2.0 * np.degrees(moved[4:].max()) < 1e-3
+
+
+@SLOW
+def test_blocks_on_a_shaken_tray_stay_nearer_than_without_friction():
+    """MuJoCo Warp leaves MuJoCo by itself here: with the forces of MuJoCo's patches, and no friction of its own."""
+    both = Both(tray())
+    m, d = both.scene.native(Native("pyramidal", 1.0, condim=1), DT)
+    for name in ("qpos", "qvel", "qacc_warmstart"):
+        getattr(d, name)[:] = getattr(both.d, name)
+    mujoco.mj_forward(m, d)
+    model, data = mjw.put_model(m), mjw.put_data(m, d, nworld=1)
+    ours, without = [], []
+    for i in range(round(both.scene.time / DT)):
+        both.control(i * DT)
+        before = both.d.qvel.copy()
+        both.theirs.step(both.d)
+        both.ours.step()
+        friction = both.d.qfrc_passive + m.dof_damping * before
+        for name, values in (("ctrl", both.d.ctrl), ("qfrc_applied", friction)):
+            getattr(data, name).assign(values[None].astype(np.float32))
+        mjw.step(model, data)
+        ours.append(abs(both.ours.data.qpos.numpy()[0] - both.d.qpos).max())
+        without.append(abs(data.qpos.numpy()[0] - both.d.qpos).max())
+    assert max(ours) < 1e-3 < max(without)
+    later = slice(round(0.1 / DT), None)
+    assert (np.array(ours)[later] <= 2.0 * np.array(without)[later]).all()
 
 
 @SLOW
