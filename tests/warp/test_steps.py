@@ -114,6 +114,37 @@ def test_moments(name):
         assert wrench.numpy()[i] == pytest.approx(expected, rel=1e-5 if name == "parts" else 1e-9)
 
 
+def test_shapes():
+    """Contacts have patches and laws of their own; which one can be written between steps."""
+    rough = dataclasses.replace(LAW, mu_c=1.1, mu_s=1.3)
+    models = [pf.ReducedModel(DISC, LAW), pf.ReducedModel(pf.ContactPatch.rectangle(0.02, 0.01), rough)]
+    friction = Model(models, contacts=3, which=[1, 0, 1], device="cpu", dtype=wp.float64)
+    twist, load = np.array([[1e-3, 2e-3, 0.3]] * 3), np.array([1.0, 2.0, 3.0])
+    given = arrays(wp.float64, twist, load)
+    moments = np.array([[1e-3, 2e-3]] * 3)
+
+    def expected(i, kind, law):
+        own = pf.ReducedModel(kind.patch, law)
+        return own.step(own.rest(), twist[i], load[i], 1e-2, moments=moments[i])[1]
+
+    def found():
+        new, wrench = outputs(friction)
+        friction.step(
+            friction.rest(), *given, 1e-2, new, wrench, moments=wp.array(moments, dtype=wp.float64, device="cpu")
+        )
+        friction.check()
+        return wrench.numpy().copy()
+
+    first = [expected(0, models[1], rough), expected(1, models[0], LAW), expected(2, models[1], rough)]
+    assert found() == pytest.approx(np.array(first), rel=1e-9)
+    friction.which.assign(np.array([0, 1, 1], dtype=np.int32))  # the laws stay with the contacts
+    then = [expected(0, models[0], rough), expected(1, models[1], LAW), expected(2, models[1], rough)]
+    assert found() == pytest.approx(np.array(then), rel=1e-9)
+    friction.which.assign(np.array([0, 2, 1], dtype=np.int32))
+    with pytest.raises(pf.FrictionError, match=r"parameters must be finite and in range, got .* contacts \[1\]"):
+        found()
+
+
 def test_written_parameters():
     """Parameters written between steps count from the next one."""
     friction = Model(MODELS["few"](), contacts=1, device="cpu", dtype=wp.float64)
@@ -204,13 +235,17 @@ def test_bad_numbers(place, value):
     [
         ({"contacts": 0}, "contacts must"),
         ({"dtype": int}, "dtype must be wp.float32 or wp.float64"),
+        ({"model": []}, "model must hold at least one"),
+        ({"model": [MODELS["few"]()] * 2}, "which must name the model of each contact"),
+        ({"which": [0, 1, 0]}, "which must be 3 whole numbers from 0 to 0"),
+        ({"model": [MODELS["few"](), MODELS["published"]()], "which": [0, 1, 0]}, "model must have one source"),
         ({"parameters": {"mu": 1.0}}, "mu"),
         ({"parameters": {"mu_c": [1.0, 2.0]}}, r"mu_c must be a number or have shape \(3,\), got \(2,\)"),
     ],
 )
 def test_bad_options(options, words):
     with pytest.raises(pf.FrictionError, match=words):
-        Model(MODELS["few"](), **{"contacts": 3, "device": "cpu"} | options)
+        Model(**{"model": MODELS["few"](), "contacts": 3, "device": "cpu"} | options)
 
 
 def test_bad_arrays():

@@ -18,6 +18,12 @@ class Batch:
     """Rows of `parameters`: 1, or one a contact."""
     dt: wp.float64
     parameters: wp.uint64
+    models: wp.int32
+    which: wp.uint64
+    """Models, and the index of that of each contact."""
+    number_count: wp.int32
+    place_count: wp.int32
+    """Numbers that belong to each model in `numbers` and `places`."""
     numbers: wp.uint64
     places: wp.uint64
     state: wp.uint64

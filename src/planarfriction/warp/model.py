@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.models import FrictionModel
 from planarfriction.warp import arrays
 from planarfriction.warp.kernels import Batch, kernel_of
 from planarfriction.warp.source import described, source_of
@@ -25,9 +28,12 @@ class Model:
     Parameters
     ----------
     model
-        A `ReducedModel`, `DistributedModel` or `ReducedModelPublished` with a law of LuGre bristles.
+        A `ReducedModel`, `DistributedModel` or `ReducedModelPublished` with a law of LuGre bristles; or several that
+        are stepped by the same code, as `ReducedModel` of any patches is.
     contacts
         Number of contacts.
+    which
+        Index of the model of each contact [contacts], if there are several.
     parameters
         Numbers of the law for each contact, by name (see `names`): a number, or an array [contacts]. `scale` is the
         size of the patch as a multiple of the model's: lengths of patch and lever arms, not of bristles. What is not
@@ -37,33 +43,46 @@ class Model:
     dtype
         `wp.float32` or `wp.float64`, of all arrays.
 
-    Raises InvalidValueError for models without source (see `export_c`), and parameters without that name or shape.
+    Raises InvalidValueError for models without source (see `export_c`) or of several sources, and parameters without
+    that name or shape.
     """
 
     def __init__(
         self,
-        model: Any,
+        model: FrictionModel | Sequence[FrictionModel],
         *,
         contacts: int,
+        which: Any = None,
         parameters: Mapping[str, Any] | None = None,
         device: Any = None,
         dtype: Any = wp.float32,
     ) -> None:
-        own = described(model)
-        pieces, source = own.pieces, source_of(own, arrays.precision_of(dtype))
+        models = list(model) if isinstance(model, Sequence) else [model]
+        if not models:
+            raise InvalidValueError("model", "hold at least one", "none")
         self.contacts = validation.count("contacts", contacts, at_most=2**31 - 1)
         self.device, self.dtype = wp.get_device(device), dtype
-        self.names = (*pieces.parameters, "scale")
+        kinds = self._indices(which, len(models))
+        pieces = [described(each) for each in models]
+        sources = [source_of(each, arrays.precision_of(dtype)) for each in pieces]
+        if any(each.text != sources[0].text for each in sources):
+            raise InvalidValueError("model", "have one source, as all of `ReducedModel(patch, law)` do", "several")
+        numbers = [{**each.pieces.parameters, "scale": 1.0} for each in pieces]
+        self.names = tuple(numbers[0])
         """Parameters in the order of the columns of `parameters`."""
-        self.state_shape = (self.contacts, *model.state_shape)
-        rows = arrays.parameter_rows({**pieces.parameters, "scale": 1.0}, parameters or {}, self.contacts)
+        self.state_shape = (self.contacts, *models[0].state_shape)
+        columns = {name: np.array([each[name] for each in numbers]) for name in self.names}
+        differ = {name: each[kinds] for name, each in columns.items() if (each != each[0]).any()}
+        rows = arrays.parameter_rows(numbers[0], differ | dict(parameters or {}), self.contacts)
         self.parameters = wp.array(rows, dtype=dtype, device=self.device)
         """Parameters [contacts or 1, names]; a program may write new ones between steps."""
+        self.which = wp.array(kinds, dtype=wp.int32, device=self.device)
+        """Index of the model of each contact [contacts]; a program may write new ones between steps."""
         self.status = wp.zeros(self.contacts, dtype=wp.int32, device=self.device)
         """Bits of what was wrong since the last `check` [contacts]: 1 in parameters, 2 in state, twist or load."""
-        self._numbers = wp.array(source.numbers, dtype=dtype, device=self.device)
-        self._places = wp.array(source.places, dtype=wp.int32, device=self.device)
-        self.kernel = kernel_of(source.text)
+        self._numbers = wp.array(np.stack([each.numbers for each in sources]), dtype=dtype, device=self.device)
+        self._places = wp.array(np.stack([each.places for each in sources]), dtype=wp.int32, device=self.device)
+        self.kernel = kernel_of(sources[0].text)
         """Kernel of `step` and `rollout`."""
         wp.load_module(self.kernel.module, device=self.device)
 
@@ -137,7 +156,18 @@ class Model:
         batch.wrench = self._address("wrench", wrench, (*along, 3))
         batch.parameters, batch.status = self.parameters.ptr, self.status.ptr
         batch.numbers, batch.places = self._numbers.ptr, self._places.ptr or 0
+        batch.models, batch.which = self._numbers.shape[0], self.which.ptr
+        batch.number_count, batch.place_count = self._numbers.shape[1], self._places.shape[1]
         wp.launch(self.kernel, dim=self.contacts, inputs=[batch], device=self.device)
+
+    def _indices(self, which: Any, count: int) -> np.ndarray:
+        """Return the index of the model of each contact."""
+        if which is None and count > 1:
+            raise InvalidValueError("which", "name the model of each contact", "none")
+        given = np.zeros(self.contacts, int) if which is None else np.asarray(which)
+        if given.shape != (self.contacts,) or given.dtype.kind not in "iu" or not np.isin(given, range(count)).all():
+            raise InvalidValueError("which", f"be {self.contacts} whole numbers from 0 to {count - 1}", which)
+        return given
 
     def _address(self, name: str, given: Any, shape: tuple[int, ...]) -> int:
         return arrays.address(name, given, shape, self.dtype, self.device)
