@@ -5,7 +5,7 @@ from __future__ import annotations
 from planarfriction_studies.bench.mujoco_scenes import MujocoScene, grip
 
 TORQUE = 0.5
-"""Of the motor of each finger [N m]."""
+"""Torque of the motor of each finger [N m]."""
 
 _FINGER = """<body pos="{out}0.045 0.012 0.58">
     <joint name="{side}" axis="0 {turn} 0" damping="0.02" armature="1e-4"/><geom {bar} fromto="0 0 0 0 0 -0.05"/>
