@@ -196,3 +196,13 @@ def test_numbers_beyond_floats_in_a_file_are_refused_without_a_warning(tmp_path)
     np.save(tmp_path / "map.npy", np.array([[1.0, 1.0], [1.0, np.longdouble("1e4000")]]))
     with pytest.raises((FileError, InvalidValueError), match="inf"):
         pf.ContactPatch.from_pressure(tmp_path / "map.npy", 0.001)
+
+
+def test_pixels_that_are_no_numbers_are_refused_without_a_warning(tmp_path):
+    """Signalling NaNs, of which floating-point units warn when they become numbers of another size."""
+    Image.fromarray(np.ones((4, 4), np.float32)).save(tmp_path / "map.tif")
+    ones, signalling = np.ones(4, "<f4").tobytes(), np.array([0x7FA00000], "<u4").tobytes()
+    content = (tmp_path / "map.tif").read_bytes()
+    (tmp_path / "map.tif").write_bytes(content.replace(ones, signalling + ones[4:], 1))
+    with pytest.raises(InvalidValueError, match=r"must be finite, got nan at index \(0, 0\)"):
+        pf.ContactPatch.from_pressure(tmp_path / "map.tif", 0.001)

@@ -43,7 +43,8 @@ def read_pressure_map(path: str | Path) -> np.ndarray:
         kinds = ", ".join(IMAGE_SUFFIXES)
         raise FileError(f"pressure map {path}: unknown kind {path.suffix!r}, use .csv, .npy or a grey image ({kinds})")
     try:
-        return reader(path)
+        with np.errstate(all="ignore"):  # what is no number, or too large for a float, no patch takes
+            return reader(path)
     except FrictionError:
         raise
     # Pillow reports a broken PNG as SyntaxError, and other things as what they are in its own code.
@@ -78,8 +79,7 @@ def _read_npy(path: Path) -> np.ndarray:
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "biuf":
         raise FileError(f"pressure map {path}: the file must hold one array of real numbers")
     _check_size(path, values.size)
-    with np.errstate(all="ignore"):  # what is too large for a float becomes infinite, which no patch takes
-        return values.astype(float)
+    return values.astype(float)
 
 
 def _read_image(path: Path) -> np.ndarray:
