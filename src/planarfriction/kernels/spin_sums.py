@@ -1,6 +1,10 @@
 """Nodes of the published table: sums over the cells at many centres of rotation.
 
-See docs/physics.md, "The published table, to the letter".
+The published table, to the letter, since published numbers depend on it: nodes lie at 20 polar x 80 azimuth segments of
+the half sphere of `V_S`; between them `h` is bilinear in the two angles and not normalised again. Where the centre of
+rotation lies in the grid, the sums at the four corners of its cell are blended bilinearly. The cell index is truncated
+toward zero: up to one cell outside the low edges the blend of cell 0 extrapolates; further outside, the plain sum is
+taken. The contact radius is blended in the same way (6.357 mm instead of 6.380 mm for `ContactPatch.disc_published`).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Evaluation of limit surfaces in compiled loops: `u = h(V) |V_S|` and its Jacobian for a scaled twist `V_S`.
 
-See docs/physics.md, "Limit surfaces" and "The published table, to the letter".
+See docs/physics.md, "Limit surfaces"; `kernels.spin_sums` describes the published table.
 
 `V_S = (vx, vy, r omega)` at the centre of pressure; `h` is the direction of the friction wrench with its sign
 reversed and its torque divided by `r`. `u` is homogeneous of degree 1 in `V_S` and zero at rest. A surface is a kind,
