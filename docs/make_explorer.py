@@ -80,9 +80,11 @@ def place(page: Page, x: float, y: float) -> tuple[float, float]:
 
 
 def save(page: Page, name: str, **options: Any) -> None:
-    """Write what is seen, in all its colours: a palette loses those of small marks."""
+    """Write what is seen, each colour in 52 steps: a palette loses those of small marks."""
     with Image.open(io.BytesIO(page.screenshot(**options))) as picture:
-        picture.convert("RGB").save(DOCS / "images" / f"{name}.png", optimize=True)
+        picture.convert("RGB").point(lambda value: 5 * round(value / 5)).save(
+            DOCS / "images" / f"{name}.png", optimize=True
+        )
 
 
 def pictures() -> None:

@@ -10,6 +10,7 @@ import panel as pn
 from planarfriction.laws import LAWS
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction_explorer import looks
+from planarfriction_explorer.presets import PRESETS
 from planarfriction_explorer.state import State, law_parameters
 
 TOOLS = {"Centre of rotation": "turn", "Velocity": "slide", "Brush": "brush", "Eraser": "erase"}
@@ -17,6 +18,9 @@ TOOLS = {"Centre of rotation": "turn", "Velocity": "slide", "Brush": "brush", "E
 
 OWN = "own map"
 """Choice of the patch while it is none of the published ones."""
+
+CHANGED = "choose one"
+"""Choice of the example while the screen shows none of them."""
 
 PARAMETERS = {
     "mu_c": ("", "Kinetic friction over normal force"),
@@ -38,6 +42,9 @@ class Controls:
 
     def __init__(self, state: State):
         widgets = pn.widgets
+        self.example = widgets.Select(label="Example", options=[CHANGED, *PRESETS])
+        self.undo = widgets.Button(label="Undo", disabled=True)
+        self.link = widgets.Button(label="Link")
         self.patch = widgets.Select(label="Patch", options=[*PUBLISHED_PATCHES, OWN], value=state.drawing.name)
         self.file = widgets.FileInput(accept="")
         self.cell_size = widgets.FloatInput(label="Cell size [mm]", step=0.1, format="0[.]0000")
@@ -47,8 +54,8 @@ class Controls:
         self.pressure = widgets.FloatSlider(label="Pressure of the brush", start=0.1, end=1.0, step=0.1, value=1.0)
         self.law = widgets.Select(label="Law", options=list(LAWS), value=LAWS.name_of(state.law))
         self.load = widgets.FloatInput(label="Normal force [N]", value=state.normal_force, step=0.5)
-        self.mass = widgets.FloatInput(label="Mass of the part [g]", value=1e3 * state.mass, step=10.0)
-        self.lever = widgets.FloatInput(label="Off the middle by [mm]", value=1e3 * state.lever, step=1.0)
+        self.mass = widgets.FloatInput(label="Mass of the part [g]", value=_thousandfold(state.mass), step=10.0)
+        self.lever = widgets.FloatInput(label="Off the middle by [mm]", value=_thousandfold(state.lever), step=1.0)
         vx, vy, omega = state.twist
         self.vx = widgets.FloatSlider(label="vx [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vx)
         self.vy = widgets.FloatSlider(label="vy [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vy)
@@ -92,11 +99,15 @@ class Controls:
         vx, vy, omega = state.twist
         drawing = state.drawing
         values: dict[Any, Any] = {
+            self.example: next((name for name, each in PRESETS.items() if each is state), CHANGED),
+            self.law: LAWS.name_of(state.law),
+            self.mass: _thousandfold(state.mass),
+            self.lever: _thousandfold(state.lever),
             self.vx: 1e3 * vx,
             self.vy: 1e3 * vy,
             self.omega: omega,
             self.load: state.normal_force,
-            self.cell_size: 1e3 * drawing.cell_size,
+            self.cell_size: _thousandfold(drawing.cell_size),
             self.patch: drawing.name if drawing.origin == "published" else OWN,
         }
         self._silent = True
@@ -107,8 +118,15 @@ class Controls:
         finally:
             self._silent = False
 
+    def head(self) -> Any:
+        """Return the controls of the whole screen, beside each other."""
+        self.example.styles = looks.grows(200, most=260)
+        self.undo.styles = self.link.styles = looks.grows(60, most=90)
+        parts = self.example, self.undo, self.link
+        return pn.FlexBox(*parts, gap="0 8px", align_items="flex-end", styles=looks.grows(340))
+
     def layout(self) -> Any:
-        """Return the controls, except for the tool, one below the other."""
+        """Return the controls, except for the tool and those of `head`, one below the other."""
         return pn.Column(
             _heading("Contact"),
             self.patch,
@@ -128,6 +146,11 @@ class Controls:
             stylesheets=[looks.SIDE],
             styles=looks.grows(270, most=320),
         )
+
+
+def _thousandfold(value: float) -> float:
+    """Return g of kg and mm of m, as somebody would type them: 70.3, not 70.30000000000001."""
+    return float(f"{1e3 * value:.12g}")
 
 
 def _heading(text: str) -> Any:

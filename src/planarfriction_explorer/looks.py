@@ -14,8 +14,16 @@ CARD = """:host {background: white; border: 1px solid #DFE3E8; border-radius: 8p
   box-sizing: border-box}"""
 """Style of a part of the page."""
 
-SIDE = CARD + "\n@media (max-width: 760px) {:host {order: 2; max-width: none !important}}"
-"""Style of the controls, which stand below the map on a small screen."""
+_NARROW = "@media (max-width: 760px)"
+
+SIDE = f"{CARD}\n{_NARROW} {{:host {{max-width: none !important}}}}"
+"""Style of the controls, which are as wide as a small screen."""
+
+OPENED = f"{_NARROW} {{:host {{display: contents !important}}}}"
+"""Style of a column whose parts mix with those around it on a small screen."""
+
+FIRST = f"{_NARROW} {{:host {{order: -1}}}}"
+"""Style of what stands before all else on a small screen."""
 
 CODE = """textarea {font-family: ui-monospace, "DejaVu Sans Mono", monospace; font-size: 13px; white-space: pre;
   color: #222 !important; background: #FAFAFA; opacity: 1 !important}"""

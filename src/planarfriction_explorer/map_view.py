@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from bokeh import events
-from bokeh.models import ColumnDataSource, LinearColorMapper, Range1d
+from bokeh.models import ColumnDataSource, LinearColorMapper, Range1d, SaveTool
 from bokeh.palettes import Cividis256
 from bokeh.plotting import figure
 
@@ -30,8 +30,9 @@ class MapView:
             aspect_ratio=1.0,
             width=400,
             height=400,
-            tools="",
-            toolbar_location=None,
+            tools=[SaveTool(filename="map")],
+            toolbar_location="above",
+            toolbar_inner=True,  # beside the frame it would take from its height
             x_axis_label="x [mm]",
             y_axis_label="y [mm]",
             x_range=Range1d(),
@@ -42,6 +43,7 @@ class MapView:
             min_border_bottom=56,
         )
         looks.tidy(plot)
+        plot.toolbar.logo = None
         plot.grid.visible = False
         shades = LinearColorMapper(palette=Cividis256, low=0.0, high=1.0, nan_color="#FFFFFF00")
         plot.image("image", "x", "y", "dw", "dh", source=self._sources["map"], color_mapper=shades, alpha=0.85)

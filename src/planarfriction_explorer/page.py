@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -16,13 +17,18 @@ from planarfriction_explorer.answers import Answer, answer
 from planarfriction_explorer.controls import OWN, Controls
 from planarfriction_explorer.drawing import Drawing
 from planarfriction_explorer.ladder_tab import LadderTab
+from planarfriction_explorer.links import from_link, to_link
 from planarfriction_explorer.live import Paced
 from planarfriction_explorer.map_view import MapView, legend
+from planarfriction_explorer.presets import PRESETS
 from planarfriction_explorer.scene_tab import SceneTab
 from planarfriction_explorer.state import State
 
 FASTEST = 0.1
 """Velocity [m/s] that a drag from the middle to the edge of the map gives."""
+
+STEPS = 100
+"""Most steps that can be undone."""
 
 LADDER = 2
 """Number of the tab with the ladder of the models."""
@@ -32,7 +38,11 @@ class Page:
     """One session: its state, its controls and its pictures."""
 
     def __init__(self) -> None:
-        self.state = State()
+        self.state: State = next(iter(PRESETS.values()))
+        self._past: deque[State] = deque(maxlen=STEPS)
+        """States that can be gone back to, one for each step."""
+        self._step: Any = None
+        """Control that is being dragged: all that it changes until it is released is one step."""
         self.answer: Answer | None = None
         self._figure: dict[str, Any] = {}
         self._laws: dict[str, FrictionLaw] = {}
@@ -57,6 +67,7 @@ class Page:
             ("Run a scene", self.scenes.layout),
             ("MuJoCo", _copied(self.mujoco)),
             dynamic=True,
+            margin=(10, 0, 0, 0),
             sizing_mode="stretch_width",
             stylesheets=[looks.CARD],
         )
@@ -79,11 +90,39 @@ class Page:
         on(controls.mass, lambda grams: self._change(mass=1e-3 * grams))
         on(controls.lever, lambda millimetres: self._change(lever=1e-3 * millimetres))
         for slider in (controls.vx, controls.vy, controls.omega):
-            on(slider, lambda _: self._slide())
+            controls.on(slider, lambda _, slider=slider: self._try(self._slide, slider))
+            slider.param.watch(lambda _: self._end_step(), "value_throttled")
+        on(controls.example, lambda name: self._restore(PRESETS[name]) if name in PRESETS else None)
+        controls.undo.on_click(lambda _: self._try(self._undo, controls.undo))
+        controls.link.on_click(lambda _: self._put_link())
         controls.clear.on_click(lambda _: self._try(self._clear))
+        if pn.state.location is not None:
+            pn.state.location.param.watch(lambda event: self._try(lambda: self._follow_link(event.new)), "hash")
         self._offer_parameters()
 
     # ------------------------------------------------------------------ wishes of the user
+
+    def _restore(self, state: State) -> None:
+        """Show another state: all controls and all pictures."""
+        self.state = state
+        self._offer_parameters()
+        self._redraw()
+        self._refresh()
+
+    def _undo(self) -> None:
+        self._step = self.controls.undo  # which makes no step of its own
+        if self._past:  # the button may be clicked faster than it is disabled
+            self._restore(self._past.pop())
+
+    def _put_link(self) -> None:
+        location: Any = pn.state.location
+        location.hash = to_link(self.state)
+        self._say("The address of this page now holds what is on the screen: keep it or pass it on.")
+
+    def _follow_link(self, link: str) -> None:
+        """Show what a link holds; the address changes too where the page itself has put it there."""
+        if link and link != to_link(self.state):
+            self._restore(from_link(link))
 
     def _offer_parameters(self) -> None:
         self.controls.offer_parameters(self.state.law, lambda _: self._try(self._set_law))
@@ -120,7 +159,7 @@ class Page:
     def _dragged(self, x: float, y: float) -> None:
         """Keep where the pointer is; what it has passed while the page was at work is left out, but for the brush."""
         if self.controls.tool.value in ("brush", "erase"):
-            self._try(lambda: self._paint(x, y))
+            self._try(lambda: self._paint(x, y), self.map)
             return
         waiting, self._pointer = self._pointer is not None, (x, y)
         if not waiting:
@@ -130,7 +169,7 @@ class Page:
     def _follow(self) -> None:
         pointer, self._pointer = self._pointer, None
         if pointer is not None:
-            self._try(lambda: self._follow_to(*pointer))
+            self._try(lambda: self._follow_to(*pointer), self.map)
 
     def _follow_to(self, x: float, y: float) -> None:
         if self.controls.tool.value == "turn":
@@ -147,8 +186,13 @@ class Page:
         self._draw(drawing.painted(x, y, radius=radius, pressure=pressure), quick=True)
 
     def _released(self) -> None:
+        self._follow()
         if self.controls.tool.value in ("brush", "erase"):
-            self._try(lambda: self._draw(self.state.drawing))
+            self._try(lambda: self._draw(self.state.drawing), self.map)
+        self._end_step()
+
+    def _end_step(self) -> None:
+        self._step = None
 
     def _change(self, **values: Any) -> None:
         self.state = self.state.changed(**values)
@@ -161,14 +205,23 @@ class Page:
 
     # ------------------------------------------------------------------ showing
 
-    def _try(self, act: Callable[[], Any]) -> None:
-        """Carry out a wish of the user, or say in one line why not; the browser gets all changes in one message."""
+    def _try(self, act: Callable[[], Any], step: Any = None) -> None:
+        """Carry out a wish of the user, or say in one line why not; the browser gets all changes in one message.
+
+        What the same control, `step`, changes until it is released can be undone together.
+        """
+        before = self.state
         with pn.io.unlocked():
             try:
                 self.message.visible = False
                 act()
             except FrictionError as error:
                 self._say(str(error), looks.ALERT)
+            if self.state is not before:
+                if step is None or step is not self._step:
+                    self._past.append(before)
+                self._step = step
+                self.controls.undo.disabled = not self._past
 
     def _say(self, words: str, look: str = looks.HINT) -> None:
         self.message.object = f"<div id='message' style='{look}'>{html.escape(words)}</div>"
@@ -220,7 +273,7 @@ class Page:
     def layout(self) -> Any:
         """Return the whole page."""
         words = "<b style='font-size:20px'>planarfriction explorer</b>"
-        title = pn.pane.HTML(words, margin=(8, 4, 0, 4))
+        title = pn.pane.HTML(words, margin=(8, 12, 4, 4))
         hint = pn.pane.HTML("<b style='font-size:15px'>Drag over the map</b>", margin=(4, 0, 4, 0))
         plane = pn.Column(
             hint,
@@ -232,14 +285,14 @@ class Page:
         )
         space = pn.Column(self.numbers, self.grid, self.surface, stylesheets=[looks.CARD], styles=looks.grows(360))
         main = pn.Column(
-            pn.FlexBox(plane, space, gap="10px", align_items="stretch"),
-            pn.Spacer(height=10),
+            pn.FlexBox(plane, space, gap="10px", align_items="stretch", stylesheets=[looks.FIRST]),
             self.tabs,
+            stylesheets=[looks.OPENED],
             styles=looks.grows(600),
         )
         hidden = (self.slow.asked, self.slow.drawn)
         return pn.Column(
-            title,
+            pn.FlexBox(title, self.controls.head(), align_items="flex-end"),
             self.message,
             *hidden,
             pn.FlexBox(self.controls.layout(), main, gap="10px", align_items="flex-start"),

@@ -243,7 +243,7 @@ def test_a_wrong_file_is_one_line_and_a_right_one_is_loaded_after_it(visitor, na
     assert name in message and words in message and visitor.text() == before
     right = {"name": "right.csv", "mimeType": "text/csv", "buffer": b"0,1,0\n1,2,1\n"}
     visitor.after(lambda: visitor.page.locator(".file input").set_input_files(right))
-    assert visitor.says("'right.csv'") and not visitor.page.locator("#message").is_visible()
+    assert visitor.says("'right.csv'") and "right.csv: 2 x 3 cells" in visitor.message()
 
 
 def test_what_is_on_the_screen_can_be_copied(visitor):
@@ -258,7 +258,7 @@ def test_the_ladder_of_the_models_follows_what_is_on_the_screen(visitor):
     visitor.page.get_by_text("Models", exact=True).click()
     visitor.ladder_after(lambda: None, "")
     before = visitor.ladder()
-    assert [row.split("\t")[0] for row in before.splitlines()[1:]] == list(RUNGS)
+    assert [row.split("\t")[0].removeprefix("● ") for row in before.splitlines()[1:]] == list(RUNGS)
     after = visitor.ladder_after(lambda: visitor.drag((0.0, 10.0), (3.0, 5.0)), before)
     visitor.choose("law", "coulomb-stribeck")
     refused = visitor.ladder_after(lambda: None, after)
@@ -320,12 +320,69 @@ def test_a_scene_file_is_run_as_it_is_and_a_wrong_one_is_one_line(visitor):
     assert not visitor.page.locator("#message").is_visible()
 
 
-def test_a_model_that_does_not_take_the_law_is_one_line(visitor):
-    visitor.choose("law", "coulomb-stribeck")
+def test_a_scene_that_cannot_be_run_is_one_line(visitor):
+    visitor.page.locator(".clear button").click()
     visitor.page.get_by_text("Run a scene").click()
     visitor.page.locator(".run button").click()
-    assert "creep_speed" in visitor.message()
+    visitor.page.get_by_text("must have a total > 0").wait_for()
     assert visitor.page.locator(".run button").inner_text() == "Run"
+
+
+def test_a_link_opens_what_was_on_the_screen_and_another_one_replaces_it(visitor, browser):
+    visitor.after(lambda: visitor.choose("example", "L-shaped foot"))
+    visitor.after(lambda: visitor.fill("mass", "70.3"))
+    visitor.after(lambda: visitor.choose("law", "dahl"))
+    visitor.page.locator(".link button").click()
+    assert "address" in visitor.message()
+    visitor.page.wait_for_function("location.hash.length > 100")
+    other = Visitor(browser, visitor.address)
+    first = other.text()
+    other.after(lambda: other.page.goto(visitor.page.url))  # an address of the same page: no new visit
+    assert other.says("pf.Dahl(", "from_pressure(") and (other.numbers() == visitor.numbers()).all()
+    assert other.page.locator(".mass input").input_value() == "70.3"
+    other.after(other.page.locator(".undo button").click)
+    assert other.text().splitlines()[:4] == first.splitlines()[:4]
+    other.page.reload()
+    assert other.says("pf.Dahl(")
+    other.page.goto(visitor.address + "/#%7B%22mass%22:-1%7D")
+    assert "mass must be > 0" in other.message()
+    other.page.context.close()
+    assert other.errors == [] and other.elsewhere == []
+
+
+def test_undo_takes_a_drag_back_at_once(visitor):
+    before = visitor.numbers()
+    visitor.after(lambda: visitor.drag((0.0, 10.0), (3.0, 5.0), (5.0, -4.0)))
+    visitor.page.wait_for_timeout(500)
+    slider = visitor.page.locator(".vx .noUi-handle").bounding_box()
+    visitor.page.mouse.move(slider["x"] + 5, slider["y"] + 5)
+    visitor.page.mouse.down()
+    visitor.after(lambda: visitor.page.mouse.move(slider["x"] + 40, slider["y"] + 5, steps=10))
+    visitor.page.mouse.up()
+    visitor.page.wait_for_timeout(500)
+    for _ in range(2):
+        assert visitor.page.locator(".undo button").is_enabled()
+        visitor.after(visitor.page.locator(".undo button").click)
+    np.testing.assert_array_equal(visitor.numbers(), before)
+    visitor.page.locator(".undo button[disabled]").wait_for()
+
+
+def test_the_map_is_saved_as_a_picture(visitor):
+    with visitor.page.expect_download() as saved:
+        visitor.page.locator(".bk-tool-icon-save").click()
+    assert saved.value.suggested_filename == "map.png"
+    assert saved.value.path().read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_phone_shows_the_pictures_then_the_controls_then_the_code(visitor):
+    visitor.page.set_viewport_size({"width": 400, "height": 800})
+    visitor.page.wait_for_timeout(1000)
+    tops = [
+        visitor.page.locator(each).first.bounding_box()["y"]
+        for each in (".example", ".tool", "#answer", ".load", ".python")
+    ]
+    assert tops == sorted(tops) and tops[1] < 400.0
+    assert visitor.page.evaluate("document.documentElement.scrollWidth") <= 400
 
 
 def test_two_visitors_do_not_change_each_other(visitor, browser, address):

@@ -14,12 +14,17 @@ import numpy as np
 import pytest
 
 from planarfriction.errors import FrictionError, InvalidValueError
+from planarfriction.laws import Dahl
 from planarfriction.planning import holding_load
 from planarfriction_explorer.answers import answer
+from planarfriction_explorer.drawing import Drawing
+from planarfriction_explorer.links import to_json, to_link
+from planarfriction_explorer.presets import PRESETS
+from planarfriction_explorer.state import State
 
 pn = pytest.importorskip("panel", reason="needs Panel, the extra [explore]")
 
-from planarfriction_explorer.controls import OWN  # noqa: E402
+from planarfriction_explorer.controls import CHANGED, OWN  # noqa: E402
 from planarfriction_explorer.live import GivenUp, Live  # noqa: E402
 from planarfriction_explorer.page import Page  # noqa: E402
 from planarfriction_explorer.server import open_server  # noqa: E402
@@ -106,8 +111,79 @@ def test_the_page_says_whether_a_part_is_held_with_its_mass_and_friction(page):
     assert "mass must be &gt; 0" in page.message.object
 
 
+OTHER = State(Drawing(np.ones((2, 3)), 2e-3), Dahl(mu_c=0.3), 2.5, (0.01, -0.02, 3.0), 0.0703, -0.004)
+
+
+def test_another_state_sets_every_control(page):
+    page._follow_link(to_link(OTHER))
+    controls = page.controls
+    assert to_json(page.state) == to_json(OTHER) and controls.patch.value == OWN and controls.law.value == "dahl"
+    found = [getattr(controls, name).value for name in ("cell_size", "load", "mass", "lever", "vx", "vy", "omega")]
+    assert found == [2.0, 2.5, 70.3, -4.0, 10.0, -20.0, 3.0] and controls.law_values()["mu_c"] == 0.3
+    np.testing.assert_allclose(shown(page)[1], answer(OTHER).surface * [1.0, 1.0, 1e3], atol=5e-5)
+    assert "mu_c=0.3" in page.python.value and page.controls.example.value == CHANGED
+
+
+def test_a_link_that_holds_no_state_leaves_the_page_as_it_is(page):
+    before = page.state
+    page._try(lambda: page._follow_link("#%7B%22mass%22:-1%7D"))
+    assert "mass must be &gt; 0" in page.message.object and page.message.visible and page.state is before
+    page._try(lambda: page._follow_link(""))
+    assert page.state is before and page.controls.undo.disabled
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_an_example_is_shown_until_something_is_changed(page, name):
+    page.controls.example.value = name
+    assert page.state is PRESETS[name] and shown(page).any() and not page.message.visible
+    page.controls.mass.value = 77.0
+    assert page.controls.example.value == CHANGED and page.state.mass == 0.077
+    page.controls.undo.clicks += 1
+    assert page.controls.example.value == name and page.controls.mass.value == pytest.approx(1e3 * page.state.mass)
+
+
+def test_undo_goes_back_step_by_step_and_a_drag_is_one(page):
+    def drag(tool: str) -> None:
+        page.controls.tool.value = tool
+        for x in (0.0, 1e-3, 2e-3, 3e-3):
+            if tool == "brush":
+                page._dragged(x, 0.0)
+            else:
+                page._follow()
+                page._pointer = (x, 0.0)  # which `_dragged` leaves to be followed in the next tick
+        page._released()
+
+    states = [page.state]
+    for tool in ("turn", "turn", "brush", "brush", "slide"):
+        drag(tool)
+        states.append(page.state)
+    assert states[1].centre_of_rotation == pytest.approx((3e-3, 0.0))
+    for value in (1.0, 2.0, 3.0):  # a slider that is dragged
+        page.controls.vx.value = value
+    page.controls.vx.param.trigger("value_throttled")
+    states.append(page.state)
+    page.controls.vx.value = 4.0
+    for before in reversed(states):
+        page.controls.undo.clicks += 1
+        assert page.state is before
+    assert page.controls.undo.disabled and page.controls.patch.value == "NonConvex1"
+    page.controls.undo.clicks += 1
+    assert page.state is states[0]
+
+
+def test_undo_leaves_the_empty_map_and_brings_the_law_back(page):
+    law = page.state.law
+    page.controls.law.value = "dahl"
+    page.controls.clear.clicks += 1
+    page.controls.undo.clicks += 1
+    assert shown(page).any() and not page.message.visible
+    page.controls.undo.clicks += 1
+    assert page.state.law is law and page.controls.law.value == "lugre" and page.controls.law_values()["mu_s"] == 1.2
+
+
 def test_a_page_that_nobody_holds_is_freed():
     one = Page()
+    one.controls.mass.value = 77.0
     layout, kept = one.layout(), weakref.ref(one)
     del one, layout
     gc.collect()
