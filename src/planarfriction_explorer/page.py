@@ -27,8 +27,8 @@ from planarfriction_explorer.state import State
 FASTEST = 0.1
 """Velocity [m/s] that a drag from the middle to the edge of the map gives."""
 
-STEPS = 100
-"""Most steps that can be undone."""
+STEPS = 30
+"""Most steps that can be undone: a map of the most cells takes a megabyte."""
 
 LADDER = 2
 """Number of the tab with the ladder of the models."""
