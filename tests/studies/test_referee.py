@@ -104,7 +104,9 @@ def second(source, a):
     return dry(lambda t: a["force"] / moving, lambda t, v: a["mu"] * G, time=a["time"])[-1, 1]
 
 
-@pytest.mark.parametrize("name", [name for name, truth in TRUTHS.items() if truth.source not in (*MOTIONS, "disc")])
+@pytest.mark.parametrize(
+    "name", [name for name, truth in TRUTHS.items() if truth.source not in (*MOTIONS, "disc", "measured")]
+)
 def test_small_steps_agree(name):
     truth = TRUTHS[name]
     assert second(truth.source, truth.given) == pytest.approx(truth.value, abs=5e-5)  # of a step of 50 us at 1 m/s
@@ -159,6 +161,28 @@ def test_sums_over_cells_agree(name):
     found = moved(a)
     for truth in known:  # a tenth of what is allowed: of the cells, the steps, and the last millimetre per second
         assert abs(found[truth.given["what"]] - truth.value) < 0.1 * truth.allowed
+
+
+def test_measured_slides_are_those_of_the_cube():
+    """Friction and velocities of the case come from the tosses: the longest of those that spin fast."""
+    tosses = truths.tosses()
+    ends = {toss: tosses[tosses["toss"] == toss][-1] for toss in np.unique(tosses["toss"])}
+    still = [
+        k for k, end in ends.items() if max(abs(end["vx_mps"]), abs(end["vy_mps"]), 0.1 * abs(end["wz_radps"])) < 0.03
+    ]
+    slides = {k: truths.sliding(k) for k in still if (tosses["toss"] == k).sum() >= 25}
+    ways = {k: math.hypot(*moved[:2]) for k, (_, moved) in slides.items()}
+    mus = [
+        v[:2] @ v[:2] / (2.0 * G * ways[k])
+        for k, (v, d) in slides.items()
+        if ways[k] > 0.03 and abs(d[2]) < math.radians(10)
+    ]
+    case = CASES["measured_slides"]
+    assert case.contacts[0].mu[0] == pytest.approx(np.median(mus), rel=1e-3)
+    fast = sorted((k for k in slides if abs(slides[k][0][2]) > 1.0), key=lambda k: -ways[k])[:3]
+    assert fast == [truth.given["toss"] for truth in case.truths[::3]]
+    for k, body in zip(fast, case.moving, strict=True):
+        assert np.array(body.velocity)[[0, 1, 5]] == pytest.approx(slides[k][0], rel=1e-5)
 
 
 def test_a_plate_ends_in_the_hand_where_a_sum_over_cells_says():

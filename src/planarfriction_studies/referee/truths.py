@@ -1,4 +1,4 @@
-"""Truths: closed forms, and exact motions of rigid bodies with dry friction, by the names that cases give as `source`.
+"""Truths: closed forms, exact motions of rigid bodies with dry friction, and measured ones, by the names in `source`.
 
 Each returns a number; `value` looks one up. Patches are rectangles, discs or an L of two rectangles, whose pressure is
 uniform or linear; their wrench is that of the exact limit surface, so that the error is that of the integration.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -237,9 +238,40 @@ def held_plate(
     return tuple(map(float, _moved(acceleration, velocity, math.sqrt(inertia / mass), time, rests=True)))  # pyright: ignore[reportReturnType]
 
 
+# ---------------------------------------------------------------------- measured slides
+
+TOSSES = Path(__file__).parents[1] / "measured" / "data" / "contactnets_slides.csv.gz"
+"""Slides of a cube (see the NOTICE beside it)."""
+
+FIRST = 8
+"""Sample at which a slide begins here: the cube has landed."""
+
+
+@functools.cache
+def tosses() -> np.ndarray:
+    """Return the rows of all slides, with the columns of `TOSSES` by name."""
+    return np.genfromtxt(TOSSES, delimiter=",", names=True)
+
+
+def sliding(toss: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return twist and displacement to rest [m, m, rad] of a slide in the cube's first axes."""
+    rows = tosses()[tosses()["toss"] == toss]
+    first, last, yaw = rows[FIRST], rows[-1], np.unwrap(rows["yaw_rad"])
+    c, s = math.cos(first["yaw_rad"]), math.sin(first["yaw_rad"])
+    axes = np.array([[c, s], [-s, c]])
+    velocity = axes @ [first["vx_mps"], first["vy_mps"]]
+    moved = axes @ [last["x_m"] - first["x_m"], last["y_m"] - first["y_m"]]
+    return np.array([*velocity, first["wz_radps"]]), np.array([*moved, yaw[-1] - yaw[FIRST]])
+
+
+def measured(toss: int, what: str) -> float:
+    """Return x, y [m] or the turn [rad] of a measured slide."""
+    return float(sliding(toss)[1][_PLACES.index(what)])
+
+
 SOURCES: dict[str, Callable[..., float]] = {
     each.__name__: each
-    for each in (held, slope, stop, disc, stribeck_stop, grip_slips, pad_turns, tower, shaken, slide, in_hand)
+    for each in (held, slope, stop, disc, stribeck_stop, grip_slips, pad_turns, tower, shaken, slide, in_hand, measured)
 }
 
 
