@@ -190,7 +190,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     },
     **{
         f"online.{name}": {"measurement": pf.online.Measurement(0.1, (0.0, 1.0, 0.0), 4.0, (0.0, 0.01, 0.0))}
-        for name in ("FrictionObserver.take", *(f"{each}.update" for each in MEASURING))
+        for name in (f"{each}.update" for each in MEASURING)
     },
     **{
         f"online.{name}": {"observer": Fresh(lambda: objects()["FrictionObserver"]), "goal": 0.02}

@@ -220,7 +220,7 @@ def test_an_empty_hand_gives_the_bias():
     for k in range(100, 200):
         found, other = (each.update(Measurement(1e-3 * k, bias + load, 4.0)) for each in (own, plain))
     assert own.bias == pytest.approx(bias, rel=1e-2)
-    freed = own.take(Measurement(1.0, bias + load, 4.0))["wrench"]  # as controllers see it
+    freed = own._take(Measurement(1.0, bias + load, 4.0))["wrench"]  # as controllers see it
     assert freed == pytest.approx(load, abs=1e-2 * np.abs(bias).max())
     assert found.gauge == pytest.approx(0.25, rel=5e-3)
     assert abs(other.gauge / 0.25 - 1.0) > 0.02  # without an empty hand the bias is load

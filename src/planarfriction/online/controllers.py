@@ -42,7 +42,7 @@ class GripController:
 
         Raises InvalidValueError for a measurement that does not fit the observer.
         """
-        self._found = self.observer.take(measurement)
+        self._found = self.observer._take(measurement)
         self._grip(self.state.reshape(-1), self._found.reshape(-1), *self._settings)
         return self.state["grip"].copy()
 

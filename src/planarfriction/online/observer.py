@@ -150,9 +150,9 @@ class FrictionObserver:
 
         Raises InvalidValueError for a measurement whose arrays do not have the shape of the batch.
         """
-        return estimate_of(self.take(measurement))
+        return estimate_of(self._take(measurement))
 
-    def take(self, measurement: Measurement) -> np.ndarray:
+    def _take(self, measurement: Measurement) -> np.ndarray:
         """Take a sample of every part; return the compiled filter's records of what is known, one a part.
 
         Raises InvalidValueError as `update` does.

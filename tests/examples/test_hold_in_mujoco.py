@@ -1,0 +1,19 @@
+"""The example that holds a plate in MuJoCo: what slips, with how much grip, beside the published rule."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.support.repository import script
+
+pytest.importorskip("mujoco", reason="needs MuJoCo: pip install 'planarfriction[mujoco]'")
+
+pytestmark = pytest.mark.mujoco
+
+
+def test_a_hand_that_tilts_holds_with_less_grip_than_the_rule():
+    found = script("examples/hold_in_mujoco.py").main()
+    own, rule = found["Hold"], found["published rule"]
+    assert own.slip < 1e-3 and own.turn < np.radians(2.0)
+    assert own.grip < 0.85 * rule.grip
