@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -87,7 +86,10 @@ def filled(page: str, stored: dict[str, Any]) -> str:
 def main(folders: Sequence[str]) -> None:
     """Store a run, and fill the page."""
     for folder in folders:
-        shutil.copy(Path(folder) / "referee.json", KEPT)
+        stored = json.loads((Path(folder) / "referee.json").read_text())
+        for row in stored["verdicts"]:
+            row.pop("path")  # films are on the page that the referee writes
+        KEPT.write_text(json.dumps(stored, indent=1) + "\n")
     for page in PAGES:
         page.write_text(filled(page.read_text(encoding="utf-8"), json.loads(KEPT.read_text())), encoding="utf-8")
 
