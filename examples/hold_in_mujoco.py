@@ -25,7 +25,8 @@ DT, DELAY, END = 1e-3, 20, 5.0  # time step [s], delay of the sensors [steps], d
 MU, MASS, ARM, RADIUS = 0.8, 0.2, 0.008, 0.012  # [-], [kg], from the pads to the centre of mass, of the pads [m]
 FIRST, MOST, RATE = 20.0, 40.0, 150.0  # forces of a finger at first and at most [N], largest change [N/s]
 TILT, TILTS, LASTS = np.radians(45.0), 3.0, 0.5  # of the hand [rad], when, and for how long [s]
-LEARNT = 2.0  # time after which slip and grip are compared [s]
+LIFTED = 0.2  # time from which the controller chooses the grip [s]
+LEARNT = 2.8  # time by which friction is known: grips are compared from then on [s]
 SENSORS = Sensors()
 
 SIDE = RADIUS / np.sqrt(2.0)  # half the width of boxes with their corners on the rim [m]
@@ -53,12 +54,14 @@ def disc(mu: float) -> pf.ReducedModel:
 
 
 class Held(NamedTuple):
-    """Slip of a plate after the first seconds, and the mean grip force then."""
+    """Slip of a plate while friction is found and after that, and the mean grip force after it."""
 
+    first: float
+    """[m]"""
     slip: float
     """[m]"""
     turn: float
-    """[rad]"""
+    """In all [rad]."""
     grip: float
     """[N]"""
 
@@ -78,7 +81,6 @@ def hold(control: Callable[[Measurement], Any], seed: int = 0) -> Held:
     grip, places, grips = FIRST, [], []
     for k in range(round(END / DT)):
         d.ctrl[:] = grip, grip, TILT * np.clip((k * DT - TILTS) / LASTS, 0.0, 1.0)
-        m.opt.gravity[2] = -9.81 * (k > 100)
         friction.step(d)
         slip = slip - DT * friction.twists(d)[0]  # of the plate over the near finger, whose site has the patch's axes
         velocity = np.full(3, np.nan)
@@ -87,13 +89,13 @@ def hold(control: Callable[[Measurement], Any], seed: int = 0) -> Held:
             velocity, counted, ticked = (now - counted) * unit / ((k - ticked) * DT), now, k
         wrench = -friction.wrenches(d)[0] + random.normal(size=3) * noise
         sent.append(Measurement(k * DT, wrench, friction.loads(d)[0] + random.normal() * noise[0], velocity))
-        wanted = min(float(np.asarray(control(sent[0]))), MOST)
+        wanted = min(float(np.asarray(control(sent[0]))), MOST) if k * DT > LIFTED else FIRST
         grip += np.clip(wanted - grip, -RATE * DT, RATE * DT)
         places.append(slip.copy())
         grips.append(grip)
-    later = np.array(places[round(LEARNT / DT) :])
-    moved = later - later[0]
-    return Held(np.hypot(*moved[:, :2].T).max(), abs(moved[:, 2]).max(), float(np.mean(grips[round(LEARNT / DT) :])))
+    path, known = np.array(places), round(LEARNT / DT)
+    slips = [np.hypot(*(part - part[0])[:, :2].T).max() for part in (path[:known], path[known:])]
+    return Held(*slips, abs(path[:, 2]).max(), float(np.mean(grips[known:])))
 
 
 class Rule:
@@ -114,8 +116,8 @@ def main() -> dict[str, Held]:
     """Hold the plate in both ways, and print what happened."""
     found = {"Hold": hold(Hold(FrictionObserver(disc(0.5), sensors=SENSORS)).update), "published rule": hold(Rule())}
     for name, each in found.items():
-        turned = np.degrees(each.turn)
-        print(f"{name}: {each.grip:.1f} N, slips {1e3 * each.slip:.2f} mm, turns {turned:.2f} degrees")
+        slips = f"{1e3 * each.first:.2f} mm at first, {1e3 * each.slip:.2f} mm later"
+        print(f"{name}: {each.grip:.1f} N, slips {slips}, turns {np.degrees(each.turn):.1f} degrees")
     return found
 
 

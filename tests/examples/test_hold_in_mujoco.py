@@ -15,5 +15,5 @@ pytestmark = pytest.mark.mujoco
 def test_a_hand_that_tilts_holds_with_less_grip_than_the_rule():
     found = script("examples/hold_in_mujoco.py").main()
     own, rule = found["Hold"], found["published rule"]
-    assert own.slip < 1e-3 and own.turn < np.radians(2.0)
-    assert own.grip < 0.85 * rule.grip
+    assert own.first < 1e-3 and own.slip < 3e-4 and own.turn < np.radians(5.0)
+    assert own.grip < 0.75 * rule.grip

@@ -53,6 +53,26 @@ def test_a_hinge_lets_the_part_hang():
     assert np.hypot(*gripper.slip[:, :2].T).max() < 0.05
 
 
+@pytest.mark.parametrize(
+    "kind, options", [(Hold, {}), (Hinge, {}), (SlideBy, {"goal": -0.02}), (TurnBy, {"goal": -0.5})]
+)
+def test_a_controller_begins_when_the_hand_grips(kind, options):
+    """Samples of an empty hand, which show the bias, change nothing but that."""
+    grips = []
+    for each in (lambda own: own.observer, lambda own: own):
+        gripper, own = (
+            Gripper(few(delay=0.005), 20.0, seed=1),
+            kind(FrictionObserver(known_model(), batch=COUNT), **options),
+        )
+        for sample in gripper.empty_hand():
+            each(own).update(sample)
+        sample = gripper.measurement
+        for _ in range(300):
+            sample = gripper.step(own.update(sample))
+        grips.append(gripper.normal_force)
+    assert grips[0] == pytest.approx(grips[1], rel=1e-9)
+
+
 def test_the_trapezoid_is_the_integral_of_its_speed():
     time = np.linspace(-0.5, 3.0, 3501)
     place, speed, push = trapezoid(time, 0.03, 2.0)

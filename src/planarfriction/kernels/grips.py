@@ -31,6 +31,9 @@ LOAD_TIME = 0.3
 SETTLED = 0.03
 """Time after which the load of a part is known [s]."""
 
+EMPTY = 0.1
+"""Load below which a hand that has not held anything yet is empty [N]."""
+
 PAUSE = 0.1
 """Longest time between samples that grips and loads go on by [s]."""
 
@@ -78,6 +81,8 @@ def trapezoid(xp, time, size, duration):
 @kernel
 def _follow(c, e):
     """Take in what an observer found; return the grip at mu = 1 that holds the present load, and the time step."""
+    if c.age < 0.0 and e.normal_force < EMPTY:
+        return 0.0, 0.0  # nothing begins before the hand grips
     dt = min(e.dt, PAUSE) if c.age >= 0.0 else 0.0  # the first sample has none
     force = e.normal_force
     needed = e.gauge * force if xp.in_range(force) and force > 0.0 else 0.0
