@@ -74,7 +74,7 @@ assert ((bounds[-1, :, 0] < mu_c) & (mu_c < bounds[-1, :, 1])).all()
 # Beside a rule
 # -------------
 #
-# A common rule grips twice as firmly as an ellipsoid of the true friction needs. It has to be told what `Hold` finds.
+# A common rule grips twice as firmly as an ellipsoid of the true friction needs. `Hold` finds that friction itself.
 radius = gripper.radius * gripper.model.patch.contact_radius() / 0.01
 rule = 2.0 * np.maximum(ellipsoid_load(gripper.load(), radius, mu_c), 2.0)
 print("grip of the rule", np.round(rule, 1), "N")
