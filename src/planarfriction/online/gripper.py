@@ -150,7 +150,8 @@ class Gripper:
     Each finger carries half of its part. Bristles are those of a `DistributedModel` whose patch is scaled to the radius
     at the present load, `R = radius f_N^growth`, and whose load is scaled by mu: both are symmetries of the equations,
     so that all parts of a batch are one call of `CoupledPatches`. Two fingers of different mu turn and slide as one, so
-    that the mean of mu is theirs. The grip follows its command by `f_N' = 100 e + 2 int e`, at 500 Hz.
+    that the mean of mu is theirs, if all else is the same and the stiffness of each is proportional to its mu. The
+    grip follows its command by `f_N' = 100 e + 2 int e`, at 500 Hz.
 
     Raises InvalidValueError for what is not `Parts` or `Sensors`, and values out of range.
     """
