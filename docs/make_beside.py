@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from make_moving import LARGEST
+from make_moving import check_size
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import Circle, Polygon
@@ -97,10 +97,7 @@ def main(folder: Path) -> None:
     for (load, name), run in runs.items():
         off = (run - true[load])[-1]
         print(f"load {load}, {name}: {1e3 * np.hypot(*off[:2]):.1f} mm, {np.degrees(off[2]):.2f} degrees")
-    size = path.stat().st_size
-    print(f"{path.name}: {size / 1000:.0f} kB")
-    if size > LARGEST:
-        sys.exit(f"{path.name} is larger than {LARGEST / 1000:.0f} kB")
+    check_size(path)
 
 
 if __name__ == "__main__":

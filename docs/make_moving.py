@@ -18,7 +18,11 @@ def main(folder: Path) -> None:
     model = pf.ReducedModel(PUBLISHED_PATCHES["Circle"](), law)
     scene = pf.scenes.in_hand(model, size=(0.09, 0.05), centre_of_mass=(0.006, 0.0))  # large pads, and it turns far
     folder.mkdir(parents=True, exist_ok=True)
-    path = pf.simulate(scene, save_every=2e-3).animate(folder / "in-hand.gif", slow=2.0, fps=25.0, dpi=88.0)
+    check_size(pf.simulate(scene, save_every=2e-3).animate(folder / "in-hand.gif", slow=2.0, fps=25.0, dpi=88.0))
+
+
+def check_size(path: Path) -> None:
+    """Say how large a picture is, and end with an error if it is too large for a page."""
     size = path.stat().st_size
     print(f"{path.name}: {size / 1000:.0f} kB")
     if size > LARGEST:

@@ -53,19 +53,18 @@ def test_a_hinge_lets_the_part_hang():
     assert np.hypot(*gripper.slip[:, :2].T).max() < 0.05
 
 
+@pytest.mark.parametrize("load", [0.0, 0.2])
 @pytest.mark.parametrize(
     "kind, options", [(Hold, {}), (Hinge, {}), (SlideBy, {"goal": -0.02}), (TurnBy, {"goal": -0.5})]
 )
-def test_a_controller_begins_when_the_hand_grips(kind, options):
-    """Samples of an empty hand, which show the bias, change nothing but that."""
+def test_a_controller_begins_when_the_hand_grips(kind, options, load):
+    """Samples of a hand that the observer calls empty, which show the bias, change nothing but that."""
     grips = []
     for each in (lambda own: own.observer, lambda own: own):
-        gripper, own = (
-            Gripper(few(delay=0.005), 20.0, seed=1),
-            kind(FrictionObserver(known_model(), batch=COUNT), **options),
-        )
+        gripper = Gripper(few(delay=0.005), 20.0, seed=1)
+        own = kind(FrictionObserver(known_model(), batch=COUNT, least_load=0.1 + 1.5 * load), **options)
         for sample in gripper.empty_hand():
-            each(own).update(sample)
+            each(own).update(sample._replace(normal_force=sample.normal_force + load))
         sample = gripper.measurement
         for _ in range(300):
             sample = gripper.step(own.update(sample))

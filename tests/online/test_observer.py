@@ -7,7 +7,7 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numba import njit
 
@@ -118,7 +118,14 @@ def test_bad_samples_are_said_and_lose_nothing(what):
 NUMBERS = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-10.0, 10.0)
 
 
+NOTHING = [(0.0, (0.0, 0.0, 0.0), 0.0, None)] * 13
+"""Samples after which the part has slid for long."""
+
+
 @settings(max_examples=60, deadline=None)
+@example([*NOTHING, (2.0, (0.0, 0.0, 351.0), 1.0, (0.0, 0.0, 1.0)), (3.0, (0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 1.0))])
+@example([*NOTHING, (1.0, (0.0, 0.0, 2.0), 13.0, (0.0, 0.0, 3.0)), (2.0, (0.0, 0.0, 0.0), 1.0, (0.0, 0.0, 1.0))])
+@example([*NOTHING, (1.0, (0.0, 0.0, 2.0), 10.0, (0.0, 0.0, 4.0)), (2.0, (0.0, 1.0, 0.0), 0.0, (0.0, 0.0, 1.0))])
 @given(
     st.lists(
         st.tuples(

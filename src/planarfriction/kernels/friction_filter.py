@@ -53,6 +53,9 @@ SLOW = 1.5
 MEMORY = 0.01
 """Time [s] within which samples inside the surface are one, not many, in the probability of slip."""
 
+LARGEST_LOG = 7.0
+"""Bound of the logs of mu_c, its ratio and the scale of the radius, which samples that fit nothing may not pass."""
+
 EMPTY = 5.0
 """Standard deviations by which the wrench of an empty hand may differ from the bias: else it holds something."""
 
@@ -166,6 +169,14 @@ def _move(own, s, column):
 
 
 @kernel
+def _measure(s, h, miss, variance, column):
+    """Update the unknowns with a measurement, their logs within bounds."""
+    measure(s, h, miss, variance, column)
+    for i in range(MU, BIAS):
+        s[i] = min(max(s[i], -LARGEST_LOG), LARGEST_LOG)
+
+
+@kernel
 def _learn(own, s, h, column, jacobian):
     """Update with the mean wrench and the velocity of the samples before the last velocity, which were sliding."""
     _move(own, s, column)
@@ -199,7 +210,7 @@ def _learn(own, s, h, column, jacobian):
         h[BIAS + row] = 1.0
         error = own.model_error * factor * g
         variance = own.noise[row] / count + error * error
-        measure(s, h, load * s[OLD + row] / count - factor * g * along - s[BIAS + row], variance, column)
+        _measure(s, h, load * s[OLD + row] / count - factor * g * along - s[BIAS + row], variance, column)
     s[BOUND] -= s[LEVER] * (s[SCALE] - before)
 
 
@@ -238,7 +249,7 @@ def _tare(own, s, wrench, load, h, column):
         if w * w < EMPTY * EMPTY * (variance + variance_of(s, BIAS + i, BIAS + i)):
             for k in range(N):
                 h[k] = 1.0 if k == BIAS + i else 0.0
-            measure(s, h, w, variance, column)
+            _measure(s, h, w, variance, column)
 
 
 @kernel
@@ -339,7 +350,7 @@ def update(own, states, samples, found):
             for i in range(N):
                 h[i] = 1.0 if i in (MU, RATIO) else 0.0
             h[SCALE] = s[LEVER]
-            measure(s, h, s[PEAK] - s[MU] - s[RATIO], PEAK_ERROR * PEAK_ERROR, column)
+            _measure(s, h, s[PEAK] - s[MU] - s[RATIO], PEAK_ERROR * PEAK_ERROR, column)
         e.flags, e.dt, e.normal_force = flags, dt, load
         for i in range(3):
             e.wrench[i], e.velocity[i] = wrench[i], velocity[i]

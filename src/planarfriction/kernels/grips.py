@@ -31,9 +31,6 @@ LOAD_TIME = 0.3
 SETTLED = 0.03
 """Time after which the load of a part is known [s]."""
 
-EMPTY = 0.1
-"""Load below which a hand that has not held anything yet is empty [N]."""
-
 PAUSE = 0.1
 """Longest time between samples that grips and loads go on by [s]."""
 
@@ -79,9 +76,9 @@ def trapezoid(xp, time, size, duration):
 
 
 @kernel
-def _follow(c, e):
+def _follow(c, e, least_load):
     """Take in what an observer found; return the grip at mu = 1 that holds the present load, and the time step."""
-    if c.age < 0.0 and e.normal_force < EMPTY:
+    if c.age < 0.0 and e.normal_force <= least_load:
         return 0.0, 0.0  # nothing begins before the hand grips
     dt = min(e.dt, PAUSE) if c.age >= 0.0 else 0.0  # the first sample has none
     force = e.normal_force
@@ -115,11 +112,11 @@ def _set(c, e, asked, most):
 
 
 @jit
-def hold(states, found, most, z, reserve, gain, explore):
+def hold(states, found, least_load, most, z, reserve, gain, explore):
     """Set the grips of `Hold` in states `[P]` from what an observer found `[P]`; `z` is the quantile of mu_c."""
     for p in range(states.shape[0]):
         c, e = states[p], found[p]
-        _, dt = _follow(c, e)
+        _, dt = _follow(c, e, least_load)
         slips, slid, v = e.slip > 0.5, c.slid, c.velocity
         path = math.hypot(slid[0], slid[1]) + e.radius * abs(slid[2])
         if slips and c.age >= SETTLED and (e.determined[0] > 0 or path >= explore):
@@ -136,11 +133,11 @@ def hold(states, found, most, z, reserve, gain, explore):
 
 
 @jit
-def slip(states, found, most, axis, tolerance, duration, acceleration, adapt, delay):
+def slip(states, found, least_load, most, axis, tolerance, duration, acceleration, adapt, delay):
     """Set the grips of `SlideBy` (axis 1) and `TurnBy` (axis 2) in states `[P]` from what an observer found `[P]`."""
     for p in range(states.shape[0]):
         c, e = states[p], found[p]
-        needed, dt = _follow(c, e)
+        needed, dt = _follow(c, e, least_load)
         slips, goal = e.slip > 0.5, abs(c.goal)
         sign = 1.0 if c.goal > 0.0 else -1.0
         v, x = sign * c.velocity[axis] if slips else 0.0, sign * c.slid[axis]
@@ -174,11 +171,11 @@ def slip(states, found, most, axis, tolerance, duration, acceleration, adapt, de
 
 
 @jit
-def hinge(states, found, most, reserve, gain):
+def hinge(states, found, least_load, most, reserve, gain):
     """Set the grips of `Hinge` in states `[P]` from what an observer found `[P]`."""
     for p in range(states.shape[0]):
         c, e = states[p], found[p]
-        _, dt = _follow(c, e)
+        _, dt = _follow(c, e, least_load)
         force, torque = math.hypot(e.wrench[0], e.wrench[1]), e.wrench[2]
         if xp.in_range(force) and xp.in_range(torque):
             share = dt / FORCE_TIME

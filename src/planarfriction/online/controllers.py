@@ -28,7 +28,8 @@ class GripController:
     def __init__(self, observer: FrictionObserver, grip: Any, *settings: float, most: float) -> None:
         self.observer = validation.instance("observer", observer, FrictionObserver, "a FrictionObserver")
         self.state = np.full(observer.state.shape[:-1], np.array(grips.FRESH, grips.STATE))
-        self._grip, self._settings = grip, (validation.positive("most", most), *settings)
+        least_load = observer._filter.least_load
+        self._grip, self._settings = grip, (least_load, validation.positive("most", most), *settings)
         self.state["grip"] = most
         self._found: Any = None
 
