@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
-import os
-import queue
-import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable
 from importlib.util import find_spec
@@ -17,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import coupling, derivatives, limit_surface, models
-from planarfriction.compiler import threads
+from planarfriction.compiler import threads, together
 from planarfriction.compiler.notice import expect_compilation, watched
 from planarfriction.families import MODELS
 from planarfriction.laws import LuGre
@@ -49,77 +44,27 @@ def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float
     Machine code is stored beside the sources, or in the user's cache if that folder is not writable, or in the
     folder named by `NUMBA_CACHE_DIR`. If none is possible, each process compiles again, and a warning says so.
     """
-    times, shown = {}, progress is None and watched()
+    shown = progress is None and watched()
     expect_compilation()
-    progress = _show if shown else progress
-    parts, told = _parts(), progress or (lambda words: None)
-    if threads.processors() > 1:
-        times |= _compile_at_once(parts, told)
-    for part in parts:
-        if part.words not in times:
+    told = _show if shown else progress or (lambda words: None)
+    parts, times = _parts(), {}
+    code = "from planarfriction import warm; warm.serve()"
+    with together.Crew(code, range(len(parts)), processes=threads.processors() - 1) as crew:
+        for job, part in enumerate(parts):
             told(part.words)
-            times[part.words] = _time_of(part)
-    times = {part.words: times[part.words] for part in parts}
+            begin = time.perf_counter()
+            if crew.take(job):
+                part.work()
+            times[part.words] = crew.seconds.get(job, time.perf_counter() - begin)
     if shown:
         print(f"\rcompiled {len(times)} parts in {sum(times.values()):.1f} s".ljust(_WIDTH), file=sys.stderr)
     return times
 
 
-def _time_of(part: Part) -> float:
-    """Compile a part; returns the time that it took [s]."""
-    begin = time.perf_counter()
-    part.work()
-    return time.perf_counter() - begin
-
-
-def _compile_at_once(parts: list[Part], told: Callable[[str], None]) -> dict[str, float]:
-    """Compile parts in one process for each processor; those whose process fails are left out of the times."""
-    command = [sys.executable, "-c", "from planarfriction import warm; warm.serve()"]
-    where = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
-    answers: queue.SimpleQueue[tuple[Any, bytes]] = queue.SimpleQueue()
-
-    def listen(worker: Any) -> None:
-        answers.put((worker, b"ready"))
-        for line in worker.stdout:
-            answers.put((worker, line))
-        answers.put((worker, b""))  # it has ended
-
-    waiting, busy, times = list(enumerate(parts)), {}, {}
-    with contextlib.ExitStack() as stack:
-        made = (subprocess.Popen(command, env=where, bufsize=0, **pipes) for _ in range(threads.processors()))
-        workers = [stack.enter_context(worker) for worker in made]
-        listeners = [threading.Thread(target=listen, args=(worker,)) for worker in workers]
-        for each in listeners:
-            each.start()
-        try:
-            while workers and (waiting or busy):
-                worker, line = answers.get()
-                part = busy.pop(worker, None)
-                if not line:
-                    workers.remove(worker)
-                    continue
-                if part is not None:
-                    times[part.words] = float(line)
-                if waiting:
-                    number, busy[worker] = waiting.pop(0)
-                    told(busy[worker].words)
-                    with contextlib.suppress(OSError):  # it has ended, as its listener says
-                        worker.stdin.write(f"{number}\n".encode())
-        finally:
-            for worker in workers:
-                worker.kill()
-            for each in listeners:
-                each.join()
-    return times
-
-
 def serve() -> None:
-    """Compile the parts whose numbers come on the standard input; answers each with the time that it took [s]."""
+    """Compile parts for another process."""
     parts = _parts()
-    with contextlib.suppress(KeyboardInterrupt):
-        for line in sys.stdin:
-            print(_time_of(parts[int(line)]), flush=True)
+    together.serve(lambda job: parts[job].work())
 
 
 def _show(words: str) -> None:

@@ -106,10 +106,12 @@ def run(scene: str, out: Path | None, plot: bool, animate: bool, **options: Any)
     # looking for garbage among them saves up to a tenth of the run. `main` turns the collector on again.
     gc.disable()
     from planarfriction.cli import run as command
+    from planarfriction.solvers.structured import compiled_together
 
     pictures = [name for name, wanted in (("plot", plot), ("animate", animate)) if wanted]
     folder = Path("out") if out is None and pictures else out
-    return command.run(scene, folder=folder, pictures=pictures, **options)
+    with compiled_together():  # the models take a second to load
+        return command.run(scene, folder=folder, pictures=pictures, **options)
 
 
 @app.command(

@@ -15,23 +15,30 @@ from llvmlite.binding import add_symbol
 from numba import types
 from numba.extending import intrinsic
 
-from planarfriction.compiler.interrupts import heard_between_passes
 from planarfriction.compiler.memory import place_of
 
 _ARGUMENTS = {"p": types.int64, "d": types.CPointer(types.float64), "f": types.float64}
 """Types of the letters of `words`: place (address), doubles (pointer), number."""
 
 
+Function = tuple[Any, str]
+"""A compiled function and a letter for each of its arguments: p, d or f."""
+
+
+def signature_of(words: str) -> tuple:
+    """Return the types of the arguments with these letters."""
+    return tuple(_ARGUMENTS[word] for word in words)
+
+
 def _compiled(function: Any, signature: tuple) -> Any:
-    with heard_between_passes():
-        function.compile(signature)
+    function.compile(signature)
     return function.overloads[signature]
 
 
 @functools.cache
 def address_of(function: Any, words: str) -> int:
     """Return the address of a compiled function in this process; `words` has a letter for each argument: p, d or f."""
-    compiled = _compiled(function, tuple(_ARGUMENTS[word] for word in words))
+    compiled = _compiled(function, signature_of(words))
     return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
 
 

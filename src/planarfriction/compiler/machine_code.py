@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import os
 import pickle
 import shutil
 import sys
@@ -31,6 +32,7 @@ from numba.core.sigutils import normalize_signature
 from numba.misc.appdirs import AppDirs
 
 from planarfriction.compiler.interrupts import heard_between_passes
+from planarfriction.compiler.together import wait_for
 from planarfriction.writing import replacing
 
 _SETTINGS = ("OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "USING_SVML")
@@ -77,11 +79,20 @@ def kept(dispatcher: Any, sources: Sources) -> Any:
     compile_deaf = dispatcher.compile
 
     def compile_hearing(signature):
+        wait_for(dispatcher)
         with heard_between_passes():
             return compile_deaf(signature)
 
     dispatcher.compile = compile_hearing
     return dispatcher
+
+
+def missing(dispatcher: Any, signature: tuple) -> bool:
+    """Return True if a function has yet to be compiled, and its machine code can be kept on disk."""
+    cache = getattr(dispatcher, "_cache", None)
+    if not isinstance(cache, MachineCode) or signature in dispatcher.overloads:
+        return False
+    return not cache.holds(signature, dispatcher.targetctx) and cache.writable()
 
 
 def folders(sources: Sources) -> Iterator[Path]:
@@ -117,12 +128,26 @@ class MachineCode(NullCache):
         """Folder that is tried first."""
         return str(next(folders(self._sources)))
 
+    def writable(self) -> bool:
+        """Return True if there is a folder for machine code that can be written."""
+        for folder in folders(self._sources):
+            with contextlib.suppress(OSError):
+                _make(folder)
+                if os.access(folder, os.W_OK):
+                    return True
+        return False
+
     def _file(self, arguments: tuple, codegen: Any) -> tuple[str, bytes]:
         """Return the name of the file for a signature, and the origin of its machine code."""
         settings = [str(getattr(config, name, None)) for name in _SETTINGS]
         variant = repr((self._identity[0], str(arguments), codegen.magic_tuple(), settings))
         name = f"{self._name}-{hashlib.sha256(variant.encode()).hexdigest()[:16]}.machine"
         return name.replace("<", "").replace(">", ""), repr((self._sources.digest, self._identity, variant)).encode()
+
+    def holds(self, signature: tuple, target_context: Any) -> bool:
+        """Return True if there is a file for a signature; whether it is sound shows when it is read."""
+        name, _ = self._file(signature, target_context.codegen())
+        return any((folder / name).is_file() for folder in folders(self._sources))
 
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
         """Read the function for a signature; None if its file is missing, of another origin or damaged."""

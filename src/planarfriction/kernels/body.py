@@ -132,8 +132,7 @@ class System(Packed):
             Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=3, stiffness=square,
             matrix=square, inverse=square, to_pose=square, body=3, rows=(4, 3), moved=(n, 8),
         )  # fmt: skip
-        functions = (rates, "ppfdd"), (linearise, "ppd"), (factor, "ppfdf"), (solve, "ppfdfdd")
-        addresses = [address_of(*each) for each in functions]
+        addresses = [address_of(*each) for each in BODY_FUNCTIONS]
         sizes = n, int(contacts.state[n]), pressures, len(motion.breaks) - 1
         super().__init__(SystemRecord(contacts, motion, layout.made(), *sizes, *addresses))
         self.contacts, self.motion, self.work, self.keepalive = contacts, motion, self.record.work, keepalive
@@ -313,6 +312,10 @@ def solve(system, piece, since, y, shift, r, out):
         put(v, plus(applied(a, u), 1.0, applied(g, pose)))
         states = record_of(own, piece, c), at(y, first), at(r, first), v, linearisation_of(own, c), at(out, first)
         call(function_of(own, c, BACK_SUBSTITUTE), states)
+
+
+BODY_FUNCTIONS = (rates, "ppfdd"), (linearise, "ppd"), (factor, "ppfdf"), (solve, "ppfdfdd")
+"""Functions of `SystemRecord`, with their arguments (see `calls.address_of`)."""
 
 
 @jit

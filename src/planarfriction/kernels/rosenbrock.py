@@ -10,7 +10,7 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import address_of, call
 from planarfriction.compiler.memory import Layout, Packed, at, exists
-from planarfriction.kernels.body import System, load_of, maps_of, place_at, read
+from planarfriction.kernels.body import BODY_FUNCTIONS, System, load_of, maps_of, place_at, read
 from planarfriction.kernels.contacts import contact_map
 from planarfriction.kernels.integration import Method, Output, Progress, RunRecord, Stages, combine, read_run
 from planarfriction.kernels.rest import at_rest, speed_of
@@ -317,6 +317,12 @@ def _rests(run, own, place, piece, time):
     return True
 
 
+COMBINE, ATTEMPT = (combine, "ddppdd"), (attempt, "ppffp")
+
+FUNCTIONS = (*BODY_FUNCTIONS, COMBINE, ATTEMPT, (advance, "pp"))
+"""Functions that every run calls, in the order in which it asks for them, with their arguments."""
+
+
 class Run(Packed):
     """An integration on which `advance` works: its steps keep their error below `rtol |y| + atol`, `atol` [n]."""
 
@@ -327,8 +333,8 @@ class Run(Packed):
         shapes = dict.fromkeys(Stages._fields, n) | {"k": (s, n), "time_slope": 3, "coupling": s, "verdict": 2}
         stages, sizes = Layout(Stages, **shapes).made(), (n, s, len(method.dense), len(output.time))
         atol = np.ascontiguousarray(atol, dtype=float)
-        functions = (combine, "ddppdd"), (attempt, "ppffp"), (at_rest, "ppf")
-        addresses = [address_of(*each) for each in functions]
+        addresses = [address_of(*each) for each in (COMBINE, ATTEMPT)]
+        addresses.append(address_of(at_rest, "ppf") if system.motion.stop_speed > 0.0 else 0)
         parts = system.address, method, output, progress, stages, atol, float(rtol)
         super().__init__(RunRecord(*parts, *sizes, *addresses))
         self.system = system

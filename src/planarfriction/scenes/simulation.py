@@ -17,6 +17,7 @@ from planarfriction.scenes.packing import SegmentBatches
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.solution import History, Solution
 from planarfriction.solvers import RODAS4, integrate
+from planarfriction.solvers.structured import compiled_together
 
 BRISTLES = ("none", "all")
 """Choices of `simulate(..., bristles=)`."""
@@ -102,7 +103,7 @@ def simulate(
         raise InvalidValueError("method", "be solvers.RODAS4 or solvers.RODAS3", method)
     if not (progress is None or callable(progress)):
         raise InvalidValueError("progress", "be a function of the simulated time, or None", progress)
-    with said_when_compiling(silent=progress is not None):
+    with said_when_compiling(silent=progress is not None), compiled_together():
         batches = SegmentBatches(scene, plan.end, times=plan.times)
         output = _output(scene, plan.times, batches, bristles)
         scales = plan.atol * batches.state_scale

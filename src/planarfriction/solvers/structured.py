@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from planarfriction.compiler import threads, together
+from planarfriction.compiler.calls import address_of, signature_of
+from planarfriction.compiler.machine_code import missing
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import rosenbrock as kernels
@@ -41,6 +45,28 @@ _MESSAGES = {
 
 _loaded: set[Callable[..., int]] = set()
 """Compiled loops that are in this process: later runs need not ask."""
+
+
+_MOST_PROCESSES = 3
+"""Processes that compile the solver beside this one: two of its functions take half of the time."""
+
+
+@contextlib.contextmanager
+def compiled_together() -> Iterator[None]:
+    """Let other processes compile functions of the solver in this block, if they are not on disk yet."""
+    functions = {} if kernels.advance in _loaded else dict(enumerate(kernels.FUNCTIONS))
+    jobs = {function: job for job, (function, words) in functions.items() if missing(function, signature_of(words))}
+    processes = min(threads.processors() - 1, _MOST_PROCESSES, len(jobs) - 1)
+    if processes < 1 or not together.possible():
+        yield
+        return
+    with together.sharing("from planarfriction.solvers import structured; structured.serve()", jobs, processes):
+        yield
+
+
+def serve() -> None:
+    """Compile functions of the solver for another process."""
+    together.serve(lambda job: address_of(*kernels.FUNCTIONS[job]))
 
 
 def start_of(state: np.ndarray) -> Progress:
