@@ -52,6 +52,8 @@ class _Description:
     def __get__(self, record: object, kind: type) -> str:
         if self._whole is None:
             owner = next((each for each in kind.__mro__ if each.__dict__.get("__doc__") is self), kind)
+            if dataclasses.is_dataclass(owner) and "__match_args__" not in owner.__dict__:
+                return self._words  # the decorator `dataclass` is at work, and looks whether there is a docstring
             docs = field_docs(owner)
             lines = [f"{name}\n{textwrap.indent(docs[name], '    ')}" for name in _arguments(owner) if name in docs]
             self._whole = "\n\n".join([self._words, "\n".join([f"{HEADING}:", *lines])] if lines else [self._words])

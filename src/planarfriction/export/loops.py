@@ -13,7 +13,6 @@ import inspect
 import math
 import operator
 import re
-import textwrap
 from collections.abc import Callable
 from typing import Any
 
@@ -36,6 +35,7 @@ from planarfriction.export.c_values import (
 from planarfriction.export.trace import Number, Table, Trace, traced
 from planarfriction.export.twins import twin
 from planarfriction.kernels import surfaces
+from planarfriction.kernels.definitions import definition_of
 
 _OPERATORS: dict[type, tuple[str, Callable[..., Any]]] = {
     ast.Add: ("+", operator.add), ast.Sub: ("-", operator.sub), ast.Mult: ("*", operator.mul),
@@ -162,8 +162,7 @@ class _Translated(_Function):
     """A kernel with loops."""
 
     def _write(self) -> None:
-        tree: Any = ast.parse(textwrap.dedent(inspect.getsource(self.kernel.py_func))).body[0]
-        for statement in tree.body:
+        for statement in definition_of(self.kernel.py_func).body:
             self._do(statement)
 
     # ------------------------------------------------------------------ statements

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import ast
-import inspect
-import textwrap
 from collections.abc import Callable
 from typing import Any
+
+from planarfriction.kernels.definitions import definition_of
 
 
 def bind(template: Callable, model: Any, name: str, compiled: Callable[[Any], Any]) -> Any:
@@ -16,12 +16,11 @@ def bind(template: Callable, model: Any, name: str, compiled: Callable[[Any], An
     the others. It is a function with a name and no closure, so that its machine code can be kept on disk: the name is
     unique in the file of the template.
     """
-    (definition,) = ast.parse(textwrap.dedent(inspect.getsource(template))).body
-    assert isinstance(definition, ast.FunctionDef)
+    definition = definition_of(template)
     own = {each.arg: getattr(model, each.arg) for each in definition.args.args if each.arg in model._fields}
-    definition.args.args = [each for each in definition.args.args if each.arg not in own]
-    definition.name = name
-    ast.increment_lineno(definition, template.__code__.co_firstlineno - 1)
+    left = [each for each in definition.args.args if each.arg not in own]
+    arguments = ast.arguments(**{**vars(definition.args), "args": left})
+    bound = ast.FunctionDef(**{**vars(definition), "name": name, "args": arguments})
     space = {**template.__globals__, **own}
-    exec(compile(ast.Module([definition], []), template.__code__.co_filename, "exec"), space)
+    exec(compile(ast.Module([bound], []), template.__code__.co_filename, "exec"), space)
     return compiled(space[name])

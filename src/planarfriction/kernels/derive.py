@@ -16,12 +16,13 @@ import functools
 import hashlib
 import inspect
 import linecache
-import textwrap
+import re
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
+from planarfriction.kernels.definitions import definition_of
 from planarfriction.kernels.rules import NAMES, QUOTIENT, RULES, Rule
 
 
@@ -67,15 +68,13 @@ class Walk:
 
     def _definition(self) -> ast.FunctionDef:
         try:
-            source = inspect.getsource(self.function)
+            return definition_of(self.function)
         except OSError as error:
             raise NotStraightError(f"{self.where}: there is no source to write derivatives from") from error
-        return ast.parse(textwrap.dedent(source)).body[0]  # type: ignore[return-value]
 
     def _refusal(self, node: ast.AST, why: str) -> NotStraightError:
-        first = self.function.__code__.co_firstlineno
         text = ast.unparse(node).splitlines()[0]
-        return NotStraightError(f"{self.where}, line {first + getattr(node, 'lineno', 1) - 1}: `{text}` {why}")
+        return NotStraightError(f"{self.where}, line {getattr(node, 'lineno', 1)}: `{text}` {why}")
 
     def outer(self, path: str) -> str:
         """Return the generated name of an argument or of a field of one, `law.mu_c`."""
@@ -382,8 +381,12 @@ def derive(
     return Derivative(walk.function, tuple(walk.arguments), by, vectors, kinds, source, forward, backward)
 
 
+_NAME = re.compile(r"(?<![.\w])[A-Za-z_]\w*")
+"""A name, but not that of a field."""
+
+
 def _names(text: str) -> set[str]:
-    return {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
+    return set(_NAME.findall(text))
 
 
 def text_of(head: str, lines: list[str]) -> str:

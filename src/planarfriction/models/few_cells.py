@@ -20,6 +20,9 @@ OF_ALL_LOADS = 2
 SAME = 1e-9
 """Relative difference of positions and weights below which they are the same."""
 
+SLANTED = np.array([1.0, 0.5 * (1.0 + math.sqrt(5.0))])
+"""Direction along which no two cells of a grid are level: sorted along it, equal patches are equal cell by cell."""
+
 DEGREE = 2
 """Degree up to which they keep the moments of the pressure; what is left open of their weights fits limit surfaces."""
 
@@ -72,15 +75,14 @@ def _images(patch: ContactPatch) -> np.ndarray:
 
     Reflections are those along x, y and both about the centre of pressure that leave positions and weights alike.
     """
-    from scipy.spatial import KDTree
-
     weights, about = patch.weights(), patch.positions - patch.centre_of_pressure()
-    near, tree, found = SAME * float(np.abs(about).max()), KDTree(about), [np.arange(patch.cells)]
+    near, order = SAME * float(np.abs(about).max()), np.argsort(about @ SLANTED)
+    image, found = np.empty_like(order), [np.arange(patch.cells)]
     for flip in ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)):
-        distance, image = tree.query(about * flip)
+        image[np.argsort(about * flip @ SLANTED)] = order
         alike = np.abs(weights[image] - weights).max() <= SAME * weights.max()
-        if alike and distance.max() <= near and len(np.unique(image)) == patch.cells:
-            found.append(np.asarray(image))
+        if alike and np.abs(about[image] - about * flip).max() <= near:
+            found.append(image.copy())
     return np.unique(found, axis=0)
 
 
