@@ -12,7 +12,7 @@ import numpy as np
 
 from planarfriction.compiler.memory import place_of
 from planarfriction.equality import by_parts
-from planarfriction.kernels.cell_blocks import LANES
+from planarfriction.kernels.cell_blocks import LANES, divided
 
 
 @by_parts
@@ -68,15 +68,18 @@ def shapes_by_load(loaded: Sequence[Sequence[Part]], by_load: np.ndarray | None)
 
 def cells_by_load(levers: np.ndarray, weights: np.ndarray, by_load: np.ndarray | None) -> ShapesByLoad:
     """Pack cells by the numbers of their levers `[K, N]` and weights `[L, N]` at L loads, with slopes or zeros."""
-    blocks = -(-levers.shape[1] // LANES)
-    padded = np.zeros((len(levers), blocks * LANES))
-    padded[:, : levers.shape[1]] = levers
-    shapes, slopes = (np.zeros((1, len(weights), blocks * LANES + i)) for i in range(2))
-    shapes[0, :, : levers.shape[1]] = weights
+    numbers, cells = levers.shape
+    blocks, lanes = divided.py_func(cells)
+    padded = np.zeros((numbers, blocks * lanes))
+    padded[:, :cells] = levers
+    data = np.zeros((blocks, numbers, LANES))
+    data[:, :, :lanes] = padded.reshape(numbers, blocks, lanes).swapaxes(0, 1)
+    shapes, slopes = (np.zeros((1, len(weights), blocks * lanes + i)) for i in range(2))
+    shapes[0, :, :cells] = weights
     if by_load is not None:
-        slopes[0, :, : levers.shape[1]] = by_load
-    data = padded.reshape(len(levers), blocks, LANES).swapaxes(0, 1).ravel()
-    return ShapesByLoad(np.ones((1, len(weights))), np.zeros((1, len(weights), 3), dtype=int), shapes, slopes, data)
+        slopes[0, :, :cells] = by_load
+    surface = np.zeros((1, len(weights), 3), dtype=int)
+    return ShapesByLoad(np.ones((1, len(weights))), surface, shapes, slopes, data.ravel())
 
 
 def places_of(maps: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

@@ -1,8 +1,8 @@
 """Cells in blocks, so that loops over them are vector code without a remainder.
 
-A block holds `LANES` cells, field after field; the last block of a contact is filled up with cells without load. A step
-goes over the blocks in short passes, of which the processor has several blocks in flight; as one pass, the step of a
-block is a chain of 400 cycles (measured on 28 cells: 117 ns a block, and 72 in passes).
+A block holds up to `LANES` cells, field after field. The cells of a contact are spread evenly over its blocks (see
+`divided`); the last one is filled up with cells without load. A step goes over a block in short passes, in which the
+processor has many cells in flight; as one pass, the step of a vector of cells is a chain of 400 cycles.
 """
 
 from __future__ import annotations
@@ -20,8 +20,11 @@ from planarfriction.kernels.contacts import traction
 from planarfriction.kernels.law import grip
 from planarfriction.kernels.vectors import norm, plus, scatter, times
 
-LANES = 8
-"""Cells of a block: the numbers of the longest vectors that processors have."""
+VECTOR = 8
+"""Numbers of the longest vectors that processors have."""
+
+LANES = 64
+"""Most cells of a block: several of the longest vectors of processors, so that constants are read once for all."""
 
 Z, WEIGHT, BY_LOAD, BAR, OUT, LAW_BAR = (LANES * n for n in (5, 7, 8, 9, 11, 17))
 """Fields of a block behind the numbers of the levers: state, weights, their slopes by the load, cotangent or change of
@@ -35,6 +38,13 @@ _U, _SPEED, _GRIP, _DEFLECTION, _START, _DECAY = (LANES * n for n in (25, 27, 28
 BLOCK = LANES * 33
 """Numbers of a block: an odd number of fields, for if it were a power of two, blocks would drive each other out of the
 cache."""
+
+
+@kernel
+def divided(count):
+    """Return the number of blocks of so many cells and the number of cells in each, a multiple of `VECTOR`."""
+    blocks = -(-count // LANES)
+    return blocks, -(-count // (blocks * VECTOR)) * VECTOR
 
 
 class Block(NamedTuple):
@@ -101,7 +111,7 @@ def room(typingctx, count):
         kind = ir.ArrayType(ir.DoubleType(), count.literal_value)
         with builder.goto_entry_block():
             place = builder.alloca(kind)
-            place.align = 8 * LANES
+            place.align = 8 * VECTOR
         return builder.bitcast(place, ir.DoubleType().as_pointer())
 
     return types.CPointer(types.float64)(count), generate

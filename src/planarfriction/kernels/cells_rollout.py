@@ -1,7 +1,7 @@
 """Roll-outs of cells, their discrete adjoint and their derivatives, in vector code (see `rollouts` for the inputs).
 
 The cells of a contact lie in blocks (see `cell_blocks`). It has one part, whose `shapes` are the weights of its cells
-at each load `[1, L, M]`, M a multiple of `LANES`; `data` holds the numbers of their levers, block after block.
+at each load `[1, L, M]`, M that of all their blocks; `data` holds the numbers of their levers, block after block.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from planarfriction.kernels.cell_blocks import (
     WEIGHT,
     Z,
     advance,
+    divided,
     lever_at,
     pair,
     put_pair,
@@ -69,18 +70,20 @@ def _lay(w, blocks, levers):
 @kernel
 def _write(w, field, values, n):
     """Write vectors [2 n] to a field of all blocks."""
-    for k in range(-(-n // LANES)):
-        block, first = at(w, k * BLOCK + field), k * LANES
-        for i in range(min(LANES, n - first)):
+    blocks, lanes = divided(n)
+    for k in range(blocks):
+        block, first = at(w, k * BLOCK + field), k * lanes
+        for i in range(min(lanes, n - first)):
             block[i], block[LANES + i] = values[first + i], values[n + first + i]
 
 
 @kernel
 def _read(w, field, values, n):
     """Read vectors [2 n] from a field of all blocks."""
-    for k in range(-(-n // LANES)):
-        block, first = at(w, k * BLOCK + field), k * LANES
-        for i in range(min(LANES, n - first)):
+    blocks, lanes = divided(n)
+    for k in range(blocks):
+        block, first = at(w, k * BLOCK + field), k * lanes
+        for i in range(min(lanes, n - first)):
             values[first + i], values[n + first + i] = block[i], block[LANES + i]
 
 
@@ -93,10 +96,10 @@ def _forget(w, blocks, field):
 
 
 @kernel
-def _weigh(w, blocks, weights, by_load):
+def _weigh(w, blocks, lanes, weights, by_load):
     for k in range(blocks):
-        block, first = at(w, k * BLOCK), k * LANES
-        for i in range(LANES):
+        block, first = at(w, k * BLOCK), k * lanes
+        for i in range(lanes):
             block[WEIGHT + i], block[BY_LOAD + i] = weights[first + i], by_load[first + i]
 
 
@@ -107,12 +110,11 @@ def _weigh(w, blocks, weights, by_load):
 def _roll(lever, law, inputs, b, n, w, wrench, states):
     twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
     which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shapes[0], -1
-    blocks, kept = weights.shape[1] // LANES, states.shape[0] > 0
-    lanes = weights.shape[1] // blocks
+    (blocks, lanes), kept = divided(weights.shape[1]), states.shape[0] > 0
     for t in range(inputs.dt.shape[0]):
         if which[t] != last:
             last = which[t]
-            _weigh(w, blocks, weights[last], inputs.by_load[0, last])
+            _weigh(w, blocks, lanes, weights[last], inputs.by_load[0, last])
         if kept:
             _read(w, Z, states[t], n)
         load, twist, dt = loads[t], three(twists[t]), inputs.dt[t]
@@ -126,7 +128,7 @@ def _roll(lever, law, inputs, b, n, w, wrench, states):
 @kernel
 def _rollout(lever, inputs, span, z, wrench, states, scratch):
     w, n, rows = pointer(scratch), z.shape[2] // 2, inputs.rows[0]
-    blocks = inputs.shapes.shape[2] // LANES
+    blocks, _ = divided(inputs.shapes.shape[2])
     for b in range(span[0], span[1]):
         law = law_of(rows[row_of(rows, b)])
         _lay(w, blocks, inputs.data)
@@ -143,7 +145,7 @@ def rollout(lever, inputs, span, z, wrench, states):
 
     The state before each step goes into `states` [1, B, T, 2 n], unless that is empty.
     """
-    scratch = np.empty(inputs.shapes.shape[2] // LANES * BLOCK)
+    scratch = np.empty(divided(inputs.shapes.shape[2])[0] * BLOCK)
     _rollout(lever, inputs, span, z, wrench, states, scratch)
 
 
@@ -173,12 +175,11 @@ def _retreat(lever, law, block, twist, dt, pull, load, loaded, lanes):
 def _pull(lever, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
     twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
     which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shapes[0], -1
-    blocks = weights.shape[1] // LANES
-    lanes = weights.shape[1] // blocks
+    blocks, lanes = divided(weights.shape[1])
     for t in range(inputs.dt.shape[0] - 1, -1, -1):
         if which[t] != last:
             last = which[t]
-            _weigh(w, blocks, weights[last], inputs.by_load[0, last])
+            _weigh(w, blocks, lanes, weights[last], inputs.by_load[0, last])
         _write(w, Z, states[t], n)
         load, pull, twist, dt = loads[t], three(pulls[t]), three(twists[t]), inputs.dt[t]
         loaded = 0.0 if load == 0.0 else 1.0
@@ -191,7 +192,7 @@ def _pull(lever, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
 @kernel
 def _gradient(lever, inputs, states, wrench_bar, span, bars, scratch):
     w, n, rows = pointer(scratch), bars.state.shape[2] // 2, inputs.rows[0]
-    blocks = inputs.shapes.shape[2] // LANES
+    blocks, lanes = divided(inputs.shapes.shape[2])
     for b in range(span[0], span[1]):
         law, before, pulls = law_of(rows[row_of(rows, b)]), states[0], wrench_bar[row_of(wrench_bar, b)]
         before, row_bar = before[row_of(before, b)], bars.rows[0, b]
@@ -203,12 +204,12 @@ def _gradient(lever, inputs, states, wrench_bar, span, bars, scratch):
             _pull(lever, law, inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b])
         _read(w, BAR, bars.state[0, b], n)
         for m in range(_COUNT):
-            row_bar[COLUMNS[m]] += total(w, blocks, LAW_BAR + m * LANES, LANES)
+            row_bar[COLUMNS[m]] += total(w, blocks, LAW_BAR + m * LANES, lanes)
 
 
 def gradient(lever, inputs, states, wrench_bar, span, bars):
     """Add the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
-    scratch = np.empty(inputs.shapes.shape[2] // LANES * BLOCK)
+    scratch = np.empty(divided(inputs.shapes.shape[2])[0] * BLOCK)
     _gradient(lever, inputs, states, wrench_bar, span, bars, scratch)
 
 
@@ -239,8 +240,7 @@ def _push(lever, law, by, block, twist, turn, dt, load, push, lanes):
 def _tangent(lever, inputs, span, z, changes, wrenches, slopes, scratch):
     w, n, rows = pointer(scratch), z.shape[2] // 2, inputs.rows[0]
     weights, all_by_load = inputs.shapes[0], inputs.by_load[0]
-    blocks = weights.shape[1] // LANES
-    lanes = weights.shape[1] // blocks
+    blocks, lanes = divided(weights.shape[1])
     for b in range(span[0], span[1]):
         twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
         turns, pushes = changes.twist[row_of(changes.twist, b)], changes.load[row_of(changes.load, b)]
@@ -253,7 +253,7 @@ def _tangent(lever, inputs, span, z, changes, wrenches, slopes, scratch):
         for t in range(inputs.dt.shape[0]):
             if which[t] != last:
                 last = which[t]
-                _weigh(w, blocks, weights[last], all_by_load[last])
+                _weigh(w, blocks, lanes, weights[last], all_by_load[last])
             load, twist, turn, dt = loads[t], three(twists[t]), three(turns[t]), inputs.dt[t]
             for k in range(blocks):
                 _push(lever, law, by, at(w, k * BLOCK), twist, turn, dt, load, pushes[t], lanes)
@@ -271,7 +271,7 @@ def tangent(lever, inputs, span, z, changes, wrenches, slopes):
 
     `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state in place.
     """
-    scratch = np.empty(inputs.shapes.shape[2] // LANES * BLOCK)
+    scratch = np.empty(divided(inputs.shapes.shape[2])[0] * BLOCK)
     _tangent(lever, inputs, span, z, changes, wrenches, slopes, scratch)
 
 

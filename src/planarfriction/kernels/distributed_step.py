@@ -17,6 +17,7 @@ from planarfriction.kernels.cell_blocks import (
     Z,
     advance,
     clear,
+    divided,
     end_traction,
     room,
     totals,
@@ -25,11 +26,6 @@ from planarfriction.kernels.general_cells import Bristle, slopes, slopes_of
 from planarfriction.kernels.law import grip, squared
 from planarfriction.kernels.steps import step_functions
 from planarfriction.kernels.vectors import norm, plus, put, three
-
-_BLOCKS = 8
-"""Blocks that a step has in hand at a time: 17 kB."""
-
-_ROOM = _BLOCKS * BLOCK
 
 
 @kernel
@@ -64,23 +60,16 @@ def _empty(block, first, count, n, new):
 
 @kernel
 def _step(lever, law, own, z, twist, dt, new, out):
-    n, all_of, w = own.count, (0.0, 0.0, 0.0), room(_ROOM)
-    lanes = min(LANES, n + LANES)
-    for first in range(0, n, _BLOCKS * LANES):
-        count = min(_BLOCKS * LANES, n - first)
-        full, rest = count // LANES, count % LANES
-        last, blocks = at(w, full * BLOCK), full + (1 if rest else 0)
-        for k in range(full):  # of a constant count, which is copied in vectors
-            _fill(lever, own, z, first + k * LANES, LANES, at(w, k * BLOCK))
-        if rest:
-            clear(last, WEIGHT + LANES)
-            _fill(lever, own, z, first + full * LANES, rest, last)
-        advance(lever, law, w, blocks, lanes, twist, dt)
-        all_of = plus(all_of, 1.0, totals(w, blocks, OUT, lanes))
-        for k in range(full):
-            _empty(at(w, k * BLOCK), first + k * LANES, LANES, n, new)
-        if rest:
-            _empty(last, first + full * LANES, rest, n, new)
+    n, all_of, block = own.count, (0.0, 0.0, 0.0), room(BLOCK)
+    _, lanes = divided(n)
+    for first in range(0, n, lanes):
+        count = min(lanes, n - first)
+        if count < lanes:
+            clear(block, WEIGHT + LANES)
+        _fill(lever, own, z, first, count, block)
+        advance(lever, law, block, 1, lanes, twist, dt)
+        all_of = plus(all_of, 1.0, totals(block, 1, OUT, lanes))
+        _empty(block, first, count, n, new)
     put(out, all_of)
 
 
