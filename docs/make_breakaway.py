@@ -216,7 +216,7 @@ def table_of_models(kept: dict[str, Any]) -> Rows:
 
 
 def table_of_creep(kept: dict[str, Any]) -> Rows:
-    """Rows: largest creep per cycle [nm] of all shapes, by level and model; finer cells creep like the distributed model."""
+    """Rows: largest creep per cycle [nm] of all shapes, by level and model, without finer cells."""
     names = [name for name in MODELS if name != "4 parts"]
     rows = [["largest load", *names]]
     for level in LEVELS:

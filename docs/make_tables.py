@@ -2,9 +2,9 @@
 
 A place is the folder of `planarfriction reproduce`, or a file that holds what `planarfriction bench --json` printed. A
 table stands below a line `<!-- table: TITLE -->`, named as in the report or here; what an experiment found stands below
-`<!-- verdict: EXPERIMENT -->`. A table below `<!-- table: TITLE; selection -->` keeps the rows and columns that the page
-shows. README's row about speed is that of the benchmark. What the places do not have stays as it is. So do pictures, but
-for those of `docs/images` that the reports have drawn.
+`<!-- verdict: EXPERIMENT -->`. A table below `<!-- table: TITLE; selection -->` keeps the rows and columns that the
+page shows. README's row about speed is that of the benchmark. What the places do not have stays as it is. So do
+pictures, but for those of `docs/images` that the reports have drawn.
 """
 
 from __future__ import annotations
