@@ -2,8 +2,9 @@
 
 A place is the folder of `planarfriction reproduce`, or a file that holds what `planarfriction bench --json` printed. A
 table stands below a line `<!-- table: TITLE -->`, named as in the report or here; what an experiment found stands below
-`<!-- verdict: EXPERIMENT -->`. README's row about speed is that of the benchmark. What the places do not have stays as
-it is. So do pictures, but for those of `docs/images` that the reports have drawn.
+`<!-- verdict: EXPERIMENT -->`. A table below `<!-- table: TITLE; selection -->` keeps the rows and columns that the
+page shows. README's row about speed is that of the benchmark. What the places do not have stays as it is. So do
+pictures, but for those of `docs/images` that the reports have drawn.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import Any
 
 from PIL import Image
 
-MARK = re.compile(r"<!-- table: (?P<title>.+?) -->\n\n(?:(?:\|.*\n)+\n)?")
+MARK = re.compile(r"<!-- table: (?P<title>.+?)(?P<selection>; selection)? -->\n\n(?:(?:\|.*\n)+\n)?")
 VERDICT = re.compile(r"<!-- verdict: (?P<name>.+?) -->\n\n(?:(?:[^\n#<!].*\n)+\n)?")
 SPEED = re.compile(r"^(?P<what>\| .*\(docs/benchmarks\.md\).* \|) .+ \| .+ \|$", re.MULTILINE)
 
@@ -68,9 +69,22 @@ def with_tables(page: str, tables: Mapping[str, Mapping[str, Any]]) -> str:
         title = found["title"]
         if title == "Cost" and title in tables:
             return f"<!-- table: {title} -->\n\n{_with_costs(found[0], tables[title])}\n"
+        if title in tables and found["selection"]:
+            return f"<!-- table: {title}; selection -->\n\n{markdown(_selected(found[0], tables[title]))}\n"
         return f"<!-- table: {title} -->\n\n{markdown(tables[title])}\n" if title in tables else found[0]
 
     return MARK.sub(replaced, page)
+
+
+def _selected(before: str, table: Mapping[str, Any]) -> dict[str, Any]:
+    """Rows and columns of a table that the page shows, by the first column and by the headings."""
+    lines = [line.strip("| ").split(" | ") for line in before.splitlines() if line.startswith("|")]
+    columns = [k for k, heading in enumerate(table["headings"]) if heading in lines[0]]
+    rows = [row for row in table["rows"] if row[0] in [line[0] for line in lines[2:]]]
+    return {
+        "headings": [table["headings"][k] for k in columns],
+        "rows": [[row[k] for k in columns] for row in rows],
+    }
 
 
 def _with_costs(before: str, table: Mapping[str, Any]) -> str:

@@ -53,6 +53,12 @@ def test_costs_become_a_table_and_readme_has_its_row_of_them(pages):
     assert pages["with_speed"]((DOCS.parent / "README.md").read_text("utf-8"), [line]).count("| 93 ms |") == 1
 
 
+def test_a_selection_of_a_table_keeps_its_rows_and_columns(pages):
+    table = {"headings": ["run", "a", "b"], "rows": [["one", 1.0, 2.0], ["two", 3.0, 4.0]]}
+    page = "<!-- table: T; selection -->\n\n| run | b |\n| --- | --- |\n| two | 0 |\n\nNext.\n"
+    assert pages["with_tables"](page, {"T": table}) == page.replace("| 0 |", "| 4 |")
+
+
 @pytest.mark.parametrize(
     ("value", "unit", "words"),
     [(0.668, "s", "0.67 s"), (0.0931, "s", "93 ms"), (0.16, "us", "0.16 µs"), (3.7e3, "ns", "3700 ns")],
