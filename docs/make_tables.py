@@ -12,6 +12,7 @@ import json
 import re
 import sys
 from collections.abc import Mapping, Sequence
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -44,9 +45,15 @@ SECONDS = (("s", 1.0), ("ms", 1e3), ("µs", 1e6))
 """Units of time, and how many of them are a second; a time is shown in the first that it is a tenth of."""
 
 
+LEFT_OUT = "tolerances of this report"
+"""Columns whose heading begins so stay in the reports."""
+
+
 def markdown(table: Mapping[str, Any]) -> str:
     """A table of a report as lines of a page."""
-    rows = [table["headings"], ["---"] * len(table["headings"]), *table["rows"]]
+    kept = [not heading.startswith(LEFT_OUT) for heading in table["headings"]]
+    rows = [list(compress(row, kept)) for row in (table["headings"], *table["rows"])]
+    rows.insert(1, ["---"] * sum(kept))
     return "".join(
         f"| {' | '.join(each if isinstance(each, str) else rounded(each) for each in row)} |\n" for row in rows
     )
