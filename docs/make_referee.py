@@ -33,7 +33,7 @@ COUNTS = {"ok": "ok", "step [µs]": "median step [µs]"}
 """Heading in the table of engines -> row of the referee's table."""
 
 SAID_ONCE = (
-    *("; single precision", ", Warp's CPU device", ", 21 cells across"),
+    *(", condim 3", "; single precision", ", Warp's CPU device", ", 21 cells across"),
     *("; feet at the corners for point contact, 1e4 N/m", " (a convex approximation)"),
 )
 """Parts of the settings that the text above the table of engines says for all rows."""
