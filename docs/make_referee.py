@@ -29,8 +29,14 @@ ROWS = {
 }
 """Case -> its row of README."""
 
-COUNTS = {"ok": "ok", "step [µs]": "median step [µs]", "start [s]": "median start [s]"}
+COUNTS = {"ok": "ok", "step [µs]": "median step [µs]"}
 """Heading in the table of engines -> row of the referee's table."""
+
+SAID_ONCE = (
+    *(", condim 3", "; single precision", ", Warp's CPU device", ", 21 cells across"),
+    *("; feet at the corners for point contact, 1e4 N/m", " (a convex approximation)"),
+)
+"""Parts of the settings that the text above the table of engines says for all rows."""
 
 SHOWN = (
     *("MuJoCo", "MuJoCo, stiff", "MuJoCo, patches"),
@@ -47,13 +53,23 @@ def tables(stored: dict[str, Any]) -> dict[str, str]:
     verdicts = [Verdict(**row) for row in stored["verdicts"]]
     (_, *engines), rows = table(verdicts)
     columns = {row[0]: dict(zip(engines, row[1:], strict=True)) for row in rows}
-    passed = [[*each, *(columns[row][each[0]] for row in COUNTS.values())] for each in stored["settings"].items()]
+    passed = [
+        [engine, brief(settings), *(columns[row][engine] for row in COUNTS.values())]
+        for engine, settings in stored["settings"].items()
+    ]
     versions = ", ".join(f"{name} {version}" for name, version in stored["versions"].items())
     return {
         "run": f"Run on {stored['date']}: {stored['machine']}; {versions}.\n",
         "engines": markdown(["engine", "settings", *COUNTS], passed),
         "cases": markdown(["case", *SHOWN], errors(verdicts)),
     }
+
+
+def brief(settings: str) -> str:
+    """Return the settings of an engine without the parts that the page says once for all of them."""
+    for part in SAID_ONCE:
+        settings = settings.replace(part, "")
+    return settings
 
 
 def errors(verdicts: Sequence[Verdict]) -> list[list[str]]:
