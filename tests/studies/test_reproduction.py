@@ -198,7 +198,7 @@ def test_the_report_begins_with_its_verdict_and_separates_the_papers(made, tmp_p
     # what is left out is said where the count stands, and its section named
     assert "that of the red curve (section 2)." in head
     assert "The verdict of first." in head and "The verdict of second." in head
-    titles = ("Against converged", "Against the paper, with", "s curves, stored comparisons")
+    titles = ("Converged solutions and", "The paper, with", "s curves, stored comparisons")
     places = [first.index(each) for each in ("Why?", "<figure>", "Found ", "Some", *titles)]
     assert places == sorted(places)
     ours, papers, stored = (first[begin:end] for begin, end in zip(places[-3:], [*places[-2:], None], strict=True))

@@ -96,7 +96,10 @@ def _summary(rows: Rows) -> dict[str, Any]:
         "groups": [(cause, [row for row in rows if row["cause"] == cause]) for cause in causes],
         "share": max(shares, default=None),
         "paper_share": max(paper, default=None),
-        "of_tolerance": max((row["difference"] / row["tolerance"] for row in rows if row["tolerance"]), default=None),
+        "nearest": max(
+            [(row["difference"] / row["tolerance"], row["quantity"]) for row in rows if row["tolerance"]],
+            default=(0, ""),
+        ),
     }
 
 

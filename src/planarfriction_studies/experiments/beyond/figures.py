@@ -104,7 +104,7 @@ class Family(NamedTuple):
     marker: str
 
 
-_RIGHT, _LEFT, _ABOVE = (6, -12), (-12, -13), (5, 5)
+_RIGHT, _LEFT, _ABOVE, _CORNER = (6, -12), (-12, -13), (5, 5), (-16, 4)
 
 FAMILIES = (
     Family("published reduced model", {"published": ("", _RIGHT)}, looks.REDUCED, "^"),
@@ -113,7 +113,7 @@ FAMILIES = (
            {"one part": ("1", _RIGHT), "4 parts": ("4", _LEFT), "6 parts": ("6", _RIGHT), "16 parts": ("16", _RIGHT)},
            looks.MOMENTS, "o"),
     Family("distributed, 28, 45 or all cells",
-           {"degree 3": ("28", _ABOVE), "degree 5": ("45", _ABOVE), "full": ("all", _ABOVE)}, looks.DISTRIBUTED, "D"),
+           {"degree 3": ("28", _CORNER), "degree 5": ("45", _ABOVE), "full": ("all", _ABOVE)}, looks.DISTRIBUTED, "D"),
 )  # fmt: skip
 
 ROWS = (
