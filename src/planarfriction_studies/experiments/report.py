@@ -35,10 +35,10 @@ def write_report(reproduction: Reproduction) -> Path:
         "markdown": lambda text: Markup(to_html(text)),
         "inline": lambda text: Markup(_parser().renderInline(text)),
         "symbols": lambda text: Markup(name_to_html(str(text))),
-        "percent": percent,
+        "percent": lambda share: "" if share is None else f"{100.0 * share:.2g}",
     }
     counter = itertools.count(1)
-    sections = [
+    sections: list[Record] = [
         _section(record, reproduction.folder / record["name"], counter) | {"number": number}
         for number, record in enumerate(reproduction.records(), 1)
     ]
@@ -55,11 +55,6 @@ def write_report(reproduction: Reproduction) -> Path:
     path = reproduction.folder / "report.html"
     write_text(path, text)
     return path
-
-
-def percent(share: float | None) -> str:
-    """Return a share as a percentage with two digits; nothing for None."""
-    return "" if share is None else f"{100.0 * share:.2g}"
 
 
 def _section(record: Record, home: Path, counter: Any) -> Record:

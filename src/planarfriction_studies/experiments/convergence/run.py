@@ -61,9 +61,13 @@ def run(work: Work) -> Result:
     }
     cause = "None: straight lines between the same kinks, the velocity is not held over 0.01 s."
     profile = experiment.compare_profile(runs.profile(), "convergence/velocity", TWIST, cause, dt=1e-4, allowance=0.0)
+    figures = {f"convergence_{family}": _errors_over_counts(family, counts, errors) for family in runs.FAMILIES}
+    if not work.quick:
+        torque = errors["Circle", "p0"]["cells_distributed"][:, 1]
+        figures["convergence_disc_radius"] = _radius_errors(counts, radii, torque)
     return report(
         "convergence",
-        _figures(counts, errors, radii),
+        figures,
         numbers,
         {
             "samples": sum(each.samples for each in measured),
@@ -208,16 +212,6 @@ def _dataset(counts: Sequence[int], errors: Mapping[Case, Errors]) -> Any:
 
 
 _CELLS, _SEGMENTS = "cells along the width", "table segments of a quadrant"
-
-
-def _figures(
-    counts: Sequence[int], errors: Mapping[Case, Errors], radii: Mapping[str, np.ndarray]
-) -> dict[str, PlotFigure]:
-    result = {f"convergence_{family}": _errors_over_counts(family, counts, errors) for family in runs.FAMILIES}
-    if ("Circle", "p0") in errors:
-        torque = errors["Circle", "p0"]["cells_distributed"][:, 1]
-        result["convergence_disc_radius"] = _radius_errors(counts, radii, torque)
-    return result
 
 
 def _errors_over_counts(family: Family, counts: Sequence[int], errors: Mapping[Case, Errors]) -> PlotFigure:

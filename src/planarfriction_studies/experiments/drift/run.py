@@ -89,7 +89,7 @@ def run(work: Work) -> Result:
             *_motion_comparisons(found, share),
             *_plateau_comparisons(numbers["plateaus"]),
             *_creep_comparisons(found, creep, share),
-            _width_comparison(numbers["implied width"]),
+            compare(_WIDTH, WIDTH, numbers["implied width"], "published", 1e-5 * WIDTH, "m", _RADIUS),
         ],
         tables=(experiment.table("Drift per period of 1/3 s", moved, columns, "what oscillates; model"),),
         data={load: _dataset(load, found) for load in MODELS},
@@ -180,6 +180,11 @@ def _dataset(load: Load, found: Runs) -> Any:
 
 _READING = "The same load, labelled with its own time: what is left is the error of reading the figure."
 _TWICE = "The same equations, solved twice: what is left is the error of our solver, which drift adds up."
+_WIDTH = "width of the patch that the published angle implies"
+_RADIUS = (
+    r"$\theta = \tau/(\sigma_0 f_N \langle\rho^2\rangle)$ at the largest torque: the patch of the figures is "
+    "0.05 m wide, where the article gives 0.05 m as its radius."
+)
 _SPRING, _LEFT = r"$x = F/(\sigma_0 f_N)$", "what is left is our solver's error."
 
 
@@ -249,15 +254,6 @@ def _creep_comparisons(found: Runs, creep: dict[str, Any], share: float) -> list
                     theirs = _creep(facts.converged(f"drift/{model}"), *window)[name]
                     rows.append(compare(words, ours, theirs, "converged", tolerance, POSE[name], _TWICE))
     return rows
-
-
-def _width_comparison(implied: float) -> Comparison:
-    words = "width of the patch that the published angle implies"
-    cause = (
-        r"$\theta = \tau/(\sigma_0 f_N \langle\rho^2\rangle)$ at the largest torque: the patch of the figures is "
-        "0.05 m wide, where the article gives 0.05 m as its radius."
-    )
-    return compare(words, WIDTH, implied, "published", 1e-5 * WIDTH, "m", cause)
 
 
 _ROWS = (("x", "$x$ [nm]", 1e9), ("theta", "$\\theta$ [µrad]", 1e6))

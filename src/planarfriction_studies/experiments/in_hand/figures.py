@@ -101,7 +101,7 @@ def end_shifts(rows: Mapping[str, Mapping[str, float]], colours: Mapping[str, st
     """Draw the shifts of the end [m], by case and by cause, on a logarithmic axis called `label`; friction is black."""
     figure, axes = looks.panels(8.6, 1.5 + 0.36 * len(rows))
     causes = list(dict.fromkeys(cause for shifts in rows.values() for cause in shifts))
-    for cause, marker in zip(causes, "<>oD^", strict=False):
+    for cause, marker in zip(causes, "<>oD^*", strict=False):
         places = [j for j, shifts in enumerate(rows.values()) if cause in shifts]
         shown = [1e3 * shifts[cause] for shifts in rows.values() if cause in shifts]
         colour = colours.get(cause, EXACT)

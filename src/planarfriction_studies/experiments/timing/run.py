@@ -102,6 +102,7 @@ def _machine() -> dict[str, Any]:
 
 def _baselines(work: Work) -> dict[str, dict[str, Arrays]]:
     """Time LSODA beside ours, by row and kind; the distributed model over a window unless all is wanted."""
+    spans: dict[str, tuple[float, float]]
     spans = {"distributed": (0.0, 2.0) if work.full else BREAKAWAY, "reduced": (0.0, 2.0)}
     spans = dict.fromkeys(KINDS, QUICK_WINDOW) if work.quick else spans
 
