@@ -74,6 +74,21 @@ def test_what_an_experiment_found_is_put_below_its_mark(pages):
     assert pages["with_verdicts"](found, {"drift": "It drifts."}) == found
 
 
+def test_the_table_fits_100_columns_with_its_units(monkeypatch, capsys):
+    names = {name: bench.Measurement(name, 6.1234e-4, "ns per loaded cell and step", "", 6.8e-3, 11.1) for name in
+             sorted(bench.BENCHMARKS, key=len)[-3:]}  # fmt: skip
+    words = "SciPy LSODA over the first 0.1 s (the ratio is to the 31 ms of that window here)"
+    lines = [*names.values(), line(93.1, "million contact-steps/s", words, 668.0)]
+    lines.append(bench.Measurement("absent", None, "", "left out: the package cannot be found " * 3, None, None))
+    monkeypatch.setattr(bench, "run", lambda *_, **__: lines)
+    monkeypatch.delenv("COLUMNS", raising=False)
+    assert main(["bench"]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert max(map(len, shown)) <= 100
+    text = " ".join(" ".join(shown).split())
+    assert all(name in text for name in names) and "0.0006123" in text and "93.1" in text
+
+
 @pytest.mark.warp
 def test_warp_prints_nothing_beside_the_json(capsys):
     warp = pytest.importorskip("warp", reason="needs the extra [warp]")

@@ -5,6 +5,7 @@ The experiments here are made up; the real ones have tests of their own.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 
@@ -52,16 +53,18 @@ class Made:
         table = Table("Some", ["name", "value"], [["first", np.float64(0.123456)], ["second", 3]], note="a note")
         data = {"curves": xr.Dataset({"x": ("time", np.arange(3.0))})}
         exact = compare("two, fx", ours, 2.0, "closed form", 1e-3, "m^2", "rounding")
+        stored = dataclasses.replace(row, quantity="three", theirs=2.0, difference=0.0, cause="the figure", paper=1e-4)
         picture = Picture("line", "A line.", figure)
         return Result(
             ["Found $x^2$."],
             [picture],
-            [row, exact],
+            [row, exact, stored],
             {"value": np.float64(ours)},
             [table],
             data,
             asked="Why?",
             verdict=f"The verdict of {self.name}.",
+            left_out="the red curve" if self.name == "second" else "",
         )
 
     def compute(self, letter: str) -> dict[str, float]:
@@ -191,16 +194,19 @@ def test_the_command_writes_a_report_and_all_numbers(made, tmp_path, capsys):
 def test_the_report_begins_with_its_verdict_and_separates_the_papers(made, tmp_path):
     main(["reproduce", "--out", str(tmp_path)])
     head, first, _ = re.split("<section", (tmp_path / "report.html").read_text())
-    assert "All 4 comparisons are within their tolerance" in head
+    assert "All 6 comparisons hold." in head
+    # what is left out is said where the count stands, and its section named
+    assert "that of the red curve (section 2)." in head
     assert "The verdict of first." in head and "The verdict of second." in head
-    places = [
-        first.index(each)
-        for each in ("Why?", "<figure>", "Found ", "Some", "Ours against converged", "Ours against the paper")
-    ]
+    titles = ("Converged solutions and", "The paper, with", "s curves, stored comparisons")
+    places = [first.index(each) for each in ("Why?", "<figure>", "Found ", "Some", *titles)]
     assert places == sorted(places)
-    ours, papers = first.split("Ours against the paper")
+    ours, papers, stored = (first[begin:end] for begin, end in zip(places[-3:], [*places[-2:], None], strict=True))
     assert "<i>f<sub>x</sub></i>" in ours and "m²" in ours and "none &amp; all" not in ours
-    assert "none &amp; all" in papers and "whatever its error" in papers
+    assert "none &amp; all" in papers and "<th>tolerance</th>" in papers and "three" not in papers
+    # the distance of a published curve from the converged solution limits a comparison, but is no tolerance
+    assert "three" in stored and "<th>limit</th>" in stored and "tolerance" not in stored
+    assert "The limit is no tolerance" in head
 
 
 def test_a_number_out_of_tolerance_is_shown_and_sets_the_exit_code(made, tmp_path, capsys):
@@ -258,6 +264,11 @@ def test_markdown_with_formulas():
     assert "<em>word</em>" in page and "<code>code</code>" in page and "&lt;b&gt;" in page and "and 5 $." in page
     (picture,) = re.findall(r'<img[^>]*alt="([^"]*)"', page)
     assert picture == r"\sigma_0 &lt; 1"
+
+
+def test_markdown_with_a_table():
+    page = to_html("| | $x$ |\n| --- | --- |\n| disc | 0.5 |")
+    assert "<td>disc</td>" in page and page.count("<th>") == 2 and 'alt="x"' in page
 
 
 def test_symbols_in_names():

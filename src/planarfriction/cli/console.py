@@ -57,15 +57,19 @@ def note(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def print_table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table on stdout: columns with numbers are aligned on the right, words on the left."""
+def print_table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]], *, width: int = 200) -> None:
+    """Print a table on stdout: columns with numbers are aligned on the right, words on the left.
+
+    It is as wide as the terminal; elsewhere `width` letters are enough for every table that programs may read.
+    """
     table = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
     for number, heading in enumerate(headings):
         numbers = number > 0 and any(character.isdigit() for row in rows for character in row[number][:2])
-        table.add_column(heading, justify="right" if numbers else "left", overflow="fold")
+        name = number == 0 and not any(" " in row[0] for row in rows)  # stays in one piece
+        table.add_column(heading, justify="right" if numbers else "left", overflow="fold", no_wrap=name)
     for row in rows:
         table.add_row(*row)
     console = Console(markup=False, highlight=False)  # units in brackets are no markup
     if not console.is_terminal:
-        console = Console(markup=False, highlight=False, width=200)  # never fold what another program may read
+        console = Console(markup=False, highlight=False, width=width)
     console.print(table)

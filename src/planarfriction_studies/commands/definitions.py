@@ -21,6 +21,10 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Variables by which libraries of linear algebra, and PyTorch, learn how many threads to use."""
 
 
+WIDEST = 100
+"""Letters of a line of the table of benchmarks where it is not printed on a terminal."""
+
+
 def use_one_thread() -> None:
     """Give libraries of linear algebra that are loaded after this one thread, unless OMP_NUM_THREADS says otherwise."""
     for name in THREADS:
@@ -73,19 +77,13 @@ def bench(only: tuple[str, ...], full: bool, rounds: int | None, old: Path | Non
         headings = ["name", "then", "now", "ratio then", "ratio now", "change", "spread", ""]
         print_table("Ratios to the baselines", headings, comparison.rows(comparison.changes(lines, then)))
     else:
-        shown = lambda value: "" if value is None else f"{value:.4g}"  # noqa: E731
+        shown = lambda value, unit="": "" if value is None else f"{value:.4g} {unit}".strip()  # noqa: E731
         rows = [
-            [
-                each.name,
-                shown(each.value),
-                each.unit,
-                each.baseline or "",
-                shown(each.baseline_value),
-                shown(each.ratio),
-            ]
+            [each.name, *(shown(value, each.unit) for value in (each.value, each.baseline_value)), shown(each.ratio),
+             each.baseline]
             for each in lines
-        ]
-        print_table("Benchmarks", ["name", "value", "unit", "baseline", "of the baseline", "ratio"], rows)
+        ]  # fmt: skip
+        print_table("Benchmarks", ["name", "cost", "of the baseline", "ratio", "baseline"], rows, width=WIDEST)
 
 
 # ---------------------------------------------------------------------- measured

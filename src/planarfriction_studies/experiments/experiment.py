@@ -16,6 +16,8 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from planarfriction.scenes import Signal
+from planarfriction.scenes.signal import sample_times
 from planarfriction.writing import make_folder, replacing
 from planarfriction_studies.experiments import facts
 
@@ -33,11 +35,10 @@ WRENCH = {"fx": "N", "fy": "N", "tau": "N m"}
 UNITS = TWIST | POSE | WRENCH | {"normal_force": "N"}
 
 Arrays = dict[str, np.ndarray]
+Numbers = dict[str, Any]
 
 Key = TypeVar("Key")
-
 Item = TypeVar("Item")
-
 Reference = Literal["published", "converged", "closed form"]
 
 
@@ -84,9 +85,8 @@ def compare_curve(
     error (or, where the figure's solver error is unknown, an estimate that `cause` explains).
     """
     curve = facts.published_curve(name)
-    tolerance = (curve.deviation or 0.0) + curve.reading + allowance
-    ours, theirs = (time, values), (curve.time, curve.values)
-    return _compare_at("published", quantity, ours, theirs, tolerance, curve.unit, cause, curve.deviation)
+    tolerance, theirs = (curve.deviation or 0.0) + curve.reading + allowance, (curve.time, curve.values)
+    return _compare_at("published", quantity, (time, values), theirs, tolerance, curve.unit, cause, curve.deviation)
 
 
 def compare_converged(
@@ -95,9 +95,9 @@ def compare_converged(
     """Compare our curve with the column `name` of a converged solution, `in_hand/Circle/d1/x`, at all its times."""
     solution, _, column = name.rpartition("/")
     reference = facts.converged(solution)
-    ours, theirs = (time, values), (reference["time"], reference[column])
-    tolerance = allowance + facts.CONVERGED_SHARE * float(np.ptp(reference[column]))
-    return _compare_at("converged", quantity, ours, theirs, tolerance, UNITS[column], cause)
+    theirs = reference["time"], reference[column]
+    tolerance = allowance + facts.CONVERGED_SHARE * float(np.ptp(theirs[1]))
+    return _compare_at("converged", quantity, (time, values), theirs, tolerance, UNITS[column], cause)
 
 
 Curve = tuple[np.ndarray, np.ndarray]
@@ -138,6 +138,16 @@ def compare_columns(
         for name in columns
         if UNITS[name] in allowances
     ]
+
+
+def compare_profile(
+    profile: Signal, name: str, columns: Iterable[str], cause: str, *, dt: float = 0.01, allowance: float = 1e-12,
+    before: str = "velocity profile, ",
+) -> list[Comparison]:  # fmt: skip
+    """Compare a signal, sampled every `dt` [s], with the published curves `name`."""
+    time = sample_times(5.0, dt)
+    ours = columns_of(time, profile(time), columns)
+    return compare_columns("published", before, ours, name, allowance, cause, columns)
 
 
 def compare(
@@ -207,6 +217,11 @@ def columns_of(time: np.ndarray, values: np.ndarray, names: Iterable[str]) -> Ar
     return {"time": time} | dict(zip(names, values.T, strict=True))
 
 
+def with_units(values: np.ndarray, units: Mapping[str, str]) -> dict[str, tuple[np.ndarray, str]]:
+    """Return the columns of `values` `[T, N]` by name, each with its unit."""
+    return {name: (column, unit) for (name, unit), column in zip(units.items(), values.T, strict=True)}
+
+
 def dataset(
     runs: Mapping[tuple[str, ...], Mapping[str, np.ndarray]],
     columns: Iterable[str],
@@ -249,9 +264,11 @@ class Result:
     data: Mapping[str, xr.Dataset] = field(default_factory=dict)
     """Curves by name, with units; written as NetCDF."""
     asked: str = ""
-    """Question of the experiment, Markdown."""
+    """Paragraph on what is compared, and how, Markdown."""
     verdict: str = ""
     """One or two sentences for the top of the report, Markdown."""
+    left_out: str = ""
+    """Description of the published curve that is not compared, if there is one."""
 
 
 @dataclass(frozen=True)

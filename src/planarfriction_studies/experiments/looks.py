@@ -31,16 +31,23 @@ def vertices(
     axes.plot(curve.time[part], factor * curve.values[part], ls="", marker=marker, **look)
 
 
+def panels(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[PlotFigure, Any]:
+    """Return a figure of `width` x `height` inches and its tidy panels, as `Figure.subplots` makes them."""
+    figure = style.new_figure(width, height)
+    made: Any = figure.subplots(rows, columns, **options)
+    for axes in np.ravel(made):
+        style.tidy(axes)
+    return figure, made
+
+
 def box_panels(names: list[str], height: float) -> tuple[PlotFigure, Any]:
     """Return a figure of two panels, one above the other, with a place for the boxes of each name."""
-    figure = style.new_figure(9.6, height)
-    panels: Any = figure.subplots(2, 1, sharex=True)
-    for axes in panels:
-        style.tidy(axes)
+    figure, made = panels(9.6, height, 2, sharex=True)
+    for axes in made:
         axes.grid(False, axis="x")
-    panels[1].set_xticks(range(len(names)), names)
-    figure.align_ylabels(panels)
-    return figure, panels
+    made[1].set_xticks(range(len(names)), names)
+    figure.align_ylabels(made)
+    return figure, made
 
 
 def box(axes: Any, at: float, numbers: Any, colour: str, width: float, filled: bool = True) -> None:
@@ -57,14 +64,14 @@ def box(axes: Any, at: float, numbers: Any, colour: str, width: float, filled: b
         axes.plot(at, *most, marker="x", ms=5, mew=1.4, color=colour)
 
 
-def box_key(colours: dict[str, str], ending: str = "", filled: bool = True) -> list[Any]:
-    """Return the legend of boxes by their words."""
+def box_legend(figure: PlotFigure, colours: dict[str, str], columns: int, also: dict[str, str] | None = None) -> None:
+    """Draw the legend of boxes by their words, filled, then `also` open ones, and of the crosses of maxima."""
     from matplotlib.patches import Patch
 
-    return [
-        Patch(facecolor=colour if filled else "white", edgecolor=colour, label=words + ending)
-        for words, colour in colours.items()
-    ]
+    filled = [Patch(facecolor=colour, edgecolor=colour, label=words) for words, colour in colours.items()]
+    empty = [Patch(facecolor="white", edgecolor=colour, label=words) for words, colour in (also or {}).items()]
+    cross = line_key("maximum", ls="", marker="x", ms=5, mew=1.4, color="0.3")
+    legend(figure, [*filled, *empty, cross], columns, fontsize="medium" if also else "small")
 
 
 def line_key(label: str, **look: Any) -> Any:
@@ -84,9 +91,6 @@ AXES = {
     "tau": ("$\\tau$ [N mm]", 1e3),
 }
 """Column of a run -> its label on an axis, shown units per SI unit."""
-
-MAXIMUM = {"label": "maximum", "ls": "", "marker": "x", "ms": 5, "mew": 1.4, "color": "0.3"}
-"""Legend of the crosses."""
 
 
 def legend(figure: PlotFigure, handles: Any, columns: int, place: str = "upper", **options: Any) -> None:

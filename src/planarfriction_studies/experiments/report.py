@@ -33,12 +33,15 @@ def write_report(reproduction: Reproduction) -> Path:
     page = environment().overlay()
     page.filters |= {
         "markdown": lambda text: Markup(to_html(text)),
-        "inline": lambda text: Markup(inline(text)),
+        "inline": lambda text: Markup(_parser().renderInline(text)),
         "symbols": lambda text: Markup(name_to_html(str(text))),
-        "percent": percent,
+        "percent": lambda share: "" if share is None else f"{100.0 * share:.2g}",
     }
     counter = itertools.count(1)
-    sections = [_section(record, reproduction.folder / record["name"], counter) for record in reproduction.records()]
+    sections: list[Record] = [
+        _section(record, reproduction.folder / record["name"], counter) | {"number": number}
+        for number, record in enumerate(reproduction.records(), 1)
+    ]
     rows = [row for section in sections for row in section["comparisons"]]
     text = page.get_template("report.html.j2").render(
         sections=sections,
@@ -52,11 +55,6 @@ def write_report(reproduction: Reproduction) -> Path:
     path = reproduction.folder / "report.html"
     write_text(path, text)
     return path
-
-
-def percent(share: float | None) -> str:
-    """Return a share as a percentage with two digits; nothing for None."""
-    return "" if share is None else f"{100.0 * share:.2g}"
 
 
 def _section(record: Record, home: Path, counter: Any) -> Record:
@@ -73,10 +71,12 @@ def _section(record: Record, home: Path, counter: Any) -> Record:
 
 
 def _by_kind(rows: Rows) -> dict[str, Any]:
-    """Split rows by their reference: exact or converged, and published."""
+    """Split rows by what limits them: exact or converged, published with a tolerance, published with a known error."""
+    published = [row for row in rows if row["reference"] == "published"]
     return {
         "exact": _summary([row for row in rows if row["reference"] != "published"]),
-        "paper": _summary([row for row in rows if row["reference"] == "published"]),
+        "paper": _summary([row for row in published if row["paper"] is None]),
+        "stored": _summary([row for row in published if row["paper"] is not None]),
     }
 
 
@@ -91,7 +91,10 @@ def _summary(rows: Rows) -> dict[str, Any]:
         "groups": [(cause, [row for row in rows if row["cause"] == cause]) for cause in causes],
         "share": max(shares, default=None),
         "paper_share": max(paper, default=None),
-        "of_tolerance": max((row["difference"] / row["tolerance"] for row in rows if row["tolerance"]), default=None),
+        "nearest": max(
+            [(row["difference"] / row["tolerance"], row["quantity"]) for row in rows if row["tolerance"]],
+            default=(0, ""),
+        ),
     }
 
 
@@ -105,8 +108,6 @@ def _image(path: Path) -> dict[str, Any]:
     source = "data:image/png;base64," + base64.b64encode(data).decode()
     return {"source": source, "width": min(100, round(100 * width / WIDEST))}
 
-
-# ---------------------------------------------------------------------- Markdown
 
 POINTS = 100.0
 """Size of the letters of a formula as it is drawn [points], large because pictures are whole points wide and high."""
@@ -140,11 +141,6 @@ def to_html(text: str) -> str:
     return _parser().render(text)
 
 
-def inline(text: str) -> str:
-    """Convert one line of Markdown to HTML, without a paragraph around it."""
-    return _parser().renderInline(text)
-
-
 def name_to_html(text: str) -> str:
     """Return the name of a quantity or a column, whose symbols are plain words, as HTML with typeset symbols."""
     parts = _SYMBOL.split(re.sub(r"(?<=\d) x (?=\d)", " × ", text))
@@ -176,7 +172,7 @@ def formula(source: str) -> str:
 def _parser() -> MarkdownIt:
     from markdown_it import MarkdownIt
 
-    parser = MarkdownIt("commonmark", {"html": False})
+    parser = MarkdownIt("commonmark", {"html": False}).enable("table")
     parser.inline.ruler.before("escape", "formula", _find_formula)
     parser.add_render_rule("formula", lambda _, tokens, i, *__: formula(tokens[i].content))
     return parser

@@ -60,11 +60,7 @@ class Reproduction:
         return [record for name in EXPERIMENTS if (record := self.kept(name)) is not None]
 
     def run(
-        self,
-        names: Sequence[str] | None = None,
-        *,
-        again: bool = False,
-        progress: Callable[[str], None] | None = None,
+        self, names: Sequence[str] | None = None, *, again: bool = False, progress: Callable[[str], None] | None = None
     ) -> Iterator[Record]:
         """Carry out the experiments `names` (all by default) and yield each result as it is stored.
 
@@ -133,8 +129,7 @@ def _record(each: Experiment, result: Result) -> Record:
     return {
         "name": each.name,
         "title": each.title,
-        "verdict": result.verdict,
-        "asked": result.asked,
+        **{name: getattr(result, name) for name in ("verdict", "asked", "left_out")},
         "findings": list(result.findings),
         "pictures": [{"name": picture.name, "caption": picture.caption} for picture in result.pictures],
         "tables": [_plain(dataclasses.asdict(table)) for table in result.tables],

@@ -15,6 +15,9 @@ from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction.scenes import Scene, simulate
 from planarfriction_studies.experiments.experiment import POSE, TWIST, WRENCH, Arrays
 
+WIDTH, CELLS = 0.02, 21
+"""Width of the published patches [m], and cells along it."""
+
 LAW = LuGre(mu_s=1.2, elasto_plastic=ElastoPlastic(0.9))
 """The published friction parameters with elasto-plastic bristles."""
 

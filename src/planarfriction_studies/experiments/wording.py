@@ -1,7 +1,8 @@
 """Texts about an experiment: a template beside its code, filled with the numbers of a run.
 
 A template is Markdown with formulas between dollar signs. Its parts begin with `## verdict`, `## asked`, `## found` and
-`## figures`, which lists a caption in one line for each figure, `- NAME: CAPTION`.
+`## figures`, which lists a caption in one line for each figure, `- NAME: CAPTION`. `## left out` may name a published
+curve that is not compared.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ def report(
     captions = dict(line.removeprefix("- ").split(": ", 1) for line in parts["figures"].splitlines() if line)
     pictures = [Picture(name, captions[name], figure) for name, figure in figures.items()]
     found = parts["found"].split("\n\n")
-    return Result(found, pictures, numbers=numbers, asked=parts["asked"], verdict=parts["verdict"], **rest)
+    words = {name: parts.get(name.replace("_", " "), "") for name in ("asked", "verdict", "left_out")}
+    return Result(found, pictures, numbers=numbers, **words, **rest)
 
 
 @functools.cache

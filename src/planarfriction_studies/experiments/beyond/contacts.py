@@ -14,7 +14,7 @@ from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, friction_metri
 from planarfriction.scenes import Body, Contact, Scene
 from planarfriction.scenes.ready import GRAVITY, drift
 from planarfriction_studies.experiments.drift.run import TORQUE, WIDTH
-from planarfriction_studies.experiments.experiment import Comparison, compare_all
+from planarfriction_studies.experiments.experiment import Comparison, compare, compare_all
 from planarfriction_studies.experiments.load_dependent.run import soft_patch
 from planarfriction_studies.experiments.runs import LAW, simulated
 
@@ -117,10 +117,8 @@ def plateau_comparisons(angles: dict[str, float]) -> list[Comparison]:
     settled = "Bristles that are not yet at rest, and the tolerance of the solver."
     ours, whole, exact = (angles[name] for name in ("ReducedModel", "distributed", "closed form"))
     words = "torsional plateau, ReducedModel"
-    return [
-        *compare_all("converged", [(f"{words} beside distributed", ours, whole, SHARE * whole, "rad", stiff)]),
-        *compare_all("closed form", [(words, ours, exact, SHARE * exact, "rad", settled)]),
-    ]
+    beside = compare(f"{words} beside distributed", ours, whole, "converged", SHARE * whole, "rad", stiff)
+    return [beside, compare(words, ours, exact, "closed form", SHARE * exact, "rad", settled)]
 
 
 def load_family(quick: bool) -> dict[str, float]:

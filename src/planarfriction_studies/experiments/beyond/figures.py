@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.plots.style import PlotFigure, new_figure, tidy
+from planarfriction.plots.style import PlotFigure
 from planarfriction_studies.experiments import looks
 from planarfriction_studies.experiments.beyond import contacts
 from planarfriction_studies.experiments.beyond.ladder import MOVED, Row, shape_of
@@ -36,14 +36,13 @@ def surface_errors(errors: dict[str, Arrays]) -> PlotFigure:
                 looks.box(axes, at, numbers, COLOURS[kind], 0.12)
         axes.set(yscale="log", ylabel=label)
     shown = {kind: COLOURS[kind] for kind in KINDS if any(f"{kind}/force" in each for each in errors.values())}
-    looks.legend(figure, [*looks.box_key(shown), looks.line_key(**looks.MAXIMUM)], 6, fontsize="small")
+    looks.box_legend(figure, shown, 6)
     return figure
 
 
 def staircase(stairs: Arrays) -> PlotFigure:
     """Draw the torque [N mm] and force [N] of a spin over its centre [mm], summed and exact, for line and disc."""
-    figure = new_figure(9.6, 6.0)
-    panels: Any = figure.subplots(2, 2, sharex=True)
+    figure, panels = looks.panels(9.6, 6.0, 2, 2, sharex=True)
     place = 1e3 * stairs["place"]
     for row, shape in zip(panels, ("Line", "Circle"), strict=True):
         for axes, ending, factor, label, from_exact in (
@@ -57,7 +56,6 @@ def staircase(stairs: Arrays) -> PlotFigure:
             axes.plot(place, exact, color=looks.EXACT, lw=1.3, label="exact")
             axes.set(ylabel=label, xlim=(0.0, place[-1]))
             axes.set_title(IN_WORDS[shape], fontsize="medium", loc="left")
-            tidy(axes)
     for axes in panels[1]:
         axes.set_xlabel("centre of rotation from the middle [mm]")
     figure.align_ylabels(panels)
@@ -76,15 +74,13 @@ def driven_boxes(errors: dict[str, dict[str, dict[str, float]]]) -> PlotFigure:
                 values = [1e3 * each[model][before + name] for name in boxes.COLUMNS]
                 looks.box(axes, place + offset, values, colour, 0.13)
         axes.set(ylabel=label, ylim=(0.0, None))
-    key = looks.box_key({MOVED[model]: colour for model, colour in MODEL_COLOURS.items()})
-    looks.legend(figure, [*key, looks.line_key(**looks.MAXIMUM)], 3, fontsize="small")
+    looks.box_legend(figure, {MOVED[model]: colour for model, colour in MODEL_COLOURS.items()}, 3)
     return figure
 
 
 def grooves(numbers: dict[str, Any]) -> PlotFigure:
     """Draw the drift of the grooved block [deg] over the slope [deg], simulated and in closed form."""
-    figure = new_figure(5.4, 3.6)
-    axes: Any = figure.subplots()
+    figure, axes = looks.panels(5.4, 3.6)
     slopes = np.array(numbers["slope"])
     fine = np.linspace(slopes[0], slopes[-1], 100)
     closed = np.degrees([contacts.closed_drift(slope) for slope in fine])
@@ -95,39 +91,37 @@ def grooves(numbers: dict[str, Any]) -> PlotFigure:
         axes.plot(np.degrees(slopes), np.degrees(numbers[kind]), marker, **look)
     axes.set(xlabel="slope [deg]", ylabel="drift from the fall line [deg]", ylim=(0.0, None))
     axes.legend(frameon=False)
-    tidy(axes)
     return figure
-
-
-# ---------------------------------------------------------------------- error against cost
 
 
 class Family(NamedTuple):
     """Models of the ladder that are one line."""
 
     words: str
-    rungs: dict[str, str]
-    """Model -> what stands beside its marker."""
+    rungs: dict[str, tuple[str, tuple[int, int]]]
+    """Model -> what stands beside its marker, and where: its offset from the marker [points]."""
     colour: str
     marker: str
-    place: tuple[int, int] = (5, 4)
-    """Offset of the words from the marker [points]."""
 
+
+_RIGHT, _LEFT, _ABOVE, _CORNER = (6, -12), (-12, -13), (5, 5), (-16, 4)
 
 FAMILIES = (
-    Family("published reduced model", {"published": ""}, looks.REDUCED, "^"),
-    Family("ReducedModel, by default", {"reduced": ""}, looks.FEW, "s"),
-    Family("ReducedModel, its parts", {"one part": "1", **{f"{n} parts": f"{n}" for n in (4, 6, 16)}}, looks.MOMENTS,
-           "o", (4, -11)),
-    Family("distributed, its cells", {"degree 3": "28", "degree 5": "45", "full": "all"}, looks.DISTRIBUTED, "D"),
+    Family("published reduced model", {"published": ("", _RIGHT)}, looks.REDUCED, "^"),
+    Family("ReducedModel, by default", {"reduced": ("", _RIGHT)}, looks.FEW, "s"),
+    Family("ReducedModel in 1, 4, 6 and 16 parts",
+           {"one part": ("1", _RIGHT), "4 parts": ("4", _LEFT), "6 parts": ("6", _RIGHT), "16 parts": ("16", _RIGHT)},
+           looks.MOMENTS, "o"),
+    Family("distributed, 28, 45 or all cells",
+           {"degree 3": ("28", _CORNER), "degree 5": ("45", _ABOVE), "full": ("all", _ABOVE)}, looks.DISTRIBUTED, "D"),
 )  # fmt: skip
 
-COLUMNS = (
-    ("driven, ", "third quartile", "moved with a given velocity", "error of the force, third quartile [mN]"),
+ROWS = (
+    ("driven, ", "third quartile", "moved with a given velocity", "force error, third quartile [mN]"),
     ("load 2", "end", "in hand, load 2 (slips at once)", "distance of the end [mm]"),
     ("load 1", "end", "in hand, load 1 (barely slips)", "distance of the end [mm]"),
 )
-"""Columns: part of the name of their cases, the error that is shown, its title, and its axis [thousandths]."""
+"""Rows: part of the name of their cases, the error that is shown, their title, and their axis [thousandths]."""
 
 FLOOR = 1e-4
 """Smallest error that is drawn [mN, mm]."""
@@ -136,39 +130,37 @@ TICKS = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10)
 
 
 def draw_ladder(rows: list[Row]) -> PlotFigure:
-    """Draw the error over the time of a run: patches of many cells above, of few below; velocity-driven and in hand."""
+    """Draw the error over the time of a run: patches of many cells on the left, of few on the right; a row a run."""
     from matplotlib.ticker import FixedLocator, NullLocator
 
     many = {shape_of(row.case) for row in rows if row.model == "degree 5"}
     groups = [group for few in (False, True) if (group := [row for row in rows if (shape_of(row.case) in many) ^ few])]
-    figure = new_figure(10.5, 0.7 + 3.1 * len(groups))
-    panels: Any = figure.subplots(len(groups), len(COLUMNS), sharex="row", squeeze=False)
-    for line, group in zip(panels, groups, strict=True):
+    figure, panels = looks.panels(8.3, 9.6, len(ROWS), len(groups), sharex="col", sharey="row", squeeze=False)
+    for column, group in zip(panels.T, groups, strict=True):
         cells = [row.states // 2 for row in group if row.model == "full"]
-        for axes, (case, quantity, title, label) in zip(line, COLUMNS, strict=True):
+        for axes, (case, quantity, title, label) in zip(column, ROWS, strict=True):
             for family in FAMILIES:
                 _draw_family(axes, family, [row for row in group if case in row.case], quantity)
             axes.set(xscale="log", yscale="log", ylabel=label)
-            axes.yaxis.label.set_fontsize("small")
-            axes.set_title(f"{title},\npatches of {span(cells, 'd')} cells", fontsize="medium", loc="left")
+            axes.label_outer()
+            axes.set_title(title, fontsize="medium", loc="left")
+            axes.set_title("better \N{SOUTH WEST ARROW}", fontsize="medium", loc="right", color="0.35")
             axes.margins(x=0.12, y=0.1)
             axes.xaxis.set_major_locator(FixedLocator(TICKS))
             axes.xaxis.set_major_formatter("{x:g}")
             axes.xaxis.set_minor_locator(NullLocator())
-            tidy(axes)
-    for axes in panels[-1]:
-        axes.set_xlabel("time of a run / that of the whole grid")
-    figure.align_ylabels(panels)
+        column[-1].set_xlabel(f"time of a run / distributed model's [-],\npatches of {span(cells, 'd')} cells")
+    figure.align_ylabels(panels[:, 0])
     look = {"ls": "-", "lw": 1.4, "ms": 6.5, "mec": "white"}
     key = [looks.line_key(each.words, marker=each.marker, color=each.colour, **look) for each in FAMILIES]
-    looks.legend(figure, key, len(FAMILIES), fontsize="small")
+    looks.legend(figure, key, 2)
     return figure
 
 
 def _draw_family(axes: Any, family: Family, rows: list[Row], quantity: str) -> None:
     """Draw medians joined by a line, bars from the smallest to the largest, the reference, without errors, dotted."""
     medians = []
-    for model, words in family.rungs.items():
+    for model, (words, place) in family.rungs.items():
         found = [row for row in rows if row.model == model]
         if not found:
             continue
@@ -179,7 +171,7 @@ def _draw_family(axes: Any, family: Family, rows: list[Row], quantity: str) -> N
             continue
         middle = float(np.median(errors))
         axes.vlines(cost, errors.min(), errors.max(), color=family.colour, lw=1.6, alpha=0.35)
-        axes.annotate(words, (cost, middle), family.place, textcoords="offset points", fontsize=8, color=family.colour)
+        axes.annotate(words, (cost, middle), place, textcoords="offset points", fontsize=9, color=family.colour)
         medians.append((cost, middle))
     if medians:
         axes.plot(*np.transpose(medians), "-", marker=family.marker, ms=6.5, mec="white", lw=1.4, color=family.colour)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ from planarfriction.scenes import Scene, simulate
 from planarfriction.scenes.ready import FINE, driven, in_hand, in_hand_load
 from planarfriction_studies.experiments.experiment import Arrays, median_and_quartiles
 from planarfriction_studies.experiments.in_hand import runs
-from planarfriction_studies.experiments.in_hand.runs import FRICTION_CHANGE, Case
+from planarfriction_studies.experiments.in_hand.runs import Case
 from planarfriction_studies.experiments.runs import IN_WORDS, LAW, SIX_SHAPES, at_centre_of_pressure, simulated
 from planarfriction_studies.experiments.velocity_driven import boxes
 
@@ -47,7 +47,6 @@ LEAST_PARTS, MOST_PARTS = 3, 33
 REPEATS, LONG, SHORT = 9, 0.1, 0.02
 """A run is timed once and, if it takes less than LONG [s], so many times more; a short one before does not count."""
 
-
 MOVED = {
     "published": "published reduced",
     "reduced": "ReducedModel",
@@ -69,14 +68,8 @@ SPIN, SPIN_STEPS, SPIN_STEP = 0.02, 400, 1e-8
 """Speed of the spin from rest [rad/s], its steps, and how far each goes at the contact radius [m]: 1e-6 m are full
 deflection."""
 
-ENDS = {
-    "published": "published reduced",
-    "reduced": "ReducedModel",
-    "one part": "ReducedModel, 1 part",
-    "4 parts": "ReducedModel, 4 parts",
-    AUTO: 'ReducedModel, parts="auto"',
-}
-"""Model of the ladder -> its name in the report."""
+ENDS = {name: (MOVED | {"4 parts": "ReducedModel, 4 parts"})[name] for name in (*list(MOVED)[:3], "4 parts", AUTO)}
+"""Models of the in-hand runs -> their names in the report."""
 
 SHIFT = "friction"
 """Column of the numbers that holds the shift of the end by friction."""
@@ -107,6 +100,12 @@ def shape_of(case: str) -> str:
     if case.startswith("driven, "):
         return IN_WORDS[case.removeprefix("driven, ")]
     return case.rpartition(", load")[0].removesuffix(", far placement")
+
+
+def reduced_models(patch: ContactPatch, parts: Iterable[Any]) -> dict[str, Any]:
+    """Return the published reduced model, and `ReducedModel` by default and with numbers of parts, by name."""
+    few: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW), "reduced": ReducedModel(patch, LAW)}
+    return few | {name_of_parts(count): ReducedModel(patch, LAW, parts=count) for count in parts}
 
 
 @functools.lru_cache(maxsize=8)
@@ -208,9 +207,6 @@ def _time(scene: Scene) -> float:
     return min([first, *(simulate(scene).statistics.wall_time for _ in range(REPEATS * (first < LONG)))])
 
 
-# ---------------------------------------------------------------------- moved with a given velocity
-
-
 def driven_errors(rows: list[Row]) -> dict[str, dict[str, dict[str, float]]]:
     """Return the errors of the velocity-driven runs by shape, model and statistic."""
     result: dict[str, dict[str, dict[str, float]]] = {}
@@ -234,8 +230,7 @@ def step_costs(shape: str = "Circle") -> dict[str, Any]:
     patch = PUBLISHED_PATCHES[shape]()
     directions = np.random.default_rng(7).normal(size=(STEPS, 3)) * [1.0, 1.0, 150.0]
     twists = directions * 10.0 ** np.random.default_rng(8).uniform(-4.0, -1.5, size=(STEPS, 1))
-    models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW), "reduced": ReducedModel(patch, LAW)}
-    models |= {name_of_parts(count): ReducedModel(patch, LAW, parts=count) for count in TIMED_PARTS}
+    models = reduced_models(patch, TIMED_PARTS)
     times = {name: np.empty(ROUNDS) for name in models}
     for turn in range(-1, ROUNDS):  # the first compiles
         for name, model in models.items():
@@ -257,10 +252,9 @@ def step_numbers(times: Arrays) -> dict[str, dict[str, list[float]]]:
 def spin_up(shape: str) -> dict[str, float]:
     """Return the largest error of the torque [N m] of a spin from rest, from the patch's own cells, by model."""
     patch = PUBLISHED_PATCHES[shape]()
-    models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW), "reduced": ReducedModel(patch, LAW)}
-    models |= {name_of_parts(parts): ReducedModel(patch, LAW, parts=parts) for parts in (1, AUTO)}
     dt = SPIN_STEP / (SPIN * patch.contact_radius())
     wanted = _spun(DistributedModel(patch, LAW), dt)
+    models = reduced_models(patch, (1, AUTO))
     return {name: float(np.abs(_spun(model, dt) - wanted).max()) for name, model in models.items()}
 
 
@@ -271,9 +265,6 @@ def _spun(model: Any, dt: float) -> np.ndarray:
         state, wrench = model.step(state, (0.0, 0.0, SPIN), 1.0, dt)
         torques[i] = wrench[2]
     return torques
-
-
-# ---------------------------------------------------------------------- in hand
 
 
 def depends_on_friction(each: dict[str, float]) -> bool:
@@ -289,7 +280,7 @@ def cases_of(shape: str) -> tuple[Case, ...]:
 def friction_shift(case: Case) -> float:
     """Return the mean distance [m] by which 0.1 % more and less friction move the end of the distributed model."""
     base = simulated(case.scene("d"), **FINE)
-    changed = (simulated(case.scene("d", runs.with_friction(s * FRICTION_CHANGE)), **FINE) for s in (1.0, -1.0))
+    changed = (simulated(case.scene("d", law), **FINE) for law in runs.CHANGED.values())
     return 0.5 * sum(runs.end_distance(run, base) for run in changed)
 
 

@@ -11,19 +11,12 @@ import numpy as np
 from planarfriction_studies.experiments import looks
 from planarfriction_studies.experiments.beyond import contacts, figures, ladder, surfaces, tables
 from planarfriction_studies.experiments.beyond import shapes as new_shapes
-from planarfriction_studies.experiments.experiment import Result, Work, median_and_quartiles
+from planarfriction_studies.experiments.experiment import Numbers, Result, Work, median_and_quartiles
 from planarfriction_studies.experiments.in_hand.figures import end_shifts
 from planarfriction_studies.experiments.runs import IN_WORDS, SIX_SHAPES
 from planarfriction_studies.experiments.wording import report
 
-Numbers = dict[str, Any]
-
-SHAPES = (*SIX_SHAPES, "LineGradX")
-
-QUICK_SHAPES = ("LineGrad", "NonConvex2")
-
-QUICK_TWISTS = 500
-
+SHAPES, QUICK_SHAPES, QUICK_TWISTS = (*SIX_SHAPES, "LineGradX"), ("LineGrad", "NonConvex2"), 500
 NEW_SHAPES, QUICK_NEW_SHAPES, QUICK_SEEDS = tuple(new_shapes.SHAPES), ("three feet",), (0, 1)
 
 
@@ -144,9 +137,6 @@ def _numbers(rows: list[ladder.Row], shifts: dict[str, float], errors: Numbers) 
     }
 
 
-# ---------------------------------------------------------------------- words
-
-
 def _template_values(numbers: Numbers) -> Numbers:
     """Return the values that the template names."""
     exact, ends, drifts, unseen = (numbers[name] for name in ("surfaces", "in hand", "grooves", "new shapes"))
@@ -167,9 +157,7 @@ def _template_values(numbers: Numbers) -> Numbers:
             "auto": _by_statistic(auto),
             "worse": {shape: names for shape, names in worse.items() if names},
         },
-        "rounds": ladder.ROUNDS,
         "unseen": {
-            "names": list(unseen),
             "twists": len(next(iter(unseen.values()))["reduced"]["force"]),
             "worst": {
                 model: {name: max(max(each[model][name]) for each in unseen.values()) for name in new_shapes.QUANTITIES}

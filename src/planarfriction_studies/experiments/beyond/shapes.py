@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
+from planarfriction.models import DistributedModel
 from planarfriction.patch import ContactPatch
 from planarfriction.scenes.ready import driven
 from planarfriction.scenes.signal import Signal
 from planarfriction_studies.experiments import experiment
-from planarfriction_studies.experiments.beyond.ladder import AUTO, name_of_parts
+from planarfriction_studies.experiments.beyond.ladder import AUTO, reduced_models
 from planarfriction_studies.experiments.experiment import Table
 from planarfriction_studies.experiments.runs import LAW, at_centre_of_pressure, simulated
 
@@ -87,9 +87,7 @@ def largest_errors(shape: str, seeds: tuple[int, ...] = SEEDS) -> dict[str, np.n
     """
     patch = SHAPES[shape]()
     fine = patch.refined(FINER) if (patch.cell_extents() > 0.0).any() else patch
-    models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW), "reduced": ReducedModel(patch, LAW)}
-    models |= {name_of_parts(parts): ReducedModel(patch, LAW, parts=parts) for parts in PARTS}
-    reference = DistributedModel(fine, LAW)
+    models, reference = reduced_models(patch, PARTS), DistributedModel(fine, LAW)
     result = {}
     for seed in seeds:
         wrench = functools.partial(_wrench, twist=twist(seed))
@@ -125,8 +123,6 @@ def table(found: dict[str, dict[str, np.ndarray]]) -> Table:
         for quantity in QUANTITIES
         for model in models
     }
-    note = (
-        f"Smooth random twists of {T_END:g} s, samples every {1e3 * EVERY:g} ms; from a grid cut {FINER} times finer."
-    )
+    note = f"Twists of {T_END:g} s, samples every {1e3 * EVERY:g} ms; from a grid cut {FINER} times finer."
     title = "New shapes: largest error over the published reduced model's, median / worst twist"
     return experiment.table(title, {shape: ratios(each) for shape, each in found.items()}, columns, "patch", note)

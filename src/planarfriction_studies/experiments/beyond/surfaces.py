@@ -19,13 +19,10 @@ from planarfriction.limit_surface import (
 )
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction_studies.experiments.experiment import Arrays, Comparison, compare_all
-from planarfriction_studies.experiments.runs import IN_WORDS
+from planarfriction_studies.experiments.runs import IN_WORDS, WIDTH
 
 TWISTS = 2000
 """Random twists, their directions even over the sphere of (vx, vy, r omega) about the centre of pressure."""
-
-WIDTH = 0.02
-"""Width of the patches, length of the line [m]."""
 
 KINDS: dict[str, type[LimitSurface]] = {
     "published table": LimitSurfaceTablePublished,
@@ -68,7 +65,7 @@ def difference(surface: LimitSurface, exact: LimitSurface, twists: np.ndarray) -
 
 def surface_errors(shape: str, count: int) -> dict[str, Any]:
     """Return by kind the force errors `[count]` [N] and torque errors `[count]` [N m] of a published patch."""
-    patch = PUBLISHED_PATCHES[shape](width=WIDTH)
+    patch = PUBLISHED_PATCHES[shape]()
     exact = LimitSurfaceExact(patch)
     twists = random_twists(exact, count)
     result: dict[str, Any] = {}
@@ -91,7 +88,7 @@ def staircase(cells: int = 21) -> dict[str, Any]:
     result = {"place": place}
     for shape, columns in (("Circle", [zero, -place, one]), ("Line", [place, zero, one])):
         twists = np.stack(columns, axis=1)
-        patch = PUBLISHED_PATCHES[shape](cells, WIDTH)
+        patch = PUBLISHED_PATCHES[shape](cells)
         for name, surface in (("sum", LimitSurfaceCells(patch)), ("exact", LimitSurfaceExact(patch))):
             result[f"{shape}/{name}"] = -surface.wrench(twists)[:, 2]
             result[f"{shape}/{name}, force"] = np.hypot(*surface.wrench(twists)[:, :2].T)

@@ -8,11 +8,9 @@ from typing import Any
 
 from planarfriction_studies.experiments.beyond.ladder import AUTO, ENDS, MOVED, SHIFT, STATISTICS, Row, shape_of
 from planarfriction_studies.experiments.beyond.surfaces import KINDS
-from planarfriction_studies.experiments.experiment import Table, entry, table
+from planarfriction_studies.experiments.experiment import Numbers, Table, entry, table
 from planarfriction_studies.experiments.runs import IN_WORDS, SIX_SHAPES
 from planarfriction_studies.experiments.wording import fmt, short
-
-Numbers = dict[str, Any]
 
 MODEL_WORDS = {
     "full": "distributed, 21 x 21 cells",
@@ -43,7 +41,7 @@ def tables(rows: list[Row], numbers: Numbers) -> tuple[Table, ...]:
             _by_shape(surfaces),
             {kind: lambda each, kind=kind: _mean_and_largest(each.get(f"{kind}/force")) for kind in kinds},
             "patch",
-            "Same random twists, $\\mu f_N$ = 1 N. The exact surface: each cell a rectangle (on lines a segment).",
+            "$\\mu f_N$ = 1 N.",
         ),
         table(
             "Velocity-driven: error from a converged grid, at the centre of pressure",
@@ -78,7 +76,7 @@ def tables(rows: list[Row], numbers: Numbers) -> tuple[Table, ...]:
             _by_shape(spins),
             {MOVED[model]: _scaled(model) for model in next(iter(spins.values()))},
             "patch",
-            "A spin at 0.02 rad/s from rest, in steps of a hundredth of a deflection, from the same cells.",
+            "At 0.02 rad/s, in steps of a hundredth of a deflection, from the same cells.",
         ),
         table(
             "Step in a compiled loop, disc",
@@ -88,7 +86,7 @@ def tables(rows: list[Row], numbers: Numbers) -> tuple[Table, ...]:
                 "relative to the published model": lambda each: _spread(each["ratio"]),
             },
             "model",
-            "Medians, in brackets the quartiles; ratios within a round, in which all models take part.",
+            "Medians and quartiles over rounds in which all models take part.",
         ),
         table(
             "Angle of the disc under a torque that friction holds",
@@ -133,10 +131,7 @@ def _combinations(rows: list[Row], quantity: str, run: str, title: str) -> Table
         costs, states = [row.time for row in own], [row.states for row in own]
         result.append((MODEL_WORDS[model], _span(states, str), _span(costs, shown), *cells))
     words = [IN_WORDS[shape] for shape in shapes]
-    note = (
-        "Time: in the solver, over that of the distributed model of the same patch. "
-        "'As full': the patch has no more cells than asked for."
-    )
+    note = "Time: in the solver, over the distributed model's. As full: no more cells than asked for."
     return Table(f"Every combination, {title}", ("model and surface", "bristles", "time", *words), result, note)
 
 

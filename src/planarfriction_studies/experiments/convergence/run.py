@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction.patch import ContactPatch
-from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import LINE_STYLES, PlotFigure
 from planarfriction_studies.experiments import experiment, facts, looks
 from planarfriction_studies.experiments.convergence import runs
 from planarfriction_studies.experiments.convergence.runs import Case, Errors, Family
@@ -59,9 +59,15 @@ def run(work: Work) -> Result:
         "disc_radius_errors": {name: each.tolist() for name, each in radii.items()},
         "base_disc_radius_error": float(runs.patch("Circle", runs.BASE_CELLS).contact_radius()) * 1.5 / RADIUS - 1.0,
     }
+    cause = "None: straight lines between the same kinks, the velocity is not held over 0.01 s."
+    profile = experiment.compare_profile(runs.profile(), "convergence/velocity", TWIST, cause, dt=1e-4, allowance=0.0)
+    figures = {f"convergence_{family}": _errors_over_counts(family, counts, errors) for family in runs.FAMILIES}
+    if not work.quick:
+        torque = errors["Circle", "p0"]["cells_distributed"][:, 1]
+        figures["convergence_disc_radius"] = _radius_errors(counts, radii, torque)
     return report(
         "convergence",
-        _figures(counts, errors, radii),
+        figures,
         numbers,
         {
             "samples": sum(each.samples for each in measured),
@@ -72,11 +78,10 @@ def run(work: Work) -> Result:
             "euler": max((each.difference for each in stepped), default=None),
             "base_cells": runs.BASE_CELLS,
             "base_segments": runs.BASE_SEGMENTS,
-            "line": slopes["cells_distributed"]["LineGrad/p0"],
             "on_cell": _on_cell(counts, errors),
         }
-        | _of_every_shape(errors, slopes, radii),
-        comparisons=[*_profile_comparisons(), *measured, *stepped, _cut_radius_comparison(counts)],
+        | _of_every_shape(errors, radii),
+        comparisons=[*profile, *measured, *stepped, _cut_radius_comparison(counts)],
         tables=[_slope_table(slopes, counts)],
         data={"errors": _dataset(counts, errors)},
     )
@@ -104,29 +109,12 @@ def radius_errors(counts: Sequence[int]) -> dict[str, np.ndarray]:
     return {"mask": masks[:-1] / masks[-1] - 1.0, "cut": cut * 1.5 / RADIUS - 1.0}
 
 
-# ---------------------------------------------------------------------- comparisons
-
-
 def _cut_radius_comparison(counts: Sequence[int]) -> Comparison:
     finest = ContactPatch.disc(RADIUS, counts[-1])
     words = f"contact radius of the disc with cells cut by the rim, {counts[-1]} x {counts[-1]}"
     cause = "Each cell's pressure acts at its centroid: an error of second order in the size of the cells."
     ours, within = float(finest.contact_radius()), 0.5 * RADIUS / counts[-1] ** 2
     return experiment.compare(words, ours, 2.0 * RADIUS / 3.0, "closed form", within, "m", cause)
-
-
-def _profile_comparisons() -> list[Comparison]:
-    velocity, cause = (
-        runs.profile(),
-        "None: straight lines between the same kinks, the velocity is not held over 0.01 s.",
-    )
-    rows = []
-    for i, name in enumerate(TWIST):
-        curve = f"convergence/velocity/{name}"
-        times = facts.published_curve(curve).time
-        values = velocity(times)[:, i]
-        rows.append(experiment.compare_curve(f"velocity profile, {name}", times, values, curve, 0.0, cause))
-    return rows
 
 
 def _comparisons(counts: Sequence[int], errors: Mapping[Case, Errors], work: Work) -> list[Comparison]:
@@ -165,9 +153,6 @@ def _against_figure(
     return experiment.compare_all("published", rows)
 
 
-# ---------------------------------------------------------------------- words, table and data
-
-
 def _on_cell(counts: Sequence[int], errors: Mapping[Case, Errors]) -> dict[str, Any] | None:
     """Return grids of the line with the centre of pressure in the middle of a cell, and their errors over the trend."""
     force, all_counts, through = errors["LineGrad", "p0"]["cells_distributed"][:, 0], np.array(counts), []
@@ -183,18 +168,14 @@ def _on_cell(counts: Sequence[int], errors: Mapping[Case, Errors]) -> dict[str, 
     return {"counts": all_counts[on].tolist(), "excess": float(np.median(excess))}
 
 
-def _of_every_shape(
-    errors: Mapping[Case, Errors], slopes: Mapping[str, Any], radii: Mapping[str, np.ndarray]
-) -> dict[str, Any]:
+def _of_every_shape(errors: Mapping[Case, Errors], radii: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """Return what is said of disc and square; None without them."""
     if ("Square", "p0") not in errors:
         return {"disc": None, "square": None}
     torque, square = errors["Circle", "p0"]["cells_distributed"][:, 1], errors["Square", "p0"]
     mask, cut = np.abs(radii["mask"]), np.abs(radii["cut"])
-    orders = [slopes["segments"][key(case)]["ft"] for case in errors if case[1] == "p0"]
     return {
         "disc": {
-            "orders": {shape: slopes["cells_distributed"][f"{shape}/p0"]["tau"] for shape in runs.SHAPES},
             "over_radius": float(np.median(torque / mask)),
             "correlation": float(np.corrcoef(np.log(mask), np.log(torque))[0, 1]),
             "cut": float(cut.max()),
@@ -205,8 +186,6 @@ def _of_every_shape(
             "finest": float(square["cells_reduced"][-1, 0]),
             "best": float(square["cells_reduced"][:, 0].min()),
             "distributed": float(square["cells_distributed"][-1, 0]),
-            "steepest": min(orders),
-            "flattest": max(orders),
         },
     }
 
@@ -218,7 +197,7 @@ def _slope_table(slopes: Mapping[str, Mapping[str, Mapping[str, float]]], counts
         for family in slopes
         for name, words in QUANTITIES.items()
     }
-    note = f"Straight lines through log error over log count, {counts[0]} to {counts[-1]}."
+    note = "Straight lines through log error over log count."
     return experiment.table("Slope of the error", cases, columns, "", note)
 
 
@@ -232,26 +211,13 @@ def _dataset(counts: Sequence[int], errors: Mapping[Case, Errors]) -> Any:
     return experiment.dataset(columns, units, ("shape", "parameters"), ("count", np.array(counts), "1"))
 
 
-# ---------------------------------------------------------------------- figures
-
 _CELLS, _SEGMENTS = "cells along the width", "table segments of a quadrant"
-
-
-def _figures(
-    counts: Sequence[int], errors: Mapping[Case, Errors], radii: Mapping[str, np.ndarray]
-) -> dict[str, PlotFigure]:
-    result = {f"convergence_{family}": _errors_over_counts(family, counts, errors) for family in runs.FAMILIES}
-    if ("Circle", "p0") in errors:
-        torque = errors["Circle", "p0"]["cells_distributed"][:, 1]
-        result["convergence_disc_radius"] = _radius_errors(counts, radii, torque)
-    return result
 
 
 def _errors_over_counts(family: Family, counts: Sequence[int], errors: Mapping[Case, Errors]) -> PlotFigure:
     """Draw relative errors of force and torque of one family, all shapes and parameters; the first with the profile."""
     with_profile = family == runs.FAMILIES[0]
-    figure = new_figure(10.0 if with_profile else 9.6, 4.2)
-    panels = figure.subplots(1, 3 if with_profile else 2)
+    figure, panels = looks.panels(10.0 if with_profile else 9.6, 4.2, 1, 3 if with_profile else 2)
     for i, (quantity, words) in enumerate(QUANTITIES.items()):
         axes = panels[i]
         for (shape, parameters), found in errors.items():
@@ -264,7 +230,6 @@ def _errors_over_counts(family: Family, counts: Sequence[int], errors: Mapping[C
             curve = f"convergence/{family}/{shape}/{parameters}/{quantity}"
             looks.vertices(axes, curve, 1.0, "black", marker=".", ms=2.5, mfc="black", label="published")
         axes.set(xlabel=_SEGMENTS if family == "segments" else _CELLS, ylabel=f"{words} error / largest {words} [-]")
-        tidy(axes)
     if with_profile:
         _draw_profile(panels[2])
     handles = dict(zip(*reversed(panels[0].get_legend_handles_labels()), strict=True))  # each label once
@@ -276,8 +241,7 @@ def _errors_over_counts(family: Family, counts: Sequence[int], errors: Mapping[C
 
 def _radius_errors(counts: Sequence[int], radii: Mapping[str, np.ndarray], torque: np.ndarray) -> PlotFigure:
     """Draw the error of the contact radius of the disc, as a mask and cut by its rim, beside that of the torque."""
-    figure = new_figure(6.4, 3.6)
-    axes = figure.subplots()
+    figure, axes = looks.panels(6.4, 3.6)
     lines = (
         (np.abs(radii["mask"]), "o-", "contact radius, mask"),
         (torque, "s--", "torque over the run, mask"),
@@ -287,7 +251,6 @@ def _radius_errors(counts: Sequence[int], radii: Mapping[str, np.ndarray], torqu
         axes.semilogy(counts, values, look, color=colour, markersize=4, label=label)
     axes.set(xlabel=_CELLS, ylabel="relative error [-]")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize="small")
-    tidy(axes)
     return figure
 
 
@@ -299,4 +262,3 @@ def _draw_profile(axes: Any) -> None:
         looks.vertices(axes, f"convergence/velocity/{name}", factor, "black", marker=".", mfc="black")
     axes.set(xlabel="time [s]", ylabel="velocity of the centre of pressure", ylim=(-0.1, 2.1))
     axes.legend(loc="upper right", frameon=False, fontsize="small")
-    tidy(axes)

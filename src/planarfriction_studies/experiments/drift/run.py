@@ -9,10 +9,9 @@ from typing import Any, Literal
 import numpy as np
 
 from planarfriction.patch import PUBLISHED_PATCHES
-from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import LINE_STYLES, PlotFigure
 from planarfriction.scenes import Signal
 from planarfriction.scenes.ready import GRAVITY, drift, drift_force
-from planarfriction.scenes.signal import sample_times
 from planarfriction_studies.experiments import experiment, facts, looks, runs
 from planarfriction_studies.experiments.experiment import POSE, WRENCH, Arrays, Comparison, Result, Work, compare, entry
 from planarfriction_studies.experiments.runs import NAMES
@@ -63,12 +62,14 @@ Runs = dict[tuple[str, str], Arrays]
 def run(work: Work) -> Result:
     """Carry out the experiment."""
     rtol, atol, share = QUICK if work.quick else TIGHT
-    moved = {(load, model): partial(_move, load, model, rtol, atol) for load, each in MODELS.items() for model in each}
-    found = work.pieces(moved, lambda key: f"drift, {', '.join(key)}")
+    moves = {(load, model): partial(_move, load, model, rtol, atol) for load, each in MODELS.items() for model in each}
+    found = work.pieces(moves, lambda key: f"drift, {', '.join(key)}")
     straight = work.piece("drift, straight ramp", lambda: _straight_ramp(rtol, atol))
     numbers = _numbers(found, straight)
     creep = numbers["creep"]
     grown = creep["normal force"]
+    moved = {f"{what}; {WORDS[model]}": each for what, models in creep.items() for model, each in models.items()}
+    columns = {"x [nm]": entry("x", scale=1e9, digits=4), "theta [µrad]": entry("theta", scale=1e6, digits=4)}
     return report(
         "drift",
         {
@@ -82,13 +83,15 @@ def run(work: Work) -> Result:
             "share": max(abs(grown["r_ep"][name] / grown["r"][name]) for name in ("x", "theta")),
         },
         comparisons=[
-            *_profile_comparisons(),
+            *experiment.compare_profile(
+                drift_force("tangential"), "drift/applied", WRENCH, _READING, before="applied "
+            ),
             *_motion_comparisons(found, share),
             *_plateau_comparisons(numbers["plateaus"]),
             *_creep_comparisons(found, creep, share),
-            _width_comparison(numbers["implied width"]),
+            compare(_WIDTH, WIDTH, numbers["implied width"], "published", 1e-5 * WIDTH, "m", _RADIUS),
         ],
-        tables=(_creep_table(creep),),
+        tables=(experiment.table("Drift per period of 1/3 s", moved, columns, "what oscillates; model"),),
         data={load: _dataset(load, found) for load in MODELS},
     )
 
@@ -105,9 +108,6 @@ def _straight_ramp(rtol: float, atol: float) -> Arrays:
     scene = drift(runs.published_model("r", "Circle", width=WIDTH), load="normal", t_end=1.0)
     ramp = Signal.sampled([0.0, 0.8], [[0.0, 0.0, 0.0], [FORCE, 0.0, TORQUE]], "linear")
     return runs.simulated(dataclasses.replace(scene, force=ramp), rtol=rtol, atol=atol)
-
-
-# ---------------------------------------------------------------------- numbers
 
 
 def _numbers(found: Runs, straight: Arrays) -> dict[str, Any]:
@@ -170,34 +170,22 @@ def _implied_width() -> float:
     return WIDTH * float(np.sqrt(moment / _patch_numbers()["second moment"]))
 
 
-def _creep_table(creep: dict[str, Any]) -> experiment.Table:
-    """Return the drift per period of the load, by what oscillates."""
-    moved = {f"{what}; {WORDS[model]}": each for what, models in creep.items() for model, each in models.items()}
-    columns = {"x [nm]": entry("x", scale=1e9, digits=4), "theta [µrad]": entry("theta", scale=1e6, digits=4)}
-    return experiment.table("Drift per period of 1/3 s", moved, columns, "what oscillates; model")
-
-
 def _dataset(load: Load, found: Runs) -> Any:
     time, normal_force = (found[load, "d"][name] for name in ("time", "normal_force"))
     labelled = {(NAMES[kind], LAWS[law][1]): found[load, kind + law] for kind in "dr" for law in LAWS}
-    applied = zip(WRENCH.items(), drift_force(load).left(time).T, strict=True)
-    alone = {f"applied_{name}": (values, unit) for (name, unit), values in applied} | {
-        "normal_force": (normal_force, "N")
-    }
+    applied = {f"applied_{name}": unit for name, unit in WRENCH.items()}
+    alone = experiment.with_units(drift_force(load).left(time), applied) | {"normal_force": (normal_force, "N")}
     return experiment.dataset(labelled, POSE, ("model", "bristles"), ("time", time, "s"), alone)
 
 
-# ---------------------------------------------------------------------- comparisons
-
+_READING = "The same load, labelled with its own time: what is left is the error of reading the figure."
 _TWICE = "The same equations, solved twice: what is left is the error of our solver, which drift adds up."
+_WIDTH = "width of the patch that the published angle implies"
+_RADIUS = (
+    r"$\theta = \tau/(\sigma_0 f_N \langle\rho^2\rangle)$ at the largest torque: the patch of the figures is "
+    "0.05 m wide, where the article gives 0.05 m as its radius."
+)
 _SPRING, _LEFT = r"$x = F/(\sigma_0 f_N)$", "what is left is our solver's error."
-
-
-def _profile_comparisons() -> list[Comparison]:
-    time = sample_times(5.0)
-    applied = experiment.columns_of(time, drift_force("tangential")(time), WRENCH)
-    cause = "The same load, labelled with its own time: what is left is the error of reading the figure."
-    return experiment.compare_columns("published", "applied ", applied, "drift/applied", 1e-12, cause, WRENCH)
 
 
 def _motion_comparisons(found: Runs, share: float) -> list[Comparison]:
@@ -268,17 +256,6 @@ def _creep_comparisons(found: Runs, creep: dict[str, Any], share: float) -> list
     return rows
 
 
-def _width_comparison(implied: float) -> Comparison:
-    words = "width of the patch that the published angle implies"
-    cause = (
-        r"$\theta = \tau/(\sigma_0 f_N \langle\rho^2\rangle)$ at the largest torque: the patch of the figures is "
-        "0.05 m wide, where the article gives 0.05 m as its radius."
-    )
-    return compare(words, WIDTH, implied, "published", 1e-5 * WIDTH, "m", cause)
-
-
-# ---------------------------------------------------------------------- figures
-
 _ROWS = (("x", "$x$ [nm]", 1e9), ("theta", "$\\theta$ [µrad]", 1e6))
 _DOTS: dict[str, Any] = {"ms": 2.4, "mew": 0.6}
 _FORCE, _OTHER = "0.15", "0.55"
@@ -287,8 +264,7 @@ _FORCE, _OTHER = "0.15", "0.55"
 
 def _motion(load: Load, found: Runs) -> PlotFigure:
     """Draw the applied load, x [nm] and theta [µrad] over time: left the distributed model, right the reduced one."""
-    figure = new_figure(9.6, 7.0)
-    panels = figure.subplots(3, 2, sharex=True, sharey="row")
+    figure, panels = looks.panels(9.6, 7.0, 3, 2, sharex=True, sharey="row")
     key: list[Any] = []
     for column, kind in enumerate("dr"):
         _draw_load(panels[0, column], load, found[load, kind], last=column == 1)
@@ -302,7 +278,6 @@ def _motion(load: Load, found: Runs) -> PlotFigure:
                     looks.vertices(axes, f"drift/{kind}{law}/{name}", factor, colour, **_DOTS)
             if column == 0:
                 axes.set_ylabel(label)
-            tidy(axes)
         panels[-1, column].set(xlabel="time [s]", xlim=(0.0, 5.0))
         key += [looks.line_key(WORDS[kind + law], color=colour, ls=each[2], lw=1.4) for law, each in LAWS.items()]
     figure.align_ylabels(panels[:, 0])
@@ -334,20 +309,19 @@ def _draw_load(axes: Any, load: Load, run: Arrays, *, last: bool) -> None:
     else:
         axes.set_ylabel("$f_x$ [N]")
         other.tick_params(labelright=False)
-    tidy(axes)
     other.spines["top"].set_visible(False)
 
 
 def _plateaus(found: Runs, straight: Arrays, closed: dict[str, Any]) -> PlotFigure:
     """Draw deflections x [nm] and theta [µrad] in the first second of the normal-load run, elasto-plastic bristles."""
-    figure = new_figure(9.6, 3.9)
+    figure, panels = looks.panels(9.6, 3.9, 1, 2)
     lines = {
         "d_ep": (looks.DISTRIBUTED, "-", 3.4, 0.5),
         "r_ep": (looks.REDUCED, "-", 3.4, 0.5),
         "e_ep": (looks.ELLIPSOID, LINE_STYLES[1], 1.4, 1.0),
         "straight": (looks.REDUCED, LINE_STYLES[3], 1.1, 1.0),
     }
-    for axes, (name, label, factor) in zip(figure.subplots(1, 2), _ROWS, strict=True):
+    for axes, (name, label, factor) in zip(panels, _ROWS, strict=True):
         for model, (colour, line, width, opacity) in lines.items():
             run = straight if model == "straight" else found["normal", model]
             part, look = run["time"] <= 1.0, {"color": colour, "ls": line, "lw": width, "alpha": opacity}
@@ -355,6 +329,5 @@ def _plateaus(found: Runs, straight: Arrays, closed: dict[str, Any]) -> PlotFigu
             if model in closed:
                 axes.axhline(factor * closed[model][name], color=colour, ls=LINE_STYLES[2], lw=1.0, zorder=1)
         axes.set(xlabel="time [s]", ylabel=label, xlim=(0.0, 1.0), ylim=(0.0, None))
-        tidy(axes)
     looks.legend(figure, figure.axes[0], 4, fontsize=9)
     return figure

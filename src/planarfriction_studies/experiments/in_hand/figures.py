@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction.plots.motion import draw_motion
-from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure
 from planarfriction.scenes import Scene, Solution
 from planarfriction.scenes.solution import History
 from planarfriction.solvers.statistics import Statistics
@@ -49,14 +49,13 @@ def histories(
 
     `published` holds, by title and label, the keys of published curves, drawn as markers.
     """
-    figure = new_figure(9.6, 0.7 + 1.75 * len(names))
-    grid = figure.subplots(len(names), len(panels), sharex=True, sharey="row", squeeze=False)
+    shared = {"sharex": True, "sharey": "row", "squeeze": False}
+    figure, grid = looks.panels(9.6, 0.7 + 1.75 * len(names), len(names), len(panels), **shared)
     for column, (title, runs) in enumerate(panels.items()):
         grid[0, column].set_title(title, fontsize="medium")
         grid[-1, column].set_xlabel("time [s]")
         for axes, name in zip(grid[:, column], names, strict=True):
             _draw_runs(axes, name, runs, styles, (published or {}).get(title, {}))
-            tidy(axes)
     for axes, name in zip(grid[:, 0], names, strict=True):
         axes.set_ylabel(AXES[name][0])
     figure.align_ylabels(grid)
@@ -85,15 +84,13 @@ def distances(
     panels: Mapping[str, Mapping[str, tuple[np.ndarray, np.ndarray]]], label: str, *, styles: Styles | None = None
 ) -> PlotFigure:
     """Draw distances [m] over time [s], one panel for each title, one line for each label; `label` names the axis."""
-    figure = new_figure(9.6, 3.9)
-    row = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    figure, (row,) = looks.panels(9.6, 3.9, 1, len(panels), sharey=True, squeeze=False)
     for axes, (title, lines) in zip(row, panels.items(), strict=True):
         for i, (words, (time, values)) in enumerate(lines.items()):
             look = {"linewidth": 1.4, "color": OTHERS[i], "linestyle": LINE_STYLES[i]}
             axes.plot(time, 1e3 * values, label=words, **(look if styles is None else styles[words]))
-        axes.set(title=title, xlabel="time [s]")
-        axes.title.set_fontsize("medium")
-        tidy(axes)
+        axes.set_title(title, fontsize="medium")
+        axes.set_xlabel("time [s]")
     row[0].set_ylabel(label)
     row[0].set_ylim(bottom=0.0)  # after all lines: it ends the scaling of the shared axis
     looks.legend(figure, row[0], 4, "lower", fontsize="small")
@@ -102,10 +99,9 @@ def distances(
 
 def end_shifts(rows: Mapping[str, Mapping[str, float]], colours: Mapping[str, str], label: str) -> PlotFigure:
     """Draw the shifts of the end [m], by case and by cause, on a logarithmic axis called `label`; friction is black."""
-    figure = new_figure(8.6, 1.5 + 0.36 * len(rows))
-    axes = figure.subplots()
+    figure, axes = looks.panels(8.6, 1.5 + 0.36 * len(rows))
     causes = list(dict.fromkeys(cause for shifts in rows.values() for cause in shifts))
-    for cause, marker in zip(causes, "<>oD^", strict=False):
+    for cause, marker in zip(causes, "<>oD^*", strict=False):
         places = [j for j, shifts in enumerate(rows.values()) if cause in shifts]
         shown = [1e3 * shifts[cause] for shifts in rows.values() if cause in shifts]
         colour = colours.get(cause, EXACT)
@@ -113,6 +109,5 @@ def end_shifts(rows: Mapping[str, Mapping[str, float]], colours: Mapping[str, st
     axes.set(xscale="log", xlabel=label, ylim=(len(rows) - 0.5, -0.5))
     axes.margins(x=0.08)
     axes.set_yticks(range(len(rows)), list(rows))
-    tidy(axes)
     looks.legend(figure, axes, 3)
     return figure

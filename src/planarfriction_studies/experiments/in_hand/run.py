@@ -64,8 +64,7 @@ def _group(case: Case, cases: tuple[Case, ...]) -> list[Case]:
 
 def _dataset(group: list[Case], found: Runs) -> Any:
     columns = {(NAMES[kind], f"load {each.load}"): found[each, kind] for kind in KINDS for each in group}
-    time = found[group[0], "d"]["time"]
-    return experiment.dataset(columns, runs.STORED, ("model", "load"), ("time", time, "s"))
+    return experiment.dataset(columns, runs.STORED, ("model", "load"), ("time", found[group[0], "d"]["time"], "s"))
 
 
 def _simulate_all(work: Work, cases: tuple[Case, ...]) -> Runs:
@@ -75,8 +74,7 @@ def _simulate_all(work: Work, cases: tuple[Case, ...]) -> Runs:
         for kind in KINDS:
             computes[case, kind] = partial(simulated, case.scene(kind), **TIGHT)
             computes[case, f"{kind}, defaults"] = partial(simulated, case.scene(kind))
-        for words, sign in ((MORE, 1), (LESS, -1)):
-            law = runs.with_friction(sign * FRICTION_CHANGE)
+        for words, law in runs.CHANGED.items():
             computes[case, words] = partial(simulated, case.scene("d", law), **FINE)
         if case.shape == "Square":
             computes[case, FINER_GRID] = partial(simulated, case.scene("d", cells=FINER), **FINE)
@@ -246,8 +244,8 @@ def _shift_table(numbers: dict[str, dict[str, Any]]) -> experiment.Table:
         "models apart, as friction [%]": entry("distance between the models as friction", scale=1e2),
     }
     note = (
-        "Shifts of the distributed model's end, unless said otherwise. A plate is held by the load that puts its "
-        "weight on the limit surface of the cells, with $\\mu_s$."
+        "Shifts are those of the distributed model's end. A load holds the plate if its weight lies on the limit "
+        "surface of the cells, with $\\mu_s$."
     )
     columns |= {name: entry(name) for name in loads}
     return experiment.table("What moves the end", numbers, columns, "case", note)

@@ -98,6 +98,10 @@ def with_friction(share: float) -> LuGre:
     return dataclasses.replace(LAW, mu_c=LAW.mu_c * (1.0 + share), mu_s=LAW.mu_s * (1.0 + share))
 
 
+CHANGED = {MORE: with_friction(FRICTION_CHANGE), LESS: with_friction(-FRICTION_CHANGE)}
+"""Change of friction in words -> its law."""
+
+
 def distance(run: Arrays, other: Arrays) -> np.ndarray:
     """Return the distance of the centre of mass between two runs over time [m]."""
     return np.hypot(run["x"] - other["x"], run["y"] - other["y"])
@@ -121,10 +125,9 @@ def errors(run: Arrays, key: str) -> dict[str, float]:
 
 def compare_with_converged(run: Arrays, key: str, words: str, *, default: bool = False) -> list[Comparison]:
     """Compare a run with the converged solution `key`; of a run at default tolerances its motion only."""
-    if default:
-        words = f"{words}, default tolerances, "
-        return experiment.compare_columns("converged", words, run, key, DEFAULT_ALLOWANCE, OF_DEFAULTS)
-    return experiment.compare_columns("converged", f"{words}, ", run, key, ALLOWANCE, OF_BOTH)
+    words = f"{words}, default tolerances, " if default else f"{words}, "
+    rest = (DEFAULT_ALLOWANCE, OF_DEFAULTS) if default else (ALLOWANCE, OF_BOTH)
+    return experiment.compare_columns("converged", words, run, key, *rest)
 
 
 def compare_with_published(run: Arrays, key: str, words: str) -> list[Comparison]:

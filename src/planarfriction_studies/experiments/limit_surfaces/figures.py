@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import geometry
 from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceEllipsoid
 from planarfriction.plots.limit_surface import draw_surface, scaled_samples
-from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure
 from planarfriction_studies.experiments import looks
+from planarfriction_studies.experiments.limit_surfaces.gradient import spin_about
 from planarfriction_studies.experiments.runs import IN_WORDS
 
 SUM, BESIDE, LINK = looks.DISTRIBUTED, looks.ELLIPSOID, "0.45"
@@ -63,8 +63,7 @@ def _circles(axes: Any) -> None:
 
 def correspondence(surfaces: Mapping[str, LimitSurfaceCells]) -> PlotFigure:
     """Draw a section of both surfaces of each shape, the same twists marked on both and joined."""
-    figure = new_figure(9.6, 7.0)
-    panels: Any = figure.subplots(2, 3)
+    figure, panels = looks.panels(9.6, 7.0, 2, 3)
     for axes, (name, surface) in zip(panels.flat, surfaces.items(), strict=True):
         column = 1 if name in ACROSS_Y else 0
         _section(axes, surface, column)
@@ -88,7 +87,6 @@ def _section(axes: Any, surface: LimitSurfaceCells, column: int, count: int = MA
     force = ("$f_x$", "$f_y$")[column]
     axes.set(xlabel=f"{force} [-]", ylabel="$\\tau/r$ [-]", aspect="equal", xlim=(-1.12, 1.12), ylim=(-1.12, 1.12))
     axes.set(xticks=[-1, -0.5, 0, 0.5, 1], yticks=[-1, -0.5, 0, 0.5, 1])
-    tidy(axes)
 
 
 def _points_of(surface: Any, column: int, count: int, *, closed: bool = True) -> np.ndarray:
@@ -101,8 +99,7 @@ def _points_of(surface: Any, column: int, count: int, *, closed: bool = True) ->
 
 def gradient_line(surface: LimitSurfaceCells, numbers: dict[str, Any]) -> PlotFigure:
     """Draw the line and its load, the force over the centre of rotation, and the section with the two spins marked."""
-    figure = new_figure(10.0, 4.6)
-    load, force, section = figure.subplots(1, 3, width_ratios=(0.55, 1.0, 1.25))
+    figure, (load, force, section) = looks.panels(10.0, 4.6, 1, 3, width_ratios=(0.55, 1.0, 1.25))
     sides = surface, LimitSurfaceEllipsoid(surface.patch)
     centres = (
         ("about the centre of pressure", numbers["cells"]["centre of pressure"], looks.OTHERS[1], "D"),
@@ -123,7 +120,6 @@ def _load_panel(axes: Any, numbers: dict[str, Any], centres: Any) -> None:
         axes.axhline(1e3 * y, color=colour, lw=1.2)
         axes.plot([0.0], [1e3 * y], marker=marker, ms=7, color=colour, clip_on=False)
     axes.set(xlabel="load of a cell [N]", ylabel="y [mm]", ylim=(-10.5, 10.5), xlim=(0.0, 0.1))
-    tidy(axes)
 
 
 def _force_panel(axes: Any, sides: Any, numbers: dict[str, Any], centres: Any) -> None:
@@ -132,20 +128,13 @@ def _force_panel(axes: Any, sides: Any, numbers: dict[str, Any], centres: Any) -
     y = np.linspace(-1.25 * half, 1.25 * half, 2001)
     continuous = 1.0 - 2.0 * np.clip((y + half) / (2.0 * half), 0.0, 1.0) ** 2
     for each, colour in zip(sides, (SUM, BESIDE), strict=True):
-        axes.plot(_spins(each, y)[:, 0], 1e3 * y, color=colour, lw=1.4)
+        axes.plot(spin_about(each, y)[:, 0], 1e3 * y, color=colour, lw=1.4)
     axes.plot(continuous, 1e3 * y, color=looks.EXACT, lw=1.0, ls=LINE_STYLES[1])
     for _, at, colour, marker in centres:
         axes.axhline(1e3 * at, color=colour, lw=0.8)
         for each in sides:
-            axes.plot(_spins(each, np.array([at]))[:, 0], [1e3 * at], marker=marker, ms=5, color=colour, ls="")
+            axes.plot(spin_about(each, at)[0], 1e3 * at, marker=marker, ms=5, color=colour, ls="")
     axes.set(xlabel="$f_x$ [N]", ylabel="centre of rotation, y [mm]", ylim=(-10.5, 10.5), xlim=(-1.05, 1.05))
-    tidy(axes)
-
-
-def _spins(surface: Any, y: np.ndarray) -> np.ndarray:
-    """Return wrenches `[N, 3]` at the centre of pressure of unit spins about the points (0, y)."""
-    zero = np.zeros_like(y)
-    return geometry.wrench_at(surface.wrench(np.stack([y, zero, zero + 1.0], -1)), surface.centre_of_pressure)
 
 
 def _spin_panel(axes: Any, sides: Any, numbers: dict[str, Any], centres: Any) -> None:
@@ -154,9 +143,8 @@ def _spin_panel(axes: Any, sides: Any, numbers: dict[str, Any], centres: Any) ->
         axes.plot(*_points_of(each, 0, 2881), color=colour, lw=1.4, label=name)
     axes.plot([], [], color=looks.EXACT, lw=1.0, ls=LINE_STYLES[1], label="continuous pressure")
     for name, y, colour, marker in centres:
-        points = [_spins(each, np.array([y]))[0] / [1.0, 1.0, each.contact_radius] for each in sides]
+        points = [spin_about(each, y) / [1.0, 1.0, each.contact_radius] for each in sides]
         axes.plot(*np.array(points)[:, [0, 2]].T, color=colour, lw=0.9, marker=marker, ms=5.5, label=f"spin {name}")
     torque = numbers["cells"]["torque"] / sides[0].contact_radius
     axes.plot([0.0], [-torque], marker="*", ms=10, ls="", color=looks.EXACT, label="torque without force", zorder=1)
     axes.set(xlabel="$f_x$ [-]", ylabel="$\\tau/r$ [-]", xlim=(-0.32, 0.32), ylim=(-1.01, -0.86))
-    tidy(axes)

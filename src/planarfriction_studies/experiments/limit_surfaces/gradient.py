@@ -10,13 +10,9 @@ import numpy as np
 from planarfriction import geometry
 from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceEllipsoid
 from planarfriction.patch import PUBLISHED_PATCHES
-from planarfriction_studies.experiments.experiment import Comparison, compare_all
+from planarfriction_studies.experiments.experiment import Comparison, Numbers, compare_all
 from planarfriction_studies.experiments.limit_surfaces.patches import LUMPED
-
-LENGTH, CELLS = 0.02, 21
-"""Length [m] and cells of the published line."""
-
-Numbers = dict[str, Any]
+from planarfriction_studies.experiments.runs import CELLS, WIDTH
 
 
 def linear_line(length: float, floor: float = 0.0) -> dict[str, float]:
@@ -47,20 +43,21 @@ def linear_line(length: float, floor: float = 0.0) -> dict[str, float]:
     }
 
 
-def spin_about(surface: Any, y: float) -> np.ndarray:
-    """Return the wrench `(fx, fy, tau)` [1, 1, m] at the centre of pressure of a spin about the point (0, y) [m]."""
-    return geometry.wrench_at(surface.wrench([y, 0.0, 1.0]), surface.centre_of_pressure)
+def spin_about(surface: Any, y: Any) -> np.ndarray:
+    """Return wrenches `[..., 3]` [1, 1, m] at the centre of pressure of unit spins about points (0, y) [m]."""
+    y = np.asarray(y)
+    return geometry.wrench_at(surface.wrench(np.stack([y, 0.0 * y, 0.0 * y + 1.0], -1)), surface.centre_of_pressure)
 
 
 def gradient_numbers() -> Numbers:
     """Return the two spins of the line of 21 cells, of the ellipsoid, and of continuous lines; places along y [m]."""
-    patch = PUBLISHED_PATCHES["LineGrad"](CELLS, LENGTH)
+    patch = PUBLISHED_PATCHES["LineGrad"]()
     cells, ellipsoid = LimitSurfaceCells(patch), LimitSurfaceEllipsoid(patch)
     middle = float(patch.centre_of_pressure()[1])
     # the twist that belongs to a torque without a force, found by the library
     vx, _, omega = cells.twist([0.0, 0.0, -1.0])
     halves = float(vx / omega)
-    cell = LENGTH / CELLS
+    cell = WIDTH / CELLS
     on_cell = cell * np.rint(halves / cell)  # a spin exactly about it
     return {
         "cell": cell,
@@ -79,8 +76,8 @@ def gradient_numbers() -> Numbers:
             "force at equal halves": float(spin_about(ellipsoid, halves)[0]),
             "torque at equal halves": float(-spin_about(ellipsoid, halves)[2]),
         },
-        "continuous": linear_line(LENGTH),
-        "continuous, as the cells": linear_line(LENGTH, 0.5 * cell),
+        "continuous": linear_line(WIDTH),
+        "continuous, as the cells": linear_line(WIDTH, 0.5 * cell),
     }
 
 

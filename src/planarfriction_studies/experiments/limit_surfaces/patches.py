@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from planarfriction.limit_surface import LimitSurfaceTablePublished
 from planarfriction.patch import ContactPatch
 from planarfriction_studies.experiments import facts
-from planarfriction_studies.experiments.experiment import Comparison, compare_all
-from planarfriction_studies.experiments.runs import IN_WORDS
-
-WIDTH, CELLS = 0.02, 21
-"""Width [m] of the published patches and cells along it."""
-
-Numbers = dict[str, Any]
+from planarfriction_studies.experiments.experiment import Comparison, Numbers, compare_all
+from planarfriction_studies.experiments.runs import CELLS, IN_WORDS, WIDTH
 
 _LENGTH = (6e-12, "m", "Printed to $10^{-11}$ m: rounding.")
 _PLACE = (6e-10, "m", "Printed to $10^{-9}$ m: rounding.")

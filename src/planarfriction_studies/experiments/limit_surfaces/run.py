@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from planarfriction.limit_surface import (
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction.plots.limit_surface import sample_limit_surface, scaled_samples
 from planarfriction_studies.experiments import facts
-from planarfriction_studies.experiments.experiment import WRENCH, Result, Table, Work, entry, table
+from planarfriction_studies.experiments.experiment import WRENCH, Numbers, Result, Table, Work, entry, table
 from planarfriction_studies.experiments.limit_surfaces import figures, gradient
 from planarfriction_studies.experiments.limit_surfaces import patches as shapes
 from planarfriction_studies.experiments.runs import IN_WORDS, SIX_SHAPES
@@ -35,8 +34,6 @@ REFINEMENTS, REFINED = 30, 0.5
 STORED = {"published": LimitSurfaceTablePublished, "smooth": LimitSurfaceTable, "sum over cells": LimitSurfaceCells}
 """Surfaces that are compared with the exact surface."""
 
-Numbers = dict[str, Any]
-
 COARSER = 2
 """The tables are measured at so many times fewer angles, and never at a node: an exact surface costs more."""
 
@@ -46,7 +43,10 @@ def run(work: Work) -> Result:
     patches = {name: make() for name, make in PUBLISHED_PATCHES.items()}
     surfaces = {name: LimitSurfaceCells(patches[name]) for name in SIX_SHAPES}
     count = (DIRECTIONS[0] // 4, DIRECTIONS[1] // 4) if work.quick else DIRECTIONS
-    computes = {name: partial(_errors, surface, count) for name, surface in surfaces.items()}
+    computes = {
+        name: lambda each=each: {"ellipsoid": ellipsoid_errors(each, count), **table_errors(each.patch, count)}
+        for name, each in surfaces.items()
+    }
     errors = work.pieces(computes, lambda name: f"{name}, {count[0]} polar angles")
     numbers = {
         "patches": shapes.patch_numbers(patches),
@@ -72,10 +72,6 @@ def run(work: Work) -> Result:
         tables=(_patches(numbers["patches"]), _ellipsoid(numbers["ellipsoid"]), _stored(numbers["tables"])),
         data={"surfaces": _dataset(surfaces)},
     )
-
-
-def _errors(surface: LimitSurfaceCells, count: tuple[int, int]) -> dict[str, Any]:
-    return {"ellipsoid": ellipsoid_errors(surface, count), **table_errors(surface.patch, count)}
 
 
 def _mesh(count: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -168,9 +164,6 @@ def _dataset(surfaces: dict[str, LimitSurfaceCells]) -> Any:
     return xr.Dataset(columns, {"shape": list(surfaces), **angles})
 
 
-# ------------------------------------------------------------------ words and tables
-
-
 def _template_values(numbers: Numbers) -> dict[str, Any]:
     """Return the values that the template names."""
     errors, stored, disc = (numbers[name] for name in ("ellipsoid", "tables", "disc"))
@@ -212,7 +205,7 @@ def _patches(ours: dict[str, Numbers]) -> Table:
     miss = {name: max(abs(row[column] - published[name][column]) for column in lengths) for name, row in ours.items()}
     rows = {IN_WORDS[name]: row | {"miss": miss[name]} for name, row in ours.items()}
     columns["farthest from the paper [mm]"] = lambda row: 1e3 * row["miss"]
-    note = "As published: r averages spins about the four corners of the cell that holds the centre of pressure."
+    note = "As published: $r$ averages spins about the corners of the cell that holds the centre of pressure."
     return table("Patches: 21 x 21 cells, 20 mm wide", rows, columns, "patch", note)
 
 

@@ -21,11 +21,8 @@ from planarfriction_studies.experiments import experiment, looks
 from planarfriction_studies.experiments.experiment import POSE, Arrays, Comparison, Result, Work, entry
 from planarfriction_studies.experiments.in_hand import figures, runs
 from planarfriction_studies.experiments.in_hand.runs import FRICTION_CHANGE, LESS, MORE, TIGHT
-from planarfriction_studies.experiments.runs import LAW, simulated
+from planarfriction_studies.experiments.runs import CELLS, LAW, WIDTH, simulated
 from planarfriction_studies.experiments.wording import report
-
-WIDTH, CELLS = 0.02, 21
-"""Width of the grid [m], and its rows and columns as published."""
 
 RADIUS_AT_1_N = 6.0 * WIDTH / CELLS
 """Contact radius at 1 N [m]: six cells; it grows with the cube root of the load up to half the width."""
@@ -107,7 +104,10 @@ def run(work: Work) -> Result:
     stored = {(PRESSURES[p], variant): found[p, variant] for p in pressures for variant in VARIANTS}
     time = "time", found[1, DISTRIBUTED]["time"], "s"
     miss = {variant: runs.errors(found[1, variant], key) for variant, key in REFERENCES.items()}
-    gap = {name: [each["variants"][name]["distance at the end [m]"] for each in numbers.values()] for name in VARIANTS}
+    gap = {
+        words: [each["variants"][name]["distance at the end [m]"] for each in numbers.values()]
+        for words, name in (("rescaled", RESCALED), ("kept", KEPT))
+    }
     return report(
         "load_dependent",
         _figures(pressures, found, loads),
@@ -116,7 +116,7 @@ def run(work: Work) -> Result:
             "loads": len(loads),
             "miss": {name: max(each[name] for each in miss.values()) for name in ("y", "theta")},
             "rescaled_miss": max(miss[RESCALED][name] for name in ("x", "y")),
-            "gap": dict(zip(("distributed", "rebuilt", "rescaled", "kept", "kept_largest"), gap.values(), strict=True)),
+            "gap": gap,
             "change": FRICTION_CHANGE,
             "published_distance": PUBLISHED_DISTANCE,
         },
@@ -133,9 +133,8 @@ def _simulate_all(work: Work, pressures: tuple[int, ...]) -> Runs:
             computes[pressure, variant] = partial(simulated, soft_scene(pressure, variant), **TIGHT)
         for variant in REFERENCES if pressure == 1 else ():
             computes[pressure, f"{variant}, defaults"] = partial(simulated, soft_scene(pressure, variant))
-        for words, sign in ((MORE, 1), (LESS, -1)):
-            scene = soft_scene(pressure, DISTRIBUTED, runs.with_friction(sign * FRICTION_CHANGE))
-            computes[pressure, words] = partial(simulated, scene, **FINE)
+        for words, law in runs.CHANGED.items():
+            computes[pressure, words] = partial(simulated, soft_scene(pressure, DISTRIBUTED, law), **FINE)
     return work.pieces(computes, lambda key: f"load-dependent, law {key[0]}, {key[1]}")
 
 
@@ -205,13 +204,10 @@ def _table(numbers: dict[str, Any]) -> experiment.Table:
     }
     rows = {f"{law}, {variant}": row for law, each in numbers.items() for variant, row in each["variants"].items()}
     note = (
-        "Distances from the distributed model with the same pressure; as friction: the share of friction that moves "
-        f"its end as far. The largest contact is that at {LARGEST_CONTACT:g} N."
+        "Distances from the distributed model with the same pressure; as friction: the share that moves its end as "
+        f"far. Largest contact: at {LARGEST_CONTACT:g} N."
     )
     return experiment.table("Where the plate is after 2 s", rows, columns, "pressure, variant", note)
-
-
-# ---------------------------------------------------------------------- figures
 
 
 def _figures(pressures: tuple[int, ...], found: Runs, loads: np.ndarray) -> dict[str, PlotFigure]:
@@ -242,8 +238,9 @@ def _profiles(titles: dict[int, str], loads: np.ndarray) -> PlotFigure:
     row = parts[0].subplots(1, len(titles), sharey=True, squeeze=False)[0]
     for axes, (pressure, title) in zip(row, titles.items(), strict=True):
         _draw_cuts(axes, soft_patch(pressure), (float(loads[0]), MEAN_LOAD, float(loads[-1])))
-        axes.set(title=title, xlabel="$x$ [mm]")
-        axes.title.set_fontsize("medium")
+        axes.set_title(title, fontsize="medium")
+        axes.set_xlabel("$x$ [mm]")
+        tidy(axes)
     row[0].set_ylabel("pressure [kPa]")
     row[0].set_ylim(bottom=0.0)  # after all lines: it ends the scaling of the shared axis
     row[0].legend(frameon=False, fontsize="small")
@@ -264,7 +261,6 @@ def _draw_cuts(axes: Any, patch: ContactPatch, loads: tuple[float, ...]) -> None
         relative = law.relative(fine, np.array(load))
         axes.stairs(pressure, 1e3 * edges, color=colour, linewidth=1.0, alpha=0.75)
         axes.plot(1e3 * fine[:, 0], pressure[centre] * relative, color=colour, linewidth=1.4, label=f"{load:.2f} N")
-    tidy(axes)
 
 
 def _draw_moments(panels: Any, titles: dict[int, str], loads: np.ndarray) -> None:

@@ -10,15 +10,17 @@ import numpy as np
 from planarfriction.kernels import spin_sums
 from planarfriction.limit_surface import LimitSurfaceCells
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
-from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import LINE_STYLES, PlotFigure
+from planarfriction.scenes import Signal
 from planarfriction.scenes.ready import published_velocity
 from planarfriction.scenes.signal import sample_times
 from planarfriction_studies.experiments import experiment, facts, looks
 from planarfriction_studies.experiments.experiment import TWIST, WRENCH, Arrays, Comparison, Reference, Result, Work
+from planarfriction_studies.experiments.runs import WIDTH
 from planarfriction_studies.experiments.wording import report
 
-WIDTH, SAMPLE_TIME = 0.02, 1e-4
-"""Length of the line [m], and the time between the samples of the published curves [s]."""
+SAMPLE_TIME = 1e-4
+"""Time between the samples of the published curves [s]."""
 
 SLIDE_RAMP = (0.8, 1.4, 0.015)
 """Start and end [s] of the ramp of vx, and the speed that it reaches [m/s]; the spin is 1 rad/s meanwhile."""
@@ -93,21 +95,21 @@ def run(work: Work) -> Result:
         "miss_if_labels_mean_the_state": _label_shifts(profile),
         "error_against_the_rod": {str(count): error for count, error in errors.items()},
     }
+    along, speeds = ("time", time[::5], "s"), experiment.with_units(twist[::5], TWIST)
     wrenches = {(name,): experiment.columns_of(time[::5], wrench[::5], WRENCH) for name, wrench in found.items()}
-    speeds = {name: (values, unit) for (name, unit), values in zip(TWIST.items(), twist[::5].T, strict=True)}
     return report(
         "staircase",
         {"staircase": _overview(time, found), "staircase_zoom": _zoom(time, found, numbers["edge"])},
         numbers,
         _orders(errors),
-        comparisons=_comparisons(time, twist, found, steps),
+        comparisons=_comparisons(time, profile, found, steps),
         tables=(_error_table(errors),),
-        data={"line": experiment.dataset(wrenches, WRENCH, ("surface",), ("time", time[::5], "s"), speeds)},
+        data={"line": experiment.dataset(wrenches, WRENCH, ("surface",), along, speeds)},
     )
 
 
 def _line(cells: int = 21) -> ContactPatch:
-    return PUBLISHED_PATCHES["Line"](cells=cells, width=WIDTH)
+    return PUBLISHED_PATCHES["Line"](cells=cells)
 
 
 def _wrenches(twist: np.ndarray, patch: ContactPatch) -> Arrays:
@@ -179,16 +181,15 @@ def _largest_jump(time: np.ndarray, values: np.ndarray, part: np.ndarray) -> dic
     return {"time": float(time[part[at]]), "jump": float(change[at])}
 
 
-def _comparisons(time: np.ndarray, twist: np.ndarray, found: Arrays, steps: Arrays) -> list[Comparison]:
+def _comparisons(time: np.ndarray, profile: Signal, found: Arrays, steps: Arrays) -> list[Comparison]:
     rows = []
     for name in ("plain", "bilinear"):
         ours, words = experiment.columns_of(time, found[name], WRENCH), f"steady state of the line, {LINES[name][0]}, "
         cause = "The same sum at the same samples: what is left is the error of reading the figure."
         curve = f"staircase/{name}"
         rows += experiment.compare_columns("published", words, ours, curve, ALLOWANCE, cause, WRENCH)
-    ours, curve = experiment.columns_of(time, twist, TWIST), "convergence/velocity"
     cause = "The same profile, at each sample's own time: what is left is the error of reading the figure."
-    rows += experiment.compare_columns("published", "velocity profile, ", ours, curve, 1e-12, cause, TWIST)
+    rows += experiment.compare_profile(profile, "convergence/velocity", TWIST, cause, dt=SAMPLE_TIME)
     return [*rows, *_plateaus(time, found), *_step_comparisons(steps)]
 
 
@@ -255,13 +256,9 @@ def _error_table(errors: dict[int, dict[str, list[float]]]) -> experiment.Table:
     return experiment.table("Distance from the exact rod along the profile", rows, columns, "cells, sum")
 
 
-# ---------------------------------------------------------------------- figures
-
-
 def _overview(time: np.ndarray, found: Arrays) -> PlotFigure:
     """Draw the force [N] and torque [N mm] over the whole profile."""
-    figure = new_figure(9.0, 7.2)
-    panels = figure.subplots(3, 1, sharex=True)
+    figure, panels = looks.panels(9.0, 7.2, 3, sharex=True)
     for axes, name in zip(panels, WRENCH, strict=True):
         _draw(axes, time, found, name, (0.0, 5.0), size=3.0)
     panels[-1].set_xlabel("time [s]")
@@ -271,8 +268,7 @@ def _overview(time: np.ndarray, found: Arrays) -> PlotFigure:
 
 def _zoom(time: np.ndarray, found: Arrays, edge: dict[str, dict[str, float]]) -> PlotFigure:
     """Draw the first steps of fx and of the torque; where the smoothing ends, at the times that `edge` holds."""
-    figure = new_figure(9.6, 6.4)
-    panels = figure.subplots(2, 2)
+    figure, panels = looks.panels(9.6, 6.4, 2, 2)
     high, low = edge["high"]["time"], edge["low"]["time"]
     parts = (
         ("fx", (0.79, 0.97), "first steps, force"),
@@ -282,8 +278,8 @@ def _zoom(time: np.ndarray, found: Arrays, edge: dict[str, dict[str, float]]) ->
     )
     for axes, (name, limits, title) in zip(panels.flat, parts, strict=True):
         _draw(axes, time, found, name, limits)
-        axes.set(title=title, xlabel="time [s]")
-        axes.title.set_fontsize("medium")
+        axes.set_title(title, fontsize="medium")
+        axes.set_xlabel("time [s]")
     looks.legend(figure, panels[0, 0], 5)
     return figure
 
@@ -299,4 +295,3 @@ def _draw(
         look = {"ms": size, "mew": 0.9, "label": f"published, {name}"}
         looks.vertices(axes, f"staircase/{name}/{column}", factor, LINES[name][-1], limits, marker, **look)
     axes.set(ylabel=label, xlim=limits)
-    tidy(axes)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.plots.style import PlotFigure, new_figure, tidy
+from planarfriction.plots.style import PlotFigure
 from planarfriction_studies.experiments import experiment, facts, looks
 from planarfriction_studies.experiments.experiment import UNITS, Arrays, Comparison, Result, Table, Work, entry
 from planarfriction_studies.experiments.timing import runs
@@ -45,13 +45,16 @@ Points = dict[str, list[dict[str, float]]]
 """Solver -> its runs: tolerance, error [m], median and quartiles of the time [s], evaluations, repeats."""
 
 
-Times = Mapping[str, Mapping[str, Arrays]]
-"""Row of the published table -> kind of model -> times [s]."""
-
-
 def run(work: Work) -> Result:
     """Carry out the experiment."""
-    times = {row: {kind: runs.whole_runs(row, kind, work) for kind in KINDS} for row in ROWS}
+    repeats = 1 if work.quick else runs.MOST_REPEATS
+    times = {
+        row: {
+            kind: work.piece(f"timing, {row}, {kind}, whole run", partial(runs.whole_runs, scene, repeats))
+            for kind, scene in scenes.items()
+        }
+        for row, scenes in ROWS.items()
+    }
     baselines = _baselines(work)
     problems = runs.problems(work)
     references = {problem: runs.reference(problem, work) for problem in problems}
@@ -87,24 +90,27 @@ def run(work: Work) -> Result:
 
 def _machine() -> dict[str, Any]:
     """Return the properties of the machine that the times depend on."""
-    versions = {name: metadata.version(name) for name in ("numpy", "scipy", "numba")}
-    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else -1.0
     return {
         "platform": platform.platform(),
         "machine": platform.machine(),
         "cpus": os.cpu_count() or 0,
-        "load average": load,
+        "load average": os.getloadavg()[0] if hasattr(os, "getloadavg") else -1.0,
         "python": platform.python_version(),
-        **versions,
+        **{name: metadata.version(name) for name in ("numpy", "scipy", "numba")},
     }
 
 
 def _baselines(work: Work) -> dict[str, dict[str, Arrays]]:
     """Time LSODA beside ours, by row and kind; the distributed model over a window unless all is wanted."""
-    if work.quick:
-        return {CIRCLE: {kind: runs.beside_lsoda(CIRCLE, kind, *QUICK_WINDOW, work) for kind in KINDS}}
+    spans: dict[str, tuple[float, float]]
     spans = {"distributed": (0.0, 2.0) if work.full else BREAKAWAY, "reduced": (0.0, 2.0)}
-    return {row: {kind: runs.beside_lsoda(row, kind, *spans[kind], work) for kind in KINDS} for row in ROWS}
+    spans = dict.fromkeys(KINDS, QUICK_WINDOW) if work.quick else spans
+
+    def beside(row: str, kind: str) -> Arrays:
+        label = f"timing, {row}, {kind}, LSODA as published, {spans[kind][0]:g} to {spans[kind][1]:g} s"
+        return work.piece(label, partial(runs.beside_lsoda, ROWS[row][kind], *spans[kind]))
+
+    return {row: {kind: beside(row, kind) for kind in KINDS} for row in ([CIRCLE] if work.quick else ROWS)}
 
 
 def _points(solved: Mapping[tuple[str, float], Arrays], reference: np.ndarray) -> Points:
@@ -136,9 +142,6 @@ def _spread(times: np.ndarray) -> dict[str, float]:
 def _ratio(times: np.ndarray, others: np.ndarray) -> dict[str, float]:
     """Return the ratio of the medians, and the least and the greatest that the quartiles allow."""
     return _spread(times / others[[0, 2, 1]])
-
-
-# ---------------------------------------------------------------------- comparisons
 
 
 def _agreements(
@@ -177,9 +180,6 @@ def _against_converged(problem: Problem, reference: np.ndarray) -> list[Comparis
     return experiment.compare_all("converged", rows)
 
 
-# ---------------------------------------------------------------------- words, figure, tables
-
-
 def _precision(problem: Problem, points: Points) -> dict[str, Any]:
     """Return the time of each solver to the same error, and the solvers that do not reach it."""
     level = LEVELS[problem.kind]
@@ -198,8 +198,7 @@ def _precision(problem: Problem, points: Points) -> dict[str, Any]:
 
 
 def _figure(points: Mapping[Problem, Points]) -> PlotFigure:
-    figure = new_figure(9.6, 4.2)
-    panels = figure.subplots(1, len(points), squeeze=False)[0]
+    figure, (panels,) = looks.panels(9.6, 4.2, 1, len(points), squeeze=False)
     for axes, (problem, solvers) in zip(panels, points.items(), strict=True):
         for i, (solver, entries) in enumerate(solvers.items()):
             errors, times, first, third = (np.array([entry[name] for entry in entries]) for name in ("error", *TIMES))
@@ -208,7 +207,6 @@ def _figure(points: Mapping[Problem, Points]) -> PlotFigure:
             axes.errorbar(errors, times, fmt="osD^"[i] + "-", **bars, **look)
         axes.set(xscale="log", yscale="log", xlabel="largest position error [m]", ylabel="wall time [s]")
         axes.set_title(problem.name, fontsize="medium")
-        tidy(axes)
     looks.legend(figure, panels[0], 4, "lower")
     return figure
 
@@ -223,11 +221,10 @@ def _published_table(rows: Mapping[str, Mapping[str, Any]]) -> Table:
     columns |= {"factor, published": entry(1, "ratio")}
     columns |= {f"{kind}, LSODA here over ours": partial(ours, name=f"{kind}, LSODA over ours") for kind in KINDS}
     note = (
-        "Ours: all of `simulate`, default tolerances, median, in brackets quartiles. "
-        "LSODA over ours: time in the solver over the same span, "
-        f"the whole run or, where that takes minutes, {BREAKAWAY[0]:g} to {BREAKAWAY[1]:g} s (the plate breaks away; a "
-        f"quick look takes {QUICK_WINDOW[0]:g} to {QUICK_WINDOW[1]:g} s), without the tables. $k = 2$: the table is "
-        "kept and $r$ follows the load; $k = 2 f_N$: all is rebuilt every 0.01 s."
+        "Ours: all of `simulate`, default tolerances. LSODA: time in the solver, without tables, over the whole run "
+        f"or, where that takes minutes, {BREAKAWAY[0]:g} to {BREAKAWAY[1]:g} s, where the plate breaks away (a quick "
+        f"run: {QUICK_WINDOW[0]:g} to {QUICK_WINDOW[1]:g} s). $k = 2$: one table, $r$ follows the load; $k = 2 f_N$: "
+        "all is rebuilt every 0.01 s."
     )
     published = facts.published_table("timing")
     return experiment.table(
@@ -243,10 +240,7 @@ def _points_table(problem: Problem, points: Points) -> Table:
         "evaluations": lambda entry: int(entry["evaluations"]),
         "runs": lambda entry: int(entry["repeats"]),
     }
-    note = (
-        f"{problem.window.states} states. Absolute tolerance: {runs.ATOL_PER_RTOL:g} times the relative one, as a "
-        "share of the natural scales. Median of the runs; what takes over a second runs once."
-    )
+    note = f"{problem.window.states} states. Absolute tolerance: {runs.ATOL_PER_RTOL:g} times the relative one."
     return experiment.table(
         f"Work against precision, {problem.name}", rows, columns, "solver, relative tolerance", note
     )

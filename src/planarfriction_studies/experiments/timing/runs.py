@@ -33,17 +33,15 @@ STRUCTURED = {"RODAS3": RODAS3, "RODAS4": RODAS4}
 """Our methods by name."""
 
 
-def _scenes(distributed: Callable[[], Scene], reduced: Callable[[], Scene]) -> dict[str, Callable[[], Scene]]:
-    return {"distributed": distributed, "reduced": reduced}
-
-
-ROWS = {
-    "disc, shape independent of the load": _scenes(
-        lambda: in_hand(published_model("d", "Circle")), lambda: in_hand(published_model("r", "Circle"))
-    ),
-    "k = 2": _scenes(lambda: soft_scene(1, DISTRIBUTED), lambda: soft_scene(1, RESCALED)),
-    "k = 2 f_N": _scenes(lambda: soft_scene(2, DISTRIBUTED), lambda: soft_scene(2, REBUILT)),
-}
+ROWS: dict[str, dict[str, Callable[[], Scene]]] = {
+    row: {"distributed": distributed, "reduced": reduced}
+    for row, distributed, reduced in (
+        ("disc, shape independent of the load",
+         lambda: in_hand(published_model("d", "Circle")), lambda: in_hand(published_model("r", "Circle"))),
+        ("k = 2", lambda: soft_scene(1, DISTRIBUTED), lambda: soft_scene(1, RESCALED)),
+        ("k = 2 f_N", lambda: soft_scene(2, DISTRIBUTED), lambda: soft_scene(2, REBUILT)),
+    )
+}  # fmt: skip
 """Rows of the published table, and what makes their scenes: with models that have computed nothing yet."""
 
 CIRCLE = next(iter(ROWS))
@@ -126,16 +124,8 @@ def _repeated(action: Callable[[], Poses], repeats: int) -> dict[str, Any]:
     }
 
 
-# ---------------------------------------------------------------------- the table
-
-
-def whole_runs(row: str, kind: str, work: Work) -> Arrays:
+def whole_runs(scene: Callable[[], Scene], repeats: int) -> dict[str, Any]:
     """Time `simulate` at default tolerances, tables included: `time`, `solver` [s] (median, quartiles), `trials`."""
-    compute = functools.partial(_whole_runs, ROWS[row][kind], 1 if work.quick else MOST_REPEATS)
-    return work.piece(f"timing, {row}, {kind}, whole run", compute)
-
-
-def _whole_runs(scene: Callable[[], Scene], repeats: int) -> dict[str, Any]:
     simulate(scene(), t_end=0.02)  # compiles
     totals, solver, trials = [], [], 0
     while sum(totals) < ENOUGH and len(totals) < repeats:
@@ -148,13 +138,8 @@ def _whole_runs(scene: Callable[[], Scene], repeats: int) -> dict[str, Any]:
     return {"time": median_and_quartiles(totals), "solver": median_and_quartiles(solver), "trials": trials}
 
 
-def beside_lsoda(row: str, kind: str, begin: float, end: float, work: Work) -> Arrays:
+def beside_lsoda(scene: Callable[[], Scene], begin: float, end: float) -> dict[str, Any]:
     """Time `lsoda` as published and `ours` at default tolerances over a window [s] (median, quartiles)."""
-    label = f"timing, {row}, {kind}, LSODA as published, {begin:g} to {end:g} s"
-    return work.piece(label, functools.partial(_beside_lsoda, ROWS[row][kind], begin, end))
-
-
-def _beside_lsoda(scene: Callable[[], Scene], begin: float, end: float) -> dict[str, Any]:
     fresh = scene()
     window = Window.of(fresh, begin, end)
     ours = [window.ours(rtol=fresh.rtol, atol=fresh.atol)[0].wall_time for _ in range(MOST_REPEATS)]

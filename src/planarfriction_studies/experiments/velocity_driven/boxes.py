@@ -25,16 +25,9 @@ MODELS = {"corrected": "r", "ellipsoid": "e"}
 """Name in the box plots -> letter of the model."""
 
 UNITS = {"ft": "N", "tau": "N m"}
-
 WORDS = {"ft": "tangential force", "tau": "torque"}
-
 COLUMNS: tuple[str, ...] = ("whisker low", "first quartile", "median", "third quartile", "whisker high", "maximum")
-
 PUBLISHED_SHAPES = ("Circle", "Square", "Line", "NonConvex1")
-
-WIDTH = 0.02
-"""Width of the patches [m]."""
-
 SAMPLES = 500
 
 OWN = {"N": 2e-7, "N m": 2e-8}
@@ -83,7 +76,7 @@ def slack(values: np.ndarray, samples: int = WRONG_SAMPLES) -> dict[str, float]:
 def guard_effect(shape: str) -> dict[str, float]:
     """Compute the friction that the guard adds to a steady slide [N] and spin [N m] at 1 N: `sigma_0 GUARD/2`."""
     force = 0.5 * runs.LAW.sigma_0 * GUARD
-    return {"N": force, "N m": force * LimitSurfaceTablePublished(PUBLISHED_PATCHES[shape](width=WIDTH)).contact_radius}
+    return {"N": force, "N m": force * LimitSurfaceTablePublished(PUBLISHED_PATCHES[shape]()).contact_radius}
 
 
 def solver_error(curve: str) -> float:
@@ -99,13 +92,11 @@ def comparisons(every: dict[str, Errors]) -> list[Comparison]:
             for model, values in models.items():
                 ours, freedom = statistics(values), slack(values)
                 for (reference, of), cause in _CAUSES.items():
-                    for column, theirs in (
-                        reference_box(reference, shape, quantity, model).items() if of == model else ()
-                    ):
+                    box = reference_box(reference, shape, quantity, model) if of == model else {}
+                    for column, theirs in box.items():
                         words = f"error of the {WORDS[quantity]}, {runs.IN_WORDS[shape]}, {model}, {column}"
                         within = _tolerance(reference, shape, quantity, model, column, freedom[column])
-                        unit = UNITS[quantity]
-                        rows.append(compare(words, ours[column], theirs, reference, within, unit, cause))
+                        rows.append(compare(words, ours[column], theirs, reference, within, UNITS[quantity], cause))
     return rows
 
 

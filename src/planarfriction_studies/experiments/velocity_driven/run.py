@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from planarfriction.patch import PUBLISHED_PATCHES
-from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import LINE_STYLES, PlotFigure
 from planarfriction.scenes.ready import driven, published_velocity
-from planarfriction.scenes.signal import sample_times
 from planarfriction_studies.experiments import experiment, facts, looks, runs
 from planarfriction_studies.experiments.experiment import TWIST, WRENCH, Arrays, Comparison, Result, Work, entry
 from planarfriction_studies.experiments.velocity_driven import boxes
@@ -46,7 +45,7 @@ MODELS = {"corrected": "table", "ellipsoid": "ellipsoid"}
 
 def drive(shape: str) -> Arrays:
     """Simulate a patch: time [s], and the wrench `[T, 3]` [N, N, N m] about the centre of pressure with each model."""
-    patch = PUBLISHED_PATCHES[shape](width=boxes.WIDTH)
+    patch = PUBLISHED_PATCHES[shape]()
     result = {}
     for kind in ("d", "r", "e"):
         columns = runs.simulated(driven(runs.published_model(kind, patch)), rtol=RTOL, atol=ATOL)
@@ -68,7 +67,7 @@ def run(work: Work) -> Result:
         _template_values(numbers),
         comparisons=[
             *_curve_comparisons(found),
-            *_velocity_comparisons(),
+            *experiment.compare_profile(published_velocity(), "driven/velocity", TWIST, _READING),
             _guard_comparison(found["Circle"]),
             *boxes.comparisons(errors),
         ],
@@ -77,7 +76,7 @@ def run(work: Work) -> Result:
     )
 
 
-# ------------------------------------------------------------------ comparisons
+_READING = "The same profile, labelled with its own time: what is left is the error of reading the figure."
 
 _GUARDED = (
     "The program behind the published ellipsoid adds $10^{-10}$ m to $|z|$ where it takes the angle between bristle "
@@ -134,13 +133,6 @@ def _ellipsoid_comparisons(
     ]
 
 
-def _velocity_comparisons() -> list[Comparison]:
-    time = sample_times(5.0)
-    ours = experiment.columns_of(time, published_velocity()(time), TWIST)
-    cause = "The same profile, labelled with its own time: what is left is the error of reading the figure."
-    return experiment.compare_columns("published", "velocity profile, ", ours, "driven/velocity", 1e-12, cause, TWIST)
-
-
 def _guard_comparison(disc: Arrays) -> Comparison:
     """Compare the published ellipsoid's surplus of friction in steady pure slide with what the guard explains."""
     words = "disc, surplus of the published ellipsoid's friction in a steady slide"
@@ -158,9 +150,6 @@ def _guard_surplus(disc: Arrays) -> float:
     steady = int(np.flatnonzero((curve.time > PURE_SLIDE[0]) & (curve.time < PURE_SLIDE[1]))[0])
     ours = disc["e"][int(np.rint(curve.time[steady] / 0.01)), 1]
     return float(ours - curve.values[steady])
-
-
-# ------------------------------------------------------------------ numbers, table and data
 
 
 def _numbers(found: dict[str, Arrays], errors: dict[str, boxes.Errors]) -> dict[str, Any]:
@@ -196,7 +185,7 @@ def _centre_of_rotation(shape: str, sample: int) -> dict[str, float] | None:
     vx, vy, omega = published_velocity().left(0.01 * sample - 0.005)
     if omega == 0.0:
         return None
-    patch = PUBLISHED_PATCHES[shape](width=boxes.WIDTH)
+    patch = PUBLISHED_PATCHES[shape]()
     cells = patch.positions[patch.weights() > 0.0] - patch.centre_of_pressure()
     centre = np.array([-vy, vx]) / omega
     nearest = np.hypot(*(cells - centre).T).min()
@@ -208,14 +197,12 @@ def _template_values(numbers: dict[str, Any]) -> dict[str, Any]:
     errors = numbers["errors"]
     tables = {shape: each["ft"]["corrected"] for shape, each in errors.items()}
     worst = max(tables, key=lambda shape: tables[shape]["maximum"] / tables[shape]["whisker high"])
-    quartiles = {
-        runs.IN_WORDS[shape]: [each["ft"][model]["third quartile"] for model in MODELS]
-        for shape, each in errors.items()
-    }
     boxes_of_all = [box for each in errors.values() for models in each.values() for box in models.values()]
     return {
-        "quartiles": quartiles,
-        "factors": [ellipsoid / table for table, ellipsoid in quartiles.values()],
+        "factors": [
+            each["ft"]["ellipsoid"]["third quartile"] / each["ft"]["corrected"]["third quartile"]
+            for each in errors.values()
+        ],
         "worst": tables[worst] | {"shape": runs.IN_WORDS[worst]},
         "most": max(box["samples above the whisker"] for box in boxes_of_all),
     }
@@ -243,15 +230,19 @@ def _dataset(found: dict[str, Arrays]) -> Any:
         for shape, each in found.items()
         for kind, name in runs.NAMES.items()
     }
-    before = published_velocity().left(time).T  # a sampled wrench belongs to the velocity of the step just ended
-    speeds = {name: (values, unit) for (name, unit), values in zip(TWIST.items(), before, strict=True)}
+    # a sampled wrench belongs to the velocity of the step just ended
+    speeds = experiment.with_units(published_velocity().left(time), TWIST)
     return experiment.dataset(wrenches, WRENCH, ("shape", "model"), ("time", time, "s"), speeds)
 
 
-# ------------------------------------------------------------------ figures
+LOOKS: dict[str, dict[str, Any]] = {
+    kind: {"ls": LINE_STYLES[style], "lw": width, "alpha": opacity, "color": looks.OF_MODEL[kind]}
+    for kind, style, width, opacity in (("d", 0, 2.6, 0.45), ("r", 1, 1.3, 1.0), ("e", 2, 1.5, 1.0))
+}
+"""Letter of a model -> how its line looks: the distributed model broad and pale below the others."""
 
-LOOKS = {"d": ("-", 2.6, 0.45, "o"), "r": (LINE_STYLES[1], 1.3, 1.0, "s"), "e": (LINE_STYLES[2], 1.5, 1.0, "^")}
-"""Letter of a model -> line style, width, opacity, marker: the distributed model broad and pale below the others."""
+MARKERS = {"d": "o", "r": "s", "e": "^"}
+"""Letter of a model -> marker of its published curves."""
 
 SPEEDS = (("vx", "$v_x$ [mm/s]", 1e3), ("vy", "$v_y$ [mm/s]", 1e3), ("omega", "$\\omega$ [rad/s]", 1.0))
 
@@ -259,83 +250,56 @@ SPEEDS = (("vx", "$v_x$ [mm/s]", 1e3), ("vy", "$v_y$ [mm/s]", 1e3), ("omega", "$
 def _figures(found: dict[str, Arrays], errors: dict[str, boxes.Errors]) -> dict[str, PlotFigure]:
     result = {"velocity_profile": _profile(found["Circle"])}
     for shape, kind in (("Circle", "r"), ("Circle", "e"), ("NonConvex1", "r")):
-        result[f"driven_{shape.lower()}_{kind}"] = _pair(shape, kind, found[shape])
+        endings = {"d": ", beside the ellipsoid" if kind == "e" else "", kind: ""}
+        result[f"driven_{shape.lower()}_{kind}"] = _page({shape: found[shape]}, f"d{kind}", 3.4, endings)
     others = {shape: found[shape] for shape in found if shape not in QUICK_SHAPES}
     if others:
-        result["driven_other_shapes"] = _page(others)
+        result["driven_other_shapes"] = _page(others, "dre", 2.1 * len(others) + 0.7)
     return result | {"driven_errors": _box_plots(errors)}
 
 
 def _profile(disc: Arrays) -> PlotFigure:
     """Draw the velocity profile [mm/s, rad/s], and the wrench of the distributed model of the disc [N, N mm]."""
-    figure = new_figure(9.6, 4.6)
-    above, below = figure.subplots(2, 3, sharex=True)
+    figure, (above, below) = looks.panels(9.6, 4.6, 2, 3, sharex=True)
     time = np.arange(0.0, 5.0, 0.001)
     for axes, (name, label, factor), values in zip(above, SPEEDS, published_velocity()(time).T, strict=True):
         axes.plot(time, factor * values, color="0.15", lw=1.4)
         looks.vertices(axes, f"driven/velocity/{name}", factor, "0.15")
         axes.set_ylabel(label)
-        tidy(axes)
     for axes, name, values in zip(below, WRENCH, disc["d"].T, strict=True):
         label, factor = looks.AXES[name]
         axes.plot(disc["time"], factor * values, color=looks.DISTRIBUTED, lw=1.4)
         looks.vertices(axes, f"driven/Circle/d, alone/{name}", factor, looks.DISTRIBUTED)
         axes.set(xlabel="time [s]", ylabel=label, xlim=(0.0, 5.0))
-        tidy(axes)
     return figure
 
 
-def _pair(shape: str, kind: str, wrenches: Arrays) -> PlotFigure:
-    """Draw forces [N] and torque [N mm] of one reduced model on top of those of the distributed one, as published."""
-    figure = new_figure(9.6, 3.4)
-    panels = figure.subplots(1, 3)
-    _draw(panels, wrenches, ("d", kind))
-    endings = {"d": ", beside the ellipsoid" if kind == "e" else "", kind: ""}
-    for axes, name in zip(panels, WRENCH, strict=True):
-        for model, ending in endings.items():
-            curve, marker = f"driven/{shape}/{model}{ending}/{name}", LOOKS[model][-1]
-            looks.vertices(axes, curve, looks.AXES[name][1], looks.OF_MODEL[model], marker=marker)
-        axes.set_xlabel("time [s]")
-    marks = {"ls": "", "ms": 4, "mfc": "white"}
-    published = [
-        looks.line_key(f"{runs.NAMES[each]}, published", marker=LOOKS[each][-1], mec=looks.OF_MODEL[each], **marks)
-        for each in endings
-    ]
-    looks.legend(figure, _key(("d", kind)) + published, 4, fontsize=9)
-    return figure
+def _page(found: dict[str, Arrays], kinds: str, height: float, endings: dict[str, str] | None = None) -> PlotFigure:
+    """Draw forces [N] and torque [N mm] of some models, a row for each shape.
 
-
-def _page(found: dict[str, Arrays]) -> PlotFigure:
-    """Draw forces [N] and torque [N mm] of several shapes, a row for each, with all three models."""
-    figure = new_figure(9.6, 2.1 * len(found) + 0.7)
-    panels = figure.subplots(len(found), 3, sharex=True, squeeze=False)
+    Published curves are those of the models in `endings`, which hold the ends of their names.
+    """
+    figure, panels = looks.panels(9.6, height, len(found), 3, sharex=True, squeeze=False)
+    endings = endings or {}
     for row, (shape, wrenches) in zip(panels, found.items(), strict=True):
         row[0].set_title(runs.IN_WORDS[shape], fontsize="medium", loc="left")
-        _draw(row, wrenches, ("d", "r", "e"))
+        for column, (axes, name) in enumerate(zip(row, WRENCH, strict=True)):
+            label, factor = looks.AXES[name]
+            for kind in kinds:
+                axes.plot(wrenches["time"], factor * wrenches[kind][:, column], **LOOKS[kind])
+            for kind, ending in endings.items():
+                curve = f"driven/{shape}/{kind}{ending}/{name}"
+                looks.vertices(axes, curve, factor, looks.OF_MODEL[kind], marker=MARKERS[kind])
+            axes.set(xlim=(0.0, 5.0), ylabel=label)
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
     figure.align_ylabels(panels)
-    looks.legend(figure, _key(("d", "r", "e")), 3, fontsize=9)
+    key = [looks.line_key(runs.NAMES[kind], **LOOKS[kind]) for kind in kinds]
+    for kind in endings:
+        marks = {"marker": MARKERS[kind], "mec": looks.OF_MODEL[kind], "ls": "", "ms": 4, "mfc": "white"}
+        key.append(looks.line_key(f"{runs.NAMES[kind]}, published", **marks))
+    looks.legend(figure, key, 4 if endings else 3, fontsize=9)
     return figure
-
-
-def _draw(row: Any, wrenches: Arrays, kinds: tuple[str, ...]) -> None:
-    """Draw forces and torque of some models in a row of three panels."""
-    for column, (axes, name) in enumerate(zip(row, WRENCH, strict=True)):
-        label, factor = looks.AXES[name]
-        for kind in kinds:
-            axes.plot(wrenches["time"], factor * wrenches[kind][:, column], **_look(kind))
-        axes.set(xlim=(0.0, 5.0), ylabel=label)
-        tidy(axes)
-
-
-def _look(kind: str) -> dict[str, Any]:
-    style, width, opacity, _ = LOOKS[kind]
-    return {"ls": style, "lw": width, "alpha": opacity, "color": looks.OF_MODEL[kind]}
-
-
-def _key(kinds: tuple[str, ...]) -> list[Any]:
-    return [looks.line_key(runs.NAMES[kind], **_look(kind)) for kind in kinds]
 
 
 def _box_plots(every: dict[str, boxes.Errors]) -> PlotFigure:
@@ -354,6 +318,5 @@ def _box_plots(every: dict[str, boxes.Errors]) -> PlotFigure:
                     looks.box(axes, place + offset + 0.16, theirs, colours[model], 0.14, filled=False)
         axes.set(ylim=(0.0, None), ylabel=label)
     named = {MODELS[model]: colour for model, colour in colours.items()}
-    published = looks.box_key(named, ", published", filled=False)
-    looks.legend(figure, [*looks.box_key(named), *published, looks.line_key(**looks.MAXIMUM)], 5)
+    looks.box_legend(figure, named, 5, {f"{words}, published": colour for words, colour in named.items()})
     return figure
