@@ -152,6 +152,19 @@ def test_at_rest_nothing_is_said_and_nothing_fails():
     assert not found.friction.any() and not found.points.any() and found.angle_error == 0.0
 
 
+@pytest.mark.parametrize("load", [5e-324, 1e-320, 1e50])
+def test_any_load_has_the_same_points_and_the_models_the_same_errors(load):
+    one, other = answer(State()), answer(State(normal_force=load))
+    np.testing.assert_array_equal(other.points, one.points)
+    np.testing.assert_allclose(other.friction, load * one.friction, rtol=1e-12, atol=1e-323)  # 5e-324 is the last digit
+    assert other.force_error == one.force_error and all(each.error < 1.0 for each in climb(State(normal_force=load)))
+
+
+def test_what_hardly_moves_rubs_as_what_moves_slowly():
+    tiny = answer(State(Drawing.published("Circle"), pf.Dahl(mu_c=0.5), twist=(5e-324, 0.0, 0.0)))
+    np.testing.assert_allclose(tiny.friction, [-0.5, 0.0, 0.0], atol=1e-15)
+
+
 def test_what_does_not_press_has_no_answer():
     with pytest.raises(InvalidValueError, match="have a total > 0"):
         answer(State(drawing=State().drawing.cleared()))
