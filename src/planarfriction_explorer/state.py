@@ -72,7 +72,7 @@ class State:
         if omega == 0.0:
             return None
         x, y = 0.0 - vy / omega, vx / omega
-        return (x, y) if math.isfinite(x) and math.isfinite(y) else None
+        return (x, y) if math.isfinite(1e3 * x) and math.isfinite(1e3 * y) else None  # in mm too
 
 
 def law_parameters(law: Any) -> dict[str, float | None]:

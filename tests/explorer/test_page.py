@@ -194,9 +194,9 @@ def test_an_empty_map_leaves_no_numbers_of_another_one(page):
     page.controls.clear.clicks += 1
     assert "Nothing presses" in page.message.object and page.controls.tool.value == "brush"
     assert page.numbers.object == page.grid.object == page.python.value == ""
-    assert not page.surface.visible
+    assert not page.surface.visible and not page.section.layout.visible
     page.controls.patch.value = "Line"
-    assert shown(page).any() and page.surface.visible and "'Line'" in page.python.value
+    assert shown(page).any() and page.surface.visible and page.section.layout.visible and "'Line'" in page.python.value
     assert str(page.state.drawing.patch.grid_error()) in page.grid.object
 
 
