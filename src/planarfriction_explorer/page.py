@@ -287,7 +287,13 @@ class Page:
             stylesheets=[looks.CARD],
             styles=looks.grows(330),
         )
-        space = pn.Column(self.numbers, self.grid, self.surface, stylesheets=[looks.CARD], styles=looks.grows(360))
+        space = pn.Column(
+            self.numbers,
+            self.grid,
+            self.surface,
+            stylesheets=[looks.CARD],
+            styles=looks.grows(360) | {"height": "auto"},
+        )
         main = pn.Column(
             pn.FlexBox(plane, space, gap="10px", align_items="stretch", stylesheets=[looks.FIRST]),
             self.tabs,

@@ -26,7 +26,7 @@ class State:
     law: FrictionLaw = field(default_factory=lambda: LuGre(mu_s=1.2, elasto_plastic=0.9))
     """Friction law."""
     normal_force: float = 1.0
-    """Load [N]."""
+    """Load [N], which presses the patch."""
     twist: tuple[float, float, float] = (0.002, -0.008, 1.0)
     """Twist `(vx, vy, omega)` of the body at the origin of the contact frame [m/s, m/s, rad/s]."""
     mass: float = 0.05

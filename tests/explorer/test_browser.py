@@ -294,6 +294,7 @@ def test_a_scene_is_run_and_watched_while_the_page_goes_on(visitor):
     picture, slider = film.locator("img"), film.locator("input[type=range]")
     picture.wait_for(timeout=120_000)
     assert picture.evaluate("(each) => each.naturalWidth") > 500 and run.inner_text() == "Run"
+    assert visitor.page.locator("#histories").evaluate("(each) => each.naturalWidth") > 1000
     visitor.page.wait_for_timeout(1000)
     assert int(slider.input_value()) > 0  # it plays by itself
     film.get_by_title("Pause").click()

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from planarfriction.errors import FrictionError, InvalidValueError
-from planarfriction.laws import Dahl
+from planarfriction.laws import LAWS, Dahl
 from planarfriction.planning import holding_load
 from planarfriction_explorer.answers import answer
 from planarfriction_explorer.drawing import Drawing
@@ -109,6 +109,20 @@ def test_the_page_says_whether_a_part_is_held_with_its_mass_and_friction(page):
     assert "slips</span>" in page.grid.object
     page.controls.mass.value = -1.0
     assert "mass must be &gt; 0" in page.message.object
+
+
+def test_each_control_says_what_it_is_in_the_unit_of_its_label(page):
+    rows = page.controls.layout().select(pn.Row)
+    icons = {row[0]: row[1].value for row in rows if isinstance(row[1], pn.widgets.TooltipIcon)}
+    found = [each for name, each in vars(page.controls).items() if isinstance(each, pn.widgets.base.Widget)]
+    for kind in LAWS:
+        page.controls.law.value = kind
+        found += page.controls.parameters
+    for each in [*found, page.scenes.scene, page.scenes.model]:
+        words = getattr(each, "description", None) or icons[each]
+        unit = re.search(r"\[[^]]+\]", each.label or "")
+        assert len(words) > 5 and (unit is None or unit[0] in words), each.label
+    assert "Stribeck speed [m/s]" in {each.label: each.description for each in found if each.tags}["v_s [m/s]"]
 
 
 OTHER = State(Drawing(np.ones((2, 3)), 2e-3), Dahl(mu_c=0.3), 2.5, (0.01, -0.02, 3.0), 0.0703, -0.004)
