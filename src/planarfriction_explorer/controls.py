@@ -160,7 +160,7 @@ class Controls:
         )
 
     def _slider(self, name: str) -> Any:
-        icon = pn.widgets.TooltipIcon(value=TOOLTIPS[name], margin=0)
+        icon = pn.widgets.TooltipIcon(value=TOOLTIPS[name], margin=(0, 0, 0, 10))
         return pn.Row(vars(self)[name], icon, sizing_mode="stretch_width")
 
 
