@@ -234,7 +234,7 @@ def test_every_point_of_a_section_lies_on_its_surface():
 
 
 @pytest.mark.parametrize("twist", [(0.01, -0.02, 1.0), (0.0, 0.0, 2.0), (0.0, 0.0, 0.0)])
-def test_the_friction_lies_in_the_section_in_newton_and_newton_millimetres(twist):
+def test_the_friction_lies_in_the_section_in_its_units(twist):
     state = State(Drawing.published("Circle"), pf.Dahl(mu_c=0.5), 4.0, twist)
     found = answer(state)
     angle, lines = pictures.section_lines(state, found)
@@ -335,7 +335,7 @@ def test_a_scene_is_run_with_the_contact_on_the_screen():
         ready_scene(state, "free-slide", "reduce")
 
 
-def test_a_film_is_one_file_with_a_player_beside_its_histories_and_can_be_cancelled(monkeypatch):
+def test_a_film_is_one_file_beside_its_histories_and_can_be_cancelled(monkeypatch):
     monkeypatch.setattr(films, "DPI", 20.0)  # quick to draw
     scene = ready_scene(State(Drawing.published("Line")), "free-slide", "reduced")
     told: list[tuple[str, float]] = []
