@@ -92,7 +92,7 @@ def pictures() -> None:
     with opened() as page:
         page.locator(".patch select").select_option("NonConvex2")
         page.wait_for_timeout(2000)
-        page.mouse.click(*place(page, 3, -3))
+        page.mouse.click(*place(page, 7, -3))
         page.get_by_text("Models", exact=True).click()
         page.get_by_text("For the patch, the law").wait_for(timeout=120_000)
         page.wait_for_timeout(4000)

@@ -33,27 +33,26 @@ class Answer:
 def answer(state: State) -> Answer:
     """Return the friction of a state. Raises `InvalidValueError` where nothing presses, or a single point alone."""
     surface, ellipsoid = state.drawing.surface, state.drawing.ellipsoid
-    twist, strength = np.array(state.twist), state.law.numbers.mu_c * state.normal_force
-    unit = surface.wrench(twist)
-    friction, on_surface, on_ellipsoid = steady_wrench(state), strength * unit, strength * ellipsoid.wrench(twist)
-    wrenches = np.stack([friction, on_surface, on_ellipsoid])
+    twist, mu_c = np.array(state.twist), state.law.numbers.mu_c
     scale = np.array([1.0, 1.0, surface.contact_radius])
-    points = geometry.wrench_at(wrenches, surface.centre_of_pressure) / (strength * scale)
+    units = np.stack([steady_wrench(state) / mu_c, surface.wrench(twist), ellipsoid.wrench(twist)])
+    points = geometry.wrench_at(units, surface.centre_of_pressure) / scale
+    wrenches = mu_c * state.normal_force * units  # last: under a load near 5e-324 N all of them are 0
     angle = 0.0
-    if unit.any():
-        both = np.stack([twist, ellipsoid.twist(unit)])
+    if units[1].any():
+        both = np.stack([twist, ellipsoid.twist(units[1])])
         here, there = geometry.twist_at(both, surface.centre_of_pressure) * scale
         angle = float(np.degrees(np.arctan2(np.linalg.norm(np.cross(here, there)), here @ there)))
     error = float(np.linalg.norm(points[2] - points[1]))
-    return Answer(friction, on_surface, on_ellipsoid, points, error, angle, float(-friction @ twist))
+    return Answer(*wrenches, points, error, angle, float(-wrenches[0] @ twist))
 
 
 def steady_wrench(state: State) -> np.ndarray:
-    """Return the wrench `[3]` of steady sliding, `-f_N sum(w_i F(|v_i|) B_i' v_i/|v_i|)` with the law's friction F."""
+    """Return the wrench `[3]` of steady sliding per unit load, `-sum(w_i F(|v_i|) B_i' v_i/|v_i|)` of the law's F."""
     patch = state.drawing.patch
     x, y = patch.positions.T
     vx, vy, _ = geometry.twist_at(np.array(state.twist), patch.positions).T
     speed = np.hypot(vx, vy)
-    share = patch.weights() * state.law.steady_friction(speed) / np.where(speed > 0.0, speed, 1.0)
-    fx, fy = -state.normal_force * share * vx, -state.normal_force * share * vy
+    friction, speed = -patch.weights() * state.law.steady_friction(speed), np.where(speed > 0.0, speed, 1.0)
+    fx, fy = friction * (vx / speed), friction * (vy / speed)
     return np.array([fx.sum(), fy.sum(), (x * fy - y * fx).sum()])

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
 import panel as pn
 
+from planarfriction.described import field_docs
+from planarfriction.families import Family
 from planarfriction.laws import LAWS
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction_explorer import looks
+from planarfriction_explorer.drawing import Drawing
 from planarfriction_explorer.presets import PRESETS
 from planarfriction_explorer.state import State, law_parameters
 
@@ -22,19 +26,21 @@ OWN = "own map"
 CHANGED = "choose one"
 """Choice of the example while the screen shows none of them."""
 
-PARAMETERS = {
-    "mu_c": ("", "Kinetic friction over normal force"),
-    "mu_s": ("", "Static friction over normal force, at least mu_c"),
-    "v_s": ("m/s", "Stribeck velocity: sliding at which friction has fallen from mu_s towards mu_c"),
-    "gamma": ("", "Exponent of the Stribeck curve"),
-    "sigma_0": ("1/m", "Stiffness of the bristles per normal force"),
-    "sigma_1": ("s/m", "Damping of the bristles per normal force"),
-    "sigma_2": ("s/m", "Viscous friction per normal force"),
-    "elasto_plastic": ("", "Share of the full deflection below which bristles do not slip; empty: plain LuGre"),
-    "creep_speed": ("m/s", "Speed of creep under a constant force"),
-    "relaxation_time": ("s", "Time in which bristles relax"),
+TOOLTIPS = {
+    "example": "Contact of a robot to begin with.",
+    "undo": "Goes back by one change, or by one drag as a whole.",
+    "link": "Puts all that is on the screen into the address of the page.",
+    "patch": "Published contact patch, of which the map shows the pressure.",
+    "file": "Table or picture of relative pressures, of at most 64 x 64 cells; only their ratios matter.",
+    "clear": "Takes all pressure away, for a map of your own.",
+    "tool": "Effect of a drag over the map.",
+    "brush": "Radius of brush and eraser [cells].",
+    "pressure": "Relative pressure that the brush leaves [-]; only ratios matter.",
+    "vx": "Velocity of the origin along x [mm/s].",
+    "vy": "Velocity of the origin along y [mm/s].",
+    "omega": "Spin, positive from x to y [rad/s].",
 }
-"""Unit and meaning of the parameters of laws."""
+"""Tooltips of what is no field of a record."""
 
 
 class Controls:
@@ -46,7 +52,7 @@ class Controls:
         self.undo = widgets.Button(label="Undo", disabled=True)
         self.link = widgets.Button(label="Link")
         self.patch = widgets.Select(label="Patch", options=[*PUBLISHED_PATCHES, OWN], value=state.drawing.name)
-        self.file = widgets.FileInput(accept="")
+        self.file = widgets.FileInput(label="Pressure map from a file (.csv, .npy, grey image)", accept="")
         self.cell_size = widgets.FloatInput(label="Cell size [mm]", step=0.1, format="0[.]0000")
         self.clear = widgets.Button(label="Clear the map", align="end")
         self.tool = widgets.RadioButtonGroup(options=TOOLS, value="turn", color="primary", variant="outline")
@@ -60,10 +66,16 @@ class Controls:
         self.vx = widgets.FloatSlider(label="vx [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vx)
         self.vy = widgets.FloatSlider(label="vy [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vy)
         self.omega = widgets.FloatSlider(label="ω [rad/s]", start=-10.0, end=10.0, step=0.01, value=omega)
+        docs = field_docs(State) | field_docs(Drawing)
+        tooltips = TOOLTIPS | {"law": members(LAWS), "load": docs.get("normal_force", "")}
+        for each in ("cell_size", "mass", "lever"):
+            tooltips[each] = docs.get(each, "").replace("[m]", "[mm]").replace("[kg]", "[g]")
         for name, widget in vars(self).items():  # a name for the widget in the page too
             widget.css_classes = [name.replace("_", "-")]
             widget.sizing_mode = "stretch_width"
             widget.margin = (3, 0, 5, 0)
+            if "description" in widget.param:  # sliders have none: `_slider`
+                widget.description = tooltips[name]
         self._silent = False
         self.parameters: Any = pn.FlexBox(gap="0 8px", sizing_mode="stretch_width")
 
@@ -73,13 +85,14 @@ class Controls:
 
     def offer_parameters(self, law: Any, changed: Callable[[Any], Any]) -> None:
         """Put up fields for the parameters of the law; empty ones have a default that depends on others."""
-        fields = []
+        fields, docs = [], field_docs(type(law))
         for name, value in law_parameters(law).items():
-            unit, meaning = PARAMETERS.get(name, ("", ""))
+            words = docs.get(name, "")
+            unit = re.search(r"\[[^]-]+\]", words)
             fields.append(
                 pn.widgets.FloatInput(
-                    label=f"{name} [{unit}]" if unit else name,
-                    description=meaning or None,
+                    label=f"{name} {unit[0]}" if unit else name,
+                    description=words or None,
                     value=value,
                     css_classes=["parameter", name],
                     tags=[name],
@@ -130,11 +143,10 @@ class Controls:
         return pn.Column(
             _heading("Contact"),
             self.patch,
-            _label("Pressure map from a file (.csv, .npy, grey image)"),
             self.file,
             pn.Row(self.cell_size, pn.Spacer(width=8), self.clear, sizing_mode="stretch_width"),
-            self.brush,
-            self.pressure,
+            self._slider("brush"),
+            self._slider("pressure"),
             _heading("Friction"),
             self.law,
             self.parameters,
@@ -142,10 +154,19 @@ class Controls:
             _heading("Held by two such contacts"),
             pn.Row(self.mass, pn.Spacer(width=8), self.lever, sizing_mode="stretch_width"),
             _heading("Motion of the origin"),
-            *(self.vx, self.vy, self.omega),
+            *map(self._slider, ("vx", "vy", "omega")),
             stylesheets=[looks.SIDE],
             styles=looks.grows(270, most=320),
         )
+
+    def _slider(self, name: str) -> Any:
+        icon = pn.widgets.TooltipIcon(value=TOOLTIPS[name], margin=(0, 0, 0, 10))
+        return pn.Row(vars(self)[name], icon, sizing_mode="stretch_width")
+
+
+def members(family: Family) -> str:
+    """Return what the members of a family are, as a list for a tooltip."""
+    return "\n".join(f"- {name}: {family.words(name)}" for name in family)
 
 
 def _thousandfold(value: float) -> float:
@@ -155,7 +176,3 @@ def _thousandfold(value: float) -> float:
 
 def _heading(text: str) -> Any:
     return pn.pane.HTML(f"<b style='font-size:15px'>{text}</b>", margin=(8, 0, 2, 0))
-
-
-def _label(text: str) -> Any:
-    return pn.pane.HTML(text, margin=(3, 0, 0, 0))

@@ -11,7 +11,7 @@ import numpy as np
 
 from planarfriction import geometry, validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceExact
+from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceExact, LimitSurfaceTable
 from planarfriction.limit_surface.comparison import directions
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, Grid, GridError, read_pressure_map
 from planarfriction_explorer.uploads import as_file, plain_name
@@ -114,6 +114,11 @@ class Drawing:
     def surface(self) -> LimitSurfaceExact:
         """Exact limit surface of the map."""
         return LimitSurfaceExact(self.patch)
+
+    @functools.cached_property
+    def table(self) -> LimitSurfaceTable:
+        """Limit surface of the map as a smooth table, quick to evaluate."""
+        return LimitSurfaceTable(self.patch)
 
     @functools.cached_property
     def ellipsoid(self) -> LimitSurfaceEllipsoid:

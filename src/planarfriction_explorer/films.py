@@ -1,12 +1,15 @@
-"""A scene as a moving picture with a player: a ready one with the contact on the screen, or one from a file."""
+"""Run of a scene, a ready one with the contact on the screen or one from a file: its film and its time histories."""
 
 from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
+from typing import NamedTuple
 
 from planarfriction.families import MODELS, SCENES
+from planarfriction.plots import plot_histories
 from planarfriction.scenes import Scene, simulate
 from planarfriction.scenes.files import read_table, scene_from_dict
 from planarfriction_explorer.state import State
@@ -49,15 +52,25 @@ def read_scene(name: str, content: bytes) -> Scene:
     return scene_from_dict(table, folder=Path.cwd(), source=name)
 
 
-def film(scene: Scene, progress: Callable[[str, float], None]) -> str:
-    """Simulate the scene; its film as a page with a player.
+class Watched(NamedTuple):
+    """A scene that was run, to be looked at."""
+
+    film: str
+    """Page with a player."""
+    histories: bytes
+    """Picture of its time histories, as PNG."""
+
+
+def film(scene: Scene, progress: Callable[[str, float], None]) -> Watched:
+    """Simulate the scene; return its film and its time histories.
 
     `progress` is called now and then with what is being done and the share of the run that is done; what it raises
     ends the work.
     """
     solution = simulate(scene, progress=lambda time: progress("simulating", time / scene.t_end))
-    end = float(solution.histories["time"].values[-1]) or 1.0
+    histories, end = BytesIO(), float(solution.histories["time"].values[-1]) or 1.0
+    plot_histories(solution).savefig(histories)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "film.html"
         solution.animate(path, dpi=DPI, progress=lambda time: progress("drawing", time / end))
-        return path.read_text(encoding="utf-8") + _MORE
+        return Watched(path.read_text(encoding="utf-8") + _MORE, histories.getvalue())

@@ -59,7 +59,7 @@ def motion(state: State) -> Signal:
 
 def climb(state: State) -> Iterator[Rung]:
     """Return each model of `RUNGS` in the same run, the distributed one first."""
-    scale = state.law.numbers.mu_c * state.normal_force * np.array([1.0, 1.0, state.drawing.surface.contact_radius])
+    scale = state.law.numbers.mu_c * np.array([1.0, 1.0, state.drawing.surface.contact_radius])
     reference = None
     for name in RUNGS:
         try:
@@ -71,7 +71,7 @@ def climb(state: State) -> Iterator[Rung]:
             yield Rung(name, 0, float("nan"), float("nan"), str(error))
             continue
         data = runs[0].data
-        found = np.stack([data[each].values[:, 0] for each in ("fx", "fy", "tau")], axis=1)
+        found = np.stack([data[each].values[:, 0] for each in ("fx", "fy", "tau")], axis=1) / state.normal_force
         reference = found if reference is None else reference
         error = float(np.sqrt((((found - reference) / scale) ** 2).sum(axis=1).mean()))
         seconds = min(run.statistics.wall_time for run in runs)

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from typing import Any
 
-PAGE = """
-body {margin: 0; background: #F3F5F7; font-family: system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif;
-  --design-primary-color: #0072B2}
+_NARROW = "@media (max-width: 760px)"
+
+PAGE = f"""
+:root {{color-scheme: only light}}
+body {{margin: 0; background: #F3F5F7; font-family: system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif;
+  --design-primary-color: #0072B2}}
+{_NARROW} {{.bk-Tooltip {{left: 8px !important; max-width: calc(100vw - 32px) !important;
+  translate: 0 calc(50% + 14px)}}}}
 """
-"""Style of the whole page."""
+"""Style of the whole page, which browsers shall not darken: black curves would be lost. Tooltips, which would be cut
+beside their controls on a small screen, lie below them there."""
 
 CARD = """:host {background: white; border: 1px solid #DFE3E8; border-radius: 8px; padding: 10px 14px;
   box-sizing: border-box}"""
 """Style of a part of the page."""
-
-_NARROW = "@media (max-width: 760px)"
 
 SIDE = f"{CARD}\n{_NARROW} {{:host {{max-width: none !important}}}}"
 """Style of the controls, which are as wide as a small screen."""

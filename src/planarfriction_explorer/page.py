@@ -22,6 +22,7 @@ from planarfriction_explorer.live import Paced
 from planarfriction_explorer.map_view import MapView, legend
 from planarfriction_explorer.presets import PRESETS
 from planarfriction_explorer.scene_tab import SceneTab
+from planarfriction_explorer.section_view import SectionView
 from planarfriction_explorer.state import State
 
 FASTEST = 0.1
@@ -51,6 +52,7 @@ class Page:
         self.slow = Paced(self._show_slow)
         self.controls = Controls(self.state)
         self.map = MapView(self._dragged, self._released)
+        self.section = SectionView()
         self.ladder = LadderTab(lambda: self.state)
         self.scenes = SceneTab(lambda: self.state, self._try)
         self.surface = pn.pane.Plotly(
@@ -201,7 +203,7 @@ class Page:
     def _draw(self, drawing: Drawing, *, quick: bool = False) -> None:
         self.state = self.state.changed(drawing=drawing)
         self._redraw(quick=quick)
-        self._refresh()
+        self._refresh(quick=quick)
 
     # ------------------------------------------------------------------ showing
 
@@ -235,7 +237,7 @@ class Page:
         except FrictionError:
             self._figure = {}  # nothing presses: `_refresh` says so
 
-    def _refresh(self) -> None:
+    def _refresh(self, *, quick: bool = False) -> None:
         """Draw the pictures that depend on the twist, the load or the law."""
         begin = time.perf_counter()
         self.controls.show(self.state)
@@ -251,6 +253,7 @@ class Page:
             raise FrictionError("Nothing presses: paint with the brush, choose a patch or load a map.") from None
         finally:
             self.map.move(self.state, self.answer)
+            self.section.move(self.state, self.answer, quick=quick)
         self.slow.ask()
         self._follow_ladder()
         self.numbers.object = pictures.numbers_table(self.state, found, time.perf_counter() - begin)
@@ -280,10 +283,17 @@ class Page:
             self.controls.tool,
             pn.pane.Bokeh(self.map.figure, css_classes=["map"], sizing_mode="scale_width", aspect_ratio=1.0, margin=0),
             pn.pane.HTML(legend(), sizing_mode="stretch_width"),
+            self.section.layout,
             stylesheets=[looks.CARD],
             styles=looks.grows(330),
         )
-        space = pn.Column(self.numbers, self.grid, self.surface, stylesheets=[looks.CARD], styles=looks.grows(360))
+        space = pn.Column(
+            self.numbers,
+            self.grid,
+            self.surface,
+            stylesheets=[looks.CARD],
+            styles=looks.grows(360) | {"height": "auto"},
+        )
         main = pn.Column(
             pn.FlexBox(plane, space, gap="10px", align_items="stretch", stylesheets=[looks.FIRST]),
             self.tabs,

@@ -9,7 +9,7 @@ import numpy as np
 
 from planarfriction import geometry
 from planarfriction.errors import InvalidValueError
-from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceTable
+from planarfriction.limit_surface import LimitSurface, LimitSurfaceCells
 from planarfriction.plots.limit_surface import scaled_samples
 from planarfriction.plots.style import DISTRIBUTED, ELLIPSOID, EXACT
 from planarfriction_explorer import looks
@@ -25,6 +25,9 @@ ARROWS = 11
 
 POLAR, AZIMUTH = 37, 73
 """Points of the mesh of a limit surface: from pole to pole, and around."""
+
+RAYS, LEAST = 121, 1e-9
+"""Points of a section; friction, as a share of mu_c f_N, below which its direction is only rounding."""
 
 REACH = 0.4
 """Length of the arrow of a force of mu_c f_N, as a share of the width of the map."""
@@ -51,8 +54,8 @@ def slip_arrows(state: State) -> dict[str, list[float]]:
     chosen[(rows // 2) % step :: step, (columns // 2) % step :: step] = True
     points = drawing.grid.centres()[(chosen & (drawing.pressures > 0.0)).ravel()]
     velocity = geometry.twist_at(np.array(state.twist), points)[:, :2]
-    fastest = np.hypot(*velocity.T).max(initial=0.0)
-    ends = points + velocity * (step * drawing.cell_size / fastest if fastest > 0.0 else 0.0)
+    fastest = np.hypot(*velocity.T).max(initial=0.0) or 1.0
+    ends = points + step * drawing.cell_size * (velocity / fastest)
     return _arrows(points, ends)
 
 
@@ -86,6 +89,38 @@ def points_of_interest(state: State) -> dict[str, list[float]]:
     return {"x": [], "y": []} if centre is None else {"x": [MM * centre[0]], "y": [MM * centre[1]]}
 
 
+def section(surface: LimitSurface, angle: float) -> np.ndarray:
+    """Return points (force, torque) where a limit surface meets a plane, closed, `[M, 2]` [1, m], per unit `mu f_N`.
+
+    The plane holds torques about the centre of pressure and forces in the direction `angle` [rad]. Its rays W meet the
+    surface at `W/(-W . V)`, with V the twist of unit dissipation that `LimitSurface.twist` gives.
+    """
+    turn = np.linspace(0.0, 2.0 * np.pi, RAYS)
+    points = np.stack([np.cos(turn), surface.contact_radius * np.sin(turn)], axis=1)
+    rays = np.stack([np.cos(angle) * points[:, 0], np.sin(angle) * points[:, 0], points[:, 1]], axis=1)
+    rays = geometry.wrench_at(rays, -surface.centre_of_pressure)
+    return points / -np.einsum("ij,ij->i", rays, surface.twist(rays))[:, None]
+
+
+def section_lines(state: State, answer: Answer, *, quick: bool = False) -> tuple[float, dict[str, np.ndarray]]:
+    """Return the direction [deg] of the friction, 0 without a force, and the sections there, `[M, 2]` [N, N mm].
+
+    They are `surface`, `ellipsoid` and the single point `friction` of the law; `quick` as in `surface_figure`.
+    """
+    drawing, (fx, fy, torque) = state.drawing, answer.points[0]
+    force = np.hypot(fx, fy)
+    angle = np.arctan2(fy, fx) if force > LEAST else 0.0
+    lines = {"surface": section(_drawn(drawing, quick), angle), "ellipsoid": section(drawing.ellipsoid, angle)}
+    lines["friction"] = np.array([[force, torque * drawing.surface.contact_radius]])
+    strength = state.law.numbers.mu_c * state.normal_force
+    return float(np.degrees(angle)), {name: strength * points * [1.0, MM] for name, points in lines.items()}
+
+
+def _drawn(drawing: Drawing, quick: bool) -> LimitSurface:
+    """Return the surface to draw: the smooth table, or a sum over the cells while a brush moves."""
+    return LimitSurfaceCells(drawing.patch) if quick else drawing.table
+
+
 def surface_figure(state: State, *, quick: bool = False) -> dict[str, Any]:
     """Return the limit surface and ellipsoid in 3-D with the wrenches of the state, as a plotly figure of plain tables.
 
@@ -93,7 +128,7 @@ def surface_figure(state: State, *, quick: bool = False) -> dict[str, Any]:
     has lumps.
     """
     drawing = state.drawing
-    surface = (LimitSurfaceCells if quick else LimitSurfaceTable)(drawing.patch)
+    surface = _drawn(drawing, quick)
     polar, azimuth = np.linspace(0.0, np.pi, POLAR)[:, None], np.linspace(0.0, 2.0 * np.pi, AZIMUTH)[None]
     mesh = scaled_samples(surface, polar, azimuth)[1]
     rings = _wires(scaled_samples(drawing.ellipsoid, polar[::6], azimuth)[1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import html
 from collections.abc import Callable
 from typing import Any
@@ -10,7 +11,8 @@ import panel as pn
 
 from planarfriction.families import MODELS, SCENES
 from planarfriction.scenes import Scene
-from planarfriction_explorer.films import film, read_scene, ready_scene
+from planarfriction_explorer.controls import members
+from planarfriction_explorer.films import Watched, film, read_scene, ready_scene
 from planarfriction_explorer.live import Live, Task
 from planarfriction_explorer.state import State
 
@@ -21,17 +23,26 @@ _WORDS = (
 
 _FRAME = "width:100%;max-width:790px;aspect-ratio:790/560;min-height:350px;border:0"
 
+_PICTURE = "width:100%;min-width:640px;max-width:960px"  # small screens scroll: its letters stay legible
+
 
 class SceneTab:
-    """Tab with the choice of a scene to run, and its film."""
+    """Tab with the choice of a scene to run, its film and its time histories."""
 
     def __init__(self, state: Callable[[], State], attempt: Callable[[Callable[[], Any]], None]):
         self._state = state
         self._loaded: dict[str, Scene] = {}
         self._live = Live(failed=self._fail)
-        self.scene = pn.widgets.Select(label="Scene", options=list(SCENES), css_classes=["scene"], width=190)
+        self.scene = pn.widgets.Select(
+            label="Scene", options=list(SCENES), description=members(SCENES), css_classes=["scene"], width=190
+        )
         self.model = pn.widgets.Select(
-            label="Model", options=list(MODELS), value="reduced", css_classes=["model"], width=190
+            label="Model",
+            options=list(MODELS),
+            value="reduced",
+            description=members(MODELS),
+            css_classes=["model"],
+            width=190,
         )
         self.file = pn.widgets.FileInput(label="Scene file", accept="", css_classes=["scene-file"], width=300)
         self.button = pn.widgets.Button(label="Run", color="primary", css_classes=["run"], align="end", width=90)
@@ -75,11 +86,13 @@ class SceneTab:
 
         task.tell(self._show, film(scene, progress))
 
-    def _show(self, page: str) -> None:
+    def _show(self, run: Watched) -> None:
         self._rest("")
+        picture = f"data:image/png;base64,{base64.b64encode(run.histories).decode()}"
         self.result.object = (
             f"<iframe id='film' title='film of the scene' sandbox='allow-scripts' style='{_FRAME}' "
-            f'srcdoc="{html.escape(page)}"></iframe>'
+            f'srcdoc="{html.escape(run.film)}"></iframe><div style="overflow-x:auto">'
+            f"<img id='histories' alt='time histories of the scene' style='{_PICTURE}' src='{picture}'></div>"
         )
 
     def _fail(self, text: str) -> None:

@@ -26,7 +26,7 @@ class State:
     law: FrictionLaw = field(default_factory=lambda: LuGre(mu_s=1.2, elasto_plastic=0.9))
     """Friction law."""
     normal_force: float = 1.0
-    """Load [N]."""
+    """Load [N], which presses the patch."""
     twist: tuple[float, float, float] = (0.002, -0.008, 1.0)
     """Twist `(vx, vy, omega)` of the body at the origin of the contact frame [m/s, m/s, rad/s]."""
     mass: float = 0.05
@@ -72,7 +72,7 @@ class State:
         if omega == 0.0:
             return None
         x, y = 0.0 - vy / omega, vx / omega
-        return (x, y) if math.isfinite(x) and math.isfinite(y) else None
+        return (x, y) if math.isfinite(1e3 * x) and math.isfinite(1e3 * y) else None  # in mm too
 
 
 def law_parameters(law: Any) -> dict[str, float | None]:

@@ -185,6 +185,17 @@ def test_a_drag_gives_the_velocity_and_friction_points_against_it(visitor):
     assert friction[1] < -0.9 and abs(friction[0]) < 0.05
 
 
+def test_the_section_follows_the_friction_on_the_page(visitor):
+    visitor.after(lambda: visitor.choose("patch", "Circle"))
+    visitor.after(lambda: visitor.drag((0.0, 10.0), (3.0, 5.0), (5.0, -4.0)))
+    visitor.page.wait_for_timeout(500)
+    plot = """Bokeh.index.query_one((each) => each.model.name === "section").model.renderers"""
+    *curves, friction = visitor.page.evaluate(f"{plot}.map(({{data_source: {{data}}}}) => [data.force, data.torque])")
+    fx, fy, torque = visitor.numbers()[0]
+    assert np.ravel(friction) == pytest.approx([np.hypot(fx, fy), torque], abs=1e-4)  # four digits are shown
+    assert [np.max(each[0]) for each in curves] == pytest.approx([1.0, 1.0], abs=1e-3)  # N, of mu_c f_N
+
+
 def test_a_brush_paints_and_an_eraser_takes_away(visitor):
     visitor.after(lambda: visitor.choose("patch", "Circle"))
     visitor.tool("Eraser")
@@ -294,6 +305,7 @@ def test_a_scene_is_run_and_watched_while_the_page_goes_on(visitor):
     picture, slider = film.locator("img"), film.locator("input[type=range]")
     picture.wait_for(timeout=120_000)
     assert picture.evaluate("(each) => each.naturalWidth") > 500 and run.inner_text() == "Run"
+    assert visitor.page.locator("#histories").evaluate("(each) => each.naturalWidth") > 1000
     visitor.page.wait_for_timeout(1000)
     assert int(slider.input_value()) > 0  # it plays by itself
     film.get_by_title("Pause").click()
@@ -383,6 +395,9 @@ def test_a_phone_shows_the_pictures_then_the_controls_then_the_code(visitor):
     ]
     assert tops == sorted(tops) and tops[1] < 400.0
     assert visitor.page.evaluate("document.documentElement.scrollWidth") <= 400
+    visitor.page.locator(".mu_s .bk-description").hover()
+    tooltip = visitor.page.get_by_text("Static (breakaway) coefficient").bounding_box()
+    assert tooltip["x"] > 0.0 and tooltip["x"] + tooltip["width"] < 400.0
 
 
 def test_two_visitors_do_not_change_each_other(visitor, browser, address):

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from planarfriction.errors import FrictionError, InvalidValueError
-from planarfriction.laws import Dahl
+from planarfriction.laws import LAWS, Dahl
 from planarfriction.planning import holding_load
 from planarfriction_explorer.answers import answer
 from planarfriction_explorer.drawing import Drawing
@@ -111,6 +111,20 @@ def test_the_page_says_whether_a_part_is_held_with_its_mass_and_friction(page):
     assert "mass must be &gt; 0" in page.message.object
 
 
+def test_each_control_says_what_it_is_in_the_unit_of_its_label(page):
+    rows = page.controls.layout().select(pn.Row)
+    icons = {row[0]: row[1].value for row in rows if isinstance(row[1], pn.widgets.TooltipIcon)}
+    found = [each for name, each in vars(page.controls).items() if isinstance(each, pn.widgets.base.Widget)]
+    for kind in LAWS:
+        page.controls.law.value = kind
+        found += page.controls.parameters
+    for each in [*found, page.scenes.scene, page.scenes.model]:
+        words = getattr(each, "description", None) or icons[each]
+        unit = re.search(r"\[[^]]+\]", each.label or "")
+        assert len(words) > 5 and (unit is None or unit[0] in words), each.label
+    assert "Stribeck speed [m/s]" in {each.label: each.description for each in found if each.tags}["v_s [m/s]"]
+
+
 OTHER = State(Drawing(np.ones((2, 3)), 2e-3), Dahl(mu_c=0.3), 2.5, (0.01, -0.02, 3.0), 0.0703, -0.004)
 
 
@@ -194,9 +208,9 @@ def test_an_empty_map_leaves_no_numbers_of_another_one(page):
     page.controls.clear.clicks += 1
     assert "Nothing presses" in page.message.object and page.controls.tool.value == "brush"
     assert page.numbers.object == page.grid.object == page.python.value == ""
-    assert not page.surface.visible
+    assert not page.surface.visible and not page.section.layout.visible
     page.controls.patch.value = "Line"
-    assert shown(page).any() and page.surface.visible and "'Line'" in page.python.value
+    assert shown(page).any() and page.surface.visible and page.section.layout.visible and "'Line'" in page.python.value
     assert str(page.state.drawing.patch.grid_error()) in page.grid.object
 
 

@@ -152,6 +152,21 @@ def test_at_rest_nothing_is_said_and_nothing_fails():
     assert not found.friction.any() and not found.points.any() and found.angle_error == 0.0
 
 
+@pytest.mark.parametrize("load", [5e-324, 1e-320, 1e50])
+def test_any_load_has_the_same_points_and_the_models_the_same_errors(load):
+    one, other = answer(State()), answer(State(normal_force=load))
+    np.testing.assert_array_equal(other.points, one.points)
+    np.testing.assert_allclose(other.friction, load * one.friction, rtol=1e-12, atol=1e-323)  # 5e-324 is the last digit
+    assert other.force_error == one.force_error and all(each.error < 1.0 for each in climb(State(normal_force=load)))
+
+
+def test_what_hardly_moves_rubs_as_what_moves_slowly():
+    tiny = State(Drawing.published("Circle"), pf.Dahl(mu_c=0.5), twist=(5e-324, 0.0, 0.0))
+    np.testing.assert_allclose(answer(tiny).friction, [-0.5, 0.0, 0.0], atol=1e-15)
+    assert pictures.slip_arrows(tiny) == pictures.slip_arrows(tiny.changed(twist=(1e-3, 0.0, 0.0)))
+    assert State(twist=(0.01, 0.0, 1e-310)).centre_of_rotation is None
+
+
 def test_what_does_not_press_has_no_answer():
     with pytest.raises(InvalidValueError, match="have a total > 0"):
         answer(State(drawing=State().drawing.cleared()))
@@ -194,6 +209,44 @@ def test_moving_the_twist_leaves_the_drawn_surface_as_it_is():
     assert all(one is other for one, other in zip(figure["data"][:2], moved["data"][:2], strict=True))
     for trace, point in zip(moved["data"][2:], answer(state).points, strict=True):
         assert [trace[axis][1] for axis in "xyz"] == pytest.approx(point.tolist())
+
+
+def test_the_section_of_a_disc_ends_at_its_force_and_its_torque():
+    surface = pf.LimitSurfaceExact(pf.ContactPatch.disc(0.01))
+    for angle in (0.0, 0.7):  # as a disc has no direction
+        right, top, left, bottom = pictures.section(surface, angle)[:-1:30]
+        torque = 0.01 * 2.0 / 3.0  # of an even pressure
+        np.testing.assert_allclose([right, left], [[1.0, 0.0], [-1.0, 0.0]], atol=1e-5)  # sums over 0.01 mm
+        np.testing.assert_allclose([top, bottom], [[0.0, torque], [0.0, -torque]], rtol=1e-4, atol=1e-6)
+
+
+def test_every_point_of_a_section_lies_on_its_surface():
+    patch, angle = pf.patch.PUBLISHED_PATCHES["NonConvex2"](), 0.4
+    ellipsoid = pf.LimitSurfaceEllipsoid(patch)
+    force, torque = pictures.section(ellipsoid, angle).T
+    np.testing.assert_allclose(force**2 + (torque / patch.contact_radius()) ** 2, 1.0, rtol=1e-12)
+    surface = pf.LimitSurfaceExact(patch)
+    force, torque = pictures.section(surface, angle).T
+    wrenches = np.stack([force * np.cos(angle), force * np.sin(angle), torque], axis=1)
+    wrenches = pf.geometry.wrench_at(wrenches, -surface.centre_of_pressure)
+    apart = wrenches - surface.wrench(surface.twist(wrenches))
+    np.testing.assert_allclose(apart / [1.0, 1.0, patch.contact_radius()], 0.0, atol=1e-5)  # `CERTIFIED`
+
+
+@pytest.mark.parametrize("twist", [(0.01, -0.02, 1.0), (0.0, 0.0, 2.0), (0.0, 0.0, 0.0)])
+def test_the_friction_lies_in_the_section_in_its_units(twist):
+    state = State(Drawing.published("Circle"), pf.Dahl(mu_c=0.5), 4.0, twist)
+    found = answer(state)
+    angle, lines = pictures.section_lines(state, found)
+    fx, fy, tau = found.friction
+    force, torque = lines["friction"][0]
+    assert (force, torque) == pytest.approx((np.hypot(fx, fy), 1e3 * tau), abs=1e-12)
+    assert angle == pytest.approx(np.degrees(np.arctan2(fy, fx)) if twist[0] else 0.0)
+    for name in ("surface", "ellipsoid"):
+        assert lines[name].max(axis=0) == pytest.approx([2.0, 2e3 * state.drawing.patch.contact_radius()], rel=6e-3)
+    if any(twist):  # Coulomb friction lies on the curve, but for the sum over the cells
+        scale = [2.0, 2e3 * state.drawing.patch.contact_radius()]
+        assert np.linalg.norm((lines["surface"] - lines["friction"]) / scale, axis=1).min() < 0.03
 
 
 # ---------------------------------------------------------------------- code
@@ -282,13 +335,14 @@ def test_a_scene_is_run_with_the_contact_on_the_screen():
         ready_scene(state, "free-slide", "reduce")
 
 
-def test_a_film_is_one_file_with_a_player_and_can_be_cancelled(monkeypatch):
+def test_a_film_is_one_file_beside_its_histories_and_can_be_cancelled(monkeypatch):
     monkeypatch.setattr(films, "DPI", 20.0)  # quick to draw
     scene = ready_scene(State(Drawing.published("Line")), "free-slide", "reduced")
     told: list[tuple[str, float]] = []
-    page = film(scene, lambda doing, share: told.append((doing, share)))
+    page, histories = film(scene, lambda doing, share: told.append((doing, share)))
     assert page.count("data:image/png;base64") >= 75 and "anim-slider" in page and "http" not in page
     assert {doing for doing, _ in told} == {"simulating", "drawing"} and told[-1][1] == pytest.approx(1.0)
+    assert histories == pf.plots.plot_histories(pf.simulate(scene))._repr_png_()
 
     def stop(doing: str, share: float) -> None:
         if doing == "drawing":

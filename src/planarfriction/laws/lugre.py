@@ -76,7 +76,8 @@ class LuGre(FrictionLaw):
     gamma: float = checked(validation.positive, default=2.0)
     """Stribeck exponent [-]."""
     elasto_plastic: ElastoPlastic | float | None = checked(_elasto_plastic, default=None)
-    """Elasto-plastic extension, None for plain LuGre; a number is taken as the breakaway ratio of `ElastoPlastic`."""
+    """Elasto-plastic extension, None for plain LuGre; a number is the breakaway ratio [-] of `ElastoPlastic`: bristles
+    deflected less than this share of their maximum do not slip."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
