@@ -113,8 +113,8 @@ def times() -> None:
         print(f"{name}: pointer to numbers {shares[-1].round()}, server {np.percentile(server, (50, 95)).round()} ms")
     median, most = np.max(shares, axis=0)
     words = (
-        f"The numbers follow the pointer after {median:.0f} ms (median; 95 % within {most:.0f} ms), in Chromium without a\n"
-        "graphics processor."
+        f"The numbers follow the pointer after {median:.0f} ms (median; 95 % within {most:.0f} ms),\n"
+        "in Chromium without a graphics processor."
     )
     path = DOCS / "pictures.md"
     pattern = r"(<!-- times -->\n\n).*?(?=\n\n|\Z)"
