@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.compiler import threads
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.pictures import picture
@@ -164,33 +165,38 @@ class _ProfileSearch:
 
         Minus what the search makes least; far less without such a profile.
         """
+        found = threads.each(lambda level: self._released(level, kick, hold), LEVELS)
+        self._reached = max(reached for reached, _ in found)
+        profiles = [values for _, values in found if values is not None]
+        if not profiles:
+            return -np.inf
+        costs = threads.each(lambda values: float((self._residuals(values) ** 2).sum()), profiles)
+        best = int(np.argmin(costs))
+        self._values = profiles[best]
+        return -0.5 * costs[best]
+
+    def _released(self, level: float, kick: float, hold: float) -> tuple[float, np.ndarray | None]:
+        """Return the share of the goal that a release at one level reaches at most, and its knots if it reaches it."""
         from scipy.optimize import brentq
 
-        found, times = [], self._times
+        times, first = self._times, np.array([min(level, kick), level]) * self._holding
+        first = first if self._first is None else np.append(self._first, first)
         rise = float(np.diff(times).max())
-        for level in LEVELS:
-            first = np.array([min(level, kick), level]) * self._holding
-            first = first if self._first is None else np.append(self._first, first)
-            low = np.interp(times, times[0] + rise * np.arange(len(first)), first)
+        low = np.interp(times, times[0] + rise * np.arange(len(first)), first)
 
-            def released(until: float, low: np.ndarray = low) -> np.ndarray:
-                """Return the values of a profile that stays `low` until some time, and then holds."""
-                return self._inside(low + (hold - low) * np.interp(times, [until, until + rise], [0.0, 1.0]))
+        def released(until: float) -> np.ndarray:
+            """Return the values of a profile that stays low until some time, and then holds."""
+            return self._inside(low + (hold - low) * np.interp(times, [until, until + rise], [0.0, 1.0]))
 
-            def missing(until: float, released: Any = released) -> float:
-                (end,) = self._grips.ends(self._signal(released(until)), [1.0])
-                return self._aim.progress(end) - 1.0
+        def missing(until: float) -> float:
+            (end,) = self._grips.ends(self._signal(released(until)), [1.0])
+            return self._aim.progress(end) - 1.0
 
-            earliest, latest = float(times[0]) - rise, float(times[-1]) - rise
-            most = missing(latest)
-            self._reached = max(self._reached, most + 1.0)
-            if most > 0.0:
-                values = released(float(brentq(missing, earliest, latest, xtol=1e-4)))  # pyright: ignore
-                found.append((-0.5 * float((self._residuals(values) ** 2).sum()), values))
-        if not found:
-            return -np.inf
-        best, self._values = max(found, key=lambda each: each[0])
-        return best
+        earliest, latest = float(times[0]) - rise, float(times[-1]) - rise
+        most = missing(latest)
+        if most <= 0.0:
+            return most + 1.0, None
+        return most + 1.0, released(float(brentq(missing, earliest, latest, xtol=1e-4)))  # pyright: ignore
 
     def bent(self) -> Signal:
         """Return the profile after a search that begins at that of the start."""

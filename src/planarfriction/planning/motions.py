@@ -80,7 +80,13 @@ class Grips:
         held = scene.start == "equilibrium"
         self.first = float(scene.contacts[contact].normal_force(0.0)) if held else None
         """Normal force that holds the body at first [N]; None where it may be any."""
-        self.simulations = self.jacobians = 0
+        self._simulated: list[int] = []  # of several threads
+        self.jacobians = 0
+
+    @property
+    def simulations(self) -> int:
+        """Number of simulations so far."""
+        return sum(self._simulated)
 
     def scene_of(self, profile: Signal, factor: float = 1.0) -> Scene:
         """Return the scene with the profile in place."""
@@ -90,7 +96,7 @@ class Grips:
 
     def ends(self, profile: Signal, factors: Sequence[float], rtol: float | None = TIGHT) -> list[np.ndarray]:
         """Return the end `[6]` of the motion under each friction."""
-        self.simulations += len(factors)
+        self._simulated.append(len(factors))
 
         def one(factor: float) -> np.ndarray:
             scene = self.scene_of(profile, factor)
