@@ -37,14 +37,14 @@ def answer(state: State) -> Answer:
     scale = np.array([1.0, 1.0, surface.contact_radius])
     units = np.stack([steady_wrench(state) / mu_c, surface.wrench(twist), ellipsoid.wrench(twist)])
     points = geometry.wrench_at(units, surface.centre_of_pressure) / scale
-    wrenches = mu_c * state.normal_force * units  # last: under a load near 5e-324 N all of them are 0
+    friction, of_surface, of_ellipsoid = mu_c * state.normal_force * units  # last: 0 under a load near 5e-324 N
     angle = 0.0
     if units[1].any():
         both = np.stack([twist, ellipsoid.twist(units[1])])
         here, there = geometry.twist_at(both, surface.centre_of_pressure) * scale
         angle = float(np.degrees(np.arctan2(np.linalg.norm(np.cross(here, there)), here @ there)))
     error = float(np.linalg.norm(points[2] - points[1]))
-    return Answer(*wrenches, points, error, angle, float(-wrenches[0] @ twist))
+    return Answer(friction, of_surface, of_ellipsoid, points, error, angle, float(-friction @ twist))
 
 
 def steady_wrench(state: State) -> np.ndarray:
