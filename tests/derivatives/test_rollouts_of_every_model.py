@@ -77,7 +77,7 @@ def distributed(patch: pf.ContactPatch, law: str, speed: str = "around") -> Case
     return Case(lambda: pf.DistributedModel(patch, LAWS[law]), SPEEDS[speed])
 
 
-MANY = pf.ContactPatch.disc(0.01, cells=5)
+MANY = pf.ContactPatch.disc(0.01, cells=9)
 """More cells than one block of compiled roll-outs holds."""
 
 FIXED = {
