@@ -464,7 +464,7 @@ def test_bench_prints_json_and_nothing_else(capsys, measured):
 def test_bench_prints_a_table(capsys, measured):
     assert main(["bench"]) == 0
     rows = table_rows(capsys.readouterr().out)
-    assert rows == [["import", "0.1", "s"], ["table.build", "0.004", "s", "published", "0.4", "0.01"]]
+    assert rows == [["import", "0.1 s"], ["table.build", "0.004 s", "0.4 s", "0.01", "published"]]
     assert measured == [(None, False)]
 
 

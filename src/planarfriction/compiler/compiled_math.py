@@ -27,7 +27,7 @@ _inline = njit(
 _LOG2_E = 1.4426950408889634
 _LN2_HIGH = 6.93147180369123816490e-01  # the first 33 bits of ln 2: k * _LN2_HIGH is exact
 _LN2_LOW = 1.90821492927058770002e-10
-_SHIFT = 1.5 * 2.0**52  # the sum with it rounds to an integer, which stands in the last bits
+_SHIFT = 1.5 * 2.0**52  # a sum with it has no digits behind the point
 _EXP_LARGEST = 708.0  # beyond it the result leaves the range of normal doubles
 
 
@@ -88,11 +88,20 @@ def in_order(x):
 
 
 @_inline
+def rounded(x):
+    """Return the integer k that is nearest to a number below 1000, and `2^k`.
+
+    k stands in the last bits of a sum: processors before AVX-512 have no vector code that makes integers of doubles.
+    """
+    shifted = x + _SHIFT
+    return shifted - _SHIFT, _bits_to_float((_float_to_bits(shifted) + 1023) << 52)
+
+
+@_inline
 def exp(x):
     """Return `e^x`, relative error below 6e-16, argument limited to +-708."""
     x = minimum(maximum(x, -_EXP_LARGEST), _EXP_LARGEST)
-    shifted = x * _LOG2_E + _SHIFT  # processors before AVX-512 have no vector code that makes integers of doubles
-    k = shifted - _SHIFT
+    k, scale = rounded(x * _LOG2_E)
     r = (x - k * _LN2_HIGH) - k * _LN2_LOW
     r2 = r * r
     r4 = r2 * r2
@@ -101,7 +110,7 @@ def exp(x):
     high = (1.0 / 40320.0 + r * (1.0 / 362880.0)) + r2 * (1.0 / 3628800.0 + r * (1.0 / 39916800.0))
     highest = 1.0 / 479001600.0 + r * (1.0 / 6227020800.0)
     p = (low + r4 * middle) + (r4 * r4) * (high + r4 * highest)
-    return p * _bits_to_float((_float_to_bits(shifted) + 1023) << 52)
+    return p * scale
 
 
 @_inline

@@ -51,6 +51,12 @@ def _put(row: Any, numbers: tuple) -> None:
         row[i] = number
 
 
+def _rounded(x: Any) -> tuple[Any, Any]:
+    """Return what `compiled_math.rounded` does, in a form that compilers may reorder."""
+    k = CompiledMathematics.floor(x + 0.5)
+    return k, CompiledMathematics.of_bits((CompiledMathematics.wide(k) + 1023) << 52)
+
+
 def _placed(a: Any, i: int, x: Any) -> tuple:
     return tuple(x if j == i else 0.0 for j in range(len(a)))
 
@@ -104,8 +110,7 @@ _TWINS: dict[int, Any] = {
         (compiled_math, CompiledMathematics),
         (compiled_math.minimum, Mathematics.minimum),
         (compiled_math.maximum, Mathematics.maximum),
-        (compiled_math._bits_to_float, CompiledMathematics.of_bits),
-        (compiled_math.types.int64, CompiledMathematics.wide),
+        (compiled_math.rounded, _rounded),
         (math, Mathematics),
         (np, Mathematics),
         (vectors.dot, _dot),

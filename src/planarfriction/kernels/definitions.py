@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ast
 import functools
+import inspect
 import linecache
+import textwrap
 from collections.abc import Callable
 
 
@@ -16,13 +18,14 @@ def _definitions(source: str) -> dict[int, ast.FunctionDef]:
 
 
 def definition_of(function: Callable) -> ast.FunctionDef:
-    """Return the syntax tree of a function, not to be changed.
+    """Return the syntax tree of a function, not to be changed, with the numbers of its lines in the file.
 
     Raises OSError if its source is not to be had.
     """
     code = function.__code__
+    lines = linecache.getlines(code.co_filename, function.__globals__)
     try:
-        lines = linecache.getlines(code.co_filename, function.__globals__)
         return _definitions("".join(lines))[code.co_firstlineno]
-    except (KeyError, SyntaxError) as error:
-        raise OSError(f"no source of {function.__qualname__} in {code.co_filename}") from error
+    except (KeyError, SyntaxError):  # part of a file of another kind
+        (definition,) = ast.parse(textwrap.dedent(inspect.getsource(function))).body
+        return ast.increment_lineno(definition, code.co_firstlineno - 1)  # type: ignore[return-value]

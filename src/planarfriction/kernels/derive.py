@@ -381,12 +381,8 @@ def derive(
     return Derivative(walk.function, tuple(walk.arguments), by, vectors, kinds, source, forward, backward)
 
 
-_NAME = re.compile(r"(?<![.\w])[A-Za-z_]\w*")
-"""A name, but not that of a field."""
-
-
 def _names(text: str) -> set[str]:
-    return set(_NAME.findall(text))
+    return set(re.findall(r"(?<![.\w])[A-Za-z_]\w*", text))  # but not those of fields
 
 
 def text_of(head: str, lines: list[str]) -> str:

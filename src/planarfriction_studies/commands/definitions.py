@@ -80,7 +80,7 @@ def bench(only: tuple[str, ...], full: bool, rounds: int | None, old: Path | Non
         shown = lambda value, unit="": "" if value is None else f"{value:.4g} {unit}".strip()  # noqa: E731
         rows = [
             [each.name, *(shown(value, each.unit) for value in (each.value, each.baseline_value)), shown(each.ratio),
-             each.baseline]
+             each.baseline or ""]
             for each in lines
         ]  # fmt: skip
         print_table("Benchmarks", ["name", "cost", "of the baseline", "ratio", "baseline"], rows, width=WIDEST)
