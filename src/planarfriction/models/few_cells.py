@@ -38,10 +38,14 @@ ROUNDS = 10
 INDEPENDENT = 1e-10
 """Relative singular value below which sums over the few cells count as dependent."""
 
+REMEMBERED = 8
+"""Patches whose few cells are kept for models with other laws: choosing cells takes longer than a short run."""
+
 LEAST = 0.05
 """Share of itself down to which a share may fall in a round that others leave negative."""
 
 
+@functools.lru_cache(REMEMBERED)
 def few_cells(patch: ContactPatch, cells: int) -> ContactPatch:
     """Return a patch of about `cells` cells that stand for all of `patch` (see `ContactPatch.compressed`).
 
