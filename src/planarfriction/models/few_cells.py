@@ -45,7 +45,6 @@ LEAST = 0.05
 """Share of itself down to which a share may fall in a round that others leave negative."""
 
 
-@functools.lru_cache(REMEMBERED)
 def few_cells(patch: ContactPatch, cells: int) -> ContactPatch:
     """Return a patch of about `cells` cells that stand for all of `patch` (see `ContactPatch.compressed`).
 
@@ -53,8 +52,12 @@ def few_cells(patch: ContactPatch, cells: int) -> ContactPatch:
     of a patch whose shape depends on the load are more than that, chosen at several loads; if they do not share
     one friction, all are kept.
     """
-    if patch.cells <= cells:
-        return patch
+    return patch if patch.cells <= cells else _fewer(patch, cells)
+
+
+@functools.lru_cache(REMEMBERED)
+def _fewer(patch: ContactPatch, cells: int) -> ContactPatch:
+    """Return the few cells of a patch that has more."""
     kinds = _kinds(patch)
     if patch.depends_on_load:
         return _by_load(patch, OF_ALL_LOADS * cells) if kinds.max() == 0 else patch
