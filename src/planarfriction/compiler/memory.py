@@ -99,8 +99,7 @@ def _plan(record: Any) -> tuple[tuple[str, int, bool, np.dtype | None], ...]:
 
 def _write(row: np.ndarray, record: Any) -> None:
     at, integers = 0, row.view(np.int64)
-    for name, words, integer, dtype in _plan(type(record)):
-        value = getattr(record, name)
+    for (name, words, integer, dtype), value in zip(_plan(type(record)), record, strict=True):
         if words:
             _write(row[at : at + words], value)
             at += words
