@@ -431,8 +431,8 @@ def test_an_executor_that_dies_is_an_error_in_one_line(tmp_path):
         pf.sweep(grip, {"grip": GRIPS}, executor=pool)
 
 
-def test_runs_with_other_laws_patches_and_loads_are_those_that_each_scene_has_alone():
-    """What is kept from run to run belongs to the run that uses it."""
+def test_a_run_is_what_its_scene_gives_alone():
+    """Parts that are kept from run to run belong to the run that uses them."""
 
     def make(mu: float, size: float, load: float) -> pf.Scene:
         model = pf.ReducedModel(pf.ContactPatch.disc(size, cells=11), pf.LuGre(mu_c=mu, mu_s=1.2 * mu))
