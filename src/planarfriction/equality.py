@@ -6,6 +6,7 @@ The `==` of Python's own dataclasses and named tuples raises for arrays; their `
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
@@ -27,15 +28,21 @@ def checked(check: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
     return dataclasses.field(metadata={"check": (check, arguments)}, **options)
 
 
+@functools.cache
+def _checks(kind: Any) -> list[tuple[str, bool, Any]]:
+    """Return the fields of a record that are checked, whether each may be None, and its check with arguments."""
+    fields = [each for each in dataclasses.fields(kind) if "check" in each.metadata]
+    return [(each.name, each.default is None, each.metadata["check"]) for each in fields]
+
+
 class Checked:
     """Base of frozen dataclasses whose fields are checked and converted when a record is made (see `checked`)."""
 
     def __post_init__(self) -> None:
-        for each in dataclasses.fields(self):  # pyright: ignore[reportArgumentType]
-            value = getattr(self, each.name, None)
-            if "check" in each.metadata and not (value is None and each.default is None):
-                check, arguments = each.metadata["check"]
-                self._set(**{each.name: check(each.name, value, *arguments)})
+        for name, optional, (check, arguments) in _checks(type(self)):
+            value = getattr(self, name, None)
+            if not (value is None and optional):
+                object.__setattr__(self, name, check(name, value, *arguments))
 
     def _set(self, **values: Any) -> None:
         """Set fields of a record that is being made; later it is frozen."""

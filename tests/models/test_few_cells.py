@@ -78,6 +78,20 @@ def test_a_patch_of_few_cells_is_itself():
     assert model.reduction.patch is patch and model.state_shape == (2, 3)
 
 
+def test_cells_are_chosen_once_for_equal_patches_and_anew_for_others():
+    few, again = few_cells(DISC, 40), pf.ContactPatch.disc(0.01)
+    assert few_cells(again, 40) is few and pf.ReducedModel(again, LAW, cells=40).reduction.patch is few
+    others = [
+        pf.ContactPatch.disc(np.nextafter(0.01, 1.0)),
+        pf.ContactPatch.disc(0.01, name="another disc"),
+        pf.ContactPatch.disc(0.01, pressure=pf.LinearGradient((1e-6, 0.0))),
+        DISC.with_friction_metric(np.diag([1.0, 2.0])),
+    ]
+    for other in others:
+        assert few_cells(other, 40) != few and few_cells(other, 40).name == other.name
+    assert few_cells(DISC, 41) is not few
+
+
 # ---------------------------------------------------------------------- the model
 
 

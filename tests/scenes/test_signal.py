@@ -133,6 +133,11 @@ def test_signals_are_immutable_and_compare_by_content():
     assert hash(signal) == hash(same)
     assert signal != Signal.sampled([0, 1], [1, 2], hold="linear")
     assert hash(Signal.constant(0.0)) == hash(Signal.constant(-0.0))  # equal, so equal hashes
+    assert signal.breaks.tolist() == [1.0]
+    with pytest.raises(ValueError, match="read-only"):
+        signal.breaks[0] = 3.0
+    assert dataclasses.replace(signal, values=[2.0, 2.0]).breaks.tolist() == []
+    assert dataclasses.replace(signal, hold="linear").breaks.tolist() == [0.0, 1.0]
 
 
 @given(

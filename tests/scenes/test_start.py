@@ -74,7 +74,7 @@ def test_contacts_share_the_load_by_their_stiffness():
 def test_no_bristle_is_bent_further_than_it_can_be():
     """Near the limit the outer cells of the patch are at `mu_s / sigma_0`, the inner ones below, and all balances."""
     scene = held(pf.DistributedModel(PATCH, LAW), load=2.6)
-    (state,) = first_states(scene, np.array([2.6])) or []
+    (state,) = first_states(scene, np.array([2.6]))
     length = np.hypot(*state)
     largest = LAW.mu_s / LAW.sigma_0
     assert length.max() <= largest * (1 + 1e-12)

@@ -6,6 +6,7 @@ import concurrent.futures
 import dataclasses
 import functools
 import importlib.util
+import itertools
 import json
 import linecache
 import multiprocessing
@@ -157,8 +158,14 @@ def test_equal_scenes_are_one_run_and_others_are_others():
         dataclasses.replace(scene, save_every=0.02),
         pf.scenes.in_hand(law, normal_force=2.0, t_end=0.03),
         pf.scenes.in_hand(pf.DistributedModel(PATCH, LAW), normal_force=2.0, t_end=0.03),
+        *(
+            pf.scenes.in_hand(dataclasses.replace(MODEL, patch=patch), normal_force=2.0, t_end=0.03)
+            for patch in (pf.ContactPatch.disc(0.01 + 1e-15, cells=7), pf.ContactPatch.disc(0.01, cells=7, name="pad"))
+        ),
     ]
-    assert len({digest(scene), *map(digest, others)}) == 6
+    one = keys.Keys(None, kept=False)  # which has the digests of earlier parts
+    for found in (set(map(digest, [scene, *others])), set(map(one.key, [scene, *others, scene]))):
+        assert len(found) == 8
     assert digest(scene, end) != digest(scene)
 
 
@@ -422,6 +429,23 @@ def test_an_executor_that_dies_is_an_error_in_one_line(tmp_path):
         pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=leave, out=tmp_path)
     with pytest.raises(SweepError, match="the executor ended"):  # it takes no more
         pf.sweep(grip, {"grip": GRIPS}, executor=pool)
+
+
+def test_a_run_is_what_its_scene_gives_alone():
+    """Parts that are kept from run to run belong to the run that uses them."""
+
+    def make(mu: float, size: float, load: float) -> pf.Scene:
+        model = pf.ReducedModel(pf.ContactPatch.disc(size, cells=11), pf.LuGre(mu_c=mu, mu_s=1.2 * mu))
+        return pf.scenes.in_hand(model, normal_force=pf.Signal([0.0, 0.015], [load, 0.5 * load]), t_end=0.03)
+
+    values = {"mu": [0.6, 0.9], "size": [0.01, 0.012], "load": [2.0, 3.0]}
+    swept, seen = pf.sweep(make, values), set()
+    for mu, size, load in itertools.product(*values.values()):
+        scene = pf.Scene.from_dict(make(mu, size, load).to_dict())
+        alone = pf.simulate(scene).histories["y"].values
+        assert (swept.y.sel(mu=mu, size=size, load=load).values == alone).all()
+        seen.add(alone.tobytes())
+    assert len(seen) == 8
 
 
 def test_models_are_built_once_for_equal_scenes():

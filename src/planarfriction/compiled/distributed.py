@@ -91,6 +91,8 @@ class CompiledDistributed(CompiledModel):
 
     def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
         """See `CompiledModel`; only cells that carry load at one of the loads have bristles."""
+        if len(loads) == 1 and loads[0] is None:
+            return self._at_any_load
         if between is None:
             weights = np.atleast_2d([self.patch.weights(load) for load in loads])
             chosen = weights.max(axis=0) > 0.0
@@ -98,6 +100,12 @@ class CompiledDistributed(CompiledModel):
         chosen = self.patch.pressure.ever_loaded(self.patch.positions, between)
         most = max(int(packed.MAX_PACK_BYTES / (8.0 * chosen.sum())), 1)
         return self._packed(np.array([self.patch.weights(load)[chosen] for load in loads[:most]]), chosen)
+
+    @functools.cached_property
+    def _at_any_load(self) -> PackedModel:
+        """The cells that carry load, on a patch that ignores how much."""
+        weights = self.patch.weights()
+        return self._packed(weights[None, weights > 0.0], weights > 0.0)
 
     def packed_parts(self, loads: Sequence[float | None]) -> PackedParts:
         """See `CompiledModel`."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import address_of, call
-from planarfriction.compiler.memory import Doubles, Integers, Layout, Packed, at, exists, reader
+from planarfriction.compiler.memory import Doubles, Integers, Packed, at, exists, layout, reader
 from planarfriction.kernels.contacts import (
     BACK_SUBSTITUTE,
     CALLS,
@@ -128,13 +128,13 @@ class System(Packed):
         self, contacts: Contacts, motion: Motion, keepalive: tuple[np.ndarray, ...] = (), pressures: int = 0
     ) -> None:
         n, square = len(contacts.count), (3, 3)
-        layout = Layout(
+        work = layout(
             Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=3, stiffness=square,
             matrix=square, inverse=square, to_pose=square, body=3, rows=(4, 3), moved=(n, 8),
         )  # fmt: skip
         addresses = [address_of(*each) for each in BODY_FUNCTIONS]
         sizes = n, int(contacts.state[n]), pressures, len(motion.breaks) - 1
-        super().__init__(SystemRecord(contacts, motion, layout.made(), *sizes, *addresses))
+        super().__init__(SystemRecord(contacts, motion, work.made(), *sizes, *addresses))
         self.contacts, self.motion, self.work, self.keepalive = contacts, motion, self.record.work, keepalive
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import address_of, call
-from planarfriction.compiler.memory import Layout, Packed, at, exists
+from planarfriction.compiler.memory import Packed, at, exists, layout
 from planarfriction.kernels.body import BODY_FUNCTIONS, System, load_of, maps_of, place_at, read
 from planarfriction.kernels.contacts import contact_map
 from planarfriction.kernels.integration import Method, Output, Progress, RunRecord, Stages, combine, read_run
@@ -331,7 +331,7 @@ class Run(Packed):
     ) -> None:
         n, s = len(progress.y), len(method.m)
         shapes = dict.fromkeys(Stages._fields, n) | {"k": (s, n), "time_slope": 3, "coupling": s, "verdict": 2}
-        stages, sizes = Layout(Stages, **shapes).made(), (n, s, len(method.dense), len(output.time))
+        stages, sizes = layout(Stages, **shapes).made(), (n, s, len(method.dense), len(output.time))
         atol = np.ascontiguousarray(atol, dtype=float)
         addresses = [address_of(*each) for each in (COMBINE, ATTEMPT)]
         addresses.append(address_of(at_rest, "ppf") if system.motion.stop_speed > 0.0 else 0)

@@ -38,6 +38,9 @@ ROUNDS = 10
 INDEPENDENT = 1e-10
 """Relative singular value below which sums over the few cells count as dependent."""
 
+REMEMBERED = 8
+"""Patches whose few cells are kept for models with other laws: choosing cells takes longer than a short run."""
+
 LEAST = 0.05
 """Share of itself down to which a share may fall in a round that others leave negative."""
 
@@ -49,8 +52,12 @@ def few_cells(patch: ContactPatch, cells: int) -> ContactPatch:
     of a patch whose shape depends on the load are more than that, chosen at several loads; if they do not share
     one friction, all are kept.
     """
-    if patch.cells <= cells:
-        return patch
+    return patch if patch.cells <= cells else _fewer(patch, cells)
+
+
+@functools.lru_cache(REMEMBERED)
+def _fewer(patch: ContactPatch, cells: int) -> ContactPatch:
+    """Return the few cells of a patch that has more."""
     kinds = _kinds(patch)
     if patch.depends_on_load:
         return _by_load(patch, OF_ALL_LOADS * cells) if kinds.max() == 0 else patch

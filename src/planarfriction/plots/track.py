@@ -101,7 +101,7 @@ def _first(solution: pf.Solution) -> list[tuple[pf.DistributedModel, np.ndarray]
     contacts = [replace(each, model=model) for each, model in zip(scene.contacts, known, strict=True)]
     loads = np.asarray(solution.histories["normal_force"].values, dtype=float)[0]
     states = first_states(replace(scene, contacts=contacts), loads)
-    return list(zip(known, states or [], strict=True))
+    return list(zip(known, states, strict=True))
 
 
 def contact_poses(contact: pf.Contact, times: np.ndarray, poses: np.ndarray) -> np.ndarray:

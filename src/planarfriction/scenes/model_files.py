@@ -7,6 +7,7 @@ parameters of what makes the member.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import inspect
 from collections.abc import Callable
 from typing import Any
@@ -24,19 +25,22 @@ _GIVEN = ("patch", "law")
 _MISSING = object()
 
 
-def model_to_dict(model: Any) -> dict[str, Any]:
-    """Return `{"model": ..., "patch": ..., "law": ...}` of a model, as numbers, texts, lists and tables."""
+def model_to_dict(model: Any, of_patch: Callable[[Any], Any] = lambda patch: patch.to_dict()) -> dict[str, Any]:
+    """Return `{"model": ..., "patch": ..., "law": ...}` of a model, as numbers, texts, lists and tables.
+
+    `of_patch` makes the tables of patches.
+    """
     table = _described(MODELS, model)
     if "surface" in table:
-        table["surface"] = _surface_to_dict(model.surface, model.patch)
-    return {"model": table, "patch": model.patch.to_dict(), "law": _described(LAWS, model.law)}
+        table["surface"] = _surface_to_dict(model.surface, model.patch, of_patch)
+    return {"model": table, "patch": of_patch(model.patch), "law": _described(LAWS, model.law)}
 
 
-def _surface_to_dict(surface: Any, patch: Any) -> dict[str, Any]:
+def _surface_to_dict(surface: Any, patch: Any, of_patch: Callable[[Any], Any]) -> dict[str, Any]:
     table = _described(SURFACES, surface)
     if "surface" in table:
-        table["surface"] = _surface_to_dict(surface.surface, surface.patch)
-    return table if surface.patch is patch else {**table, "patch": surface.patch.to_dict()}
+        table["surface"] = _surface_to_dict(surface.surface, surface.patch, of_patch)
+    return table if surface.patch is patch else {**table, "patch": of_patch(surface.patch)}
 
 
 def model_from_dict(contact: Section) -> Any:
@@ -111,13 +115,19 @@ def _parameters(make: Callable[..., Any]) -> dict[str, inspect.Parameter]:
     return {name: each for name, each in parameters.items() if name not in _GIVEN}
 
 
+@functools.cache
+def _names(make: type) -> tuple[str, ...]:
+    """Return the keys of the table of a member of this class."""
+    return tuple(_parameters(make))
+
+
 def _described(family: Family, member: Any) -> dict[str, Any]:
     """Return the kind and parameters of a member; a limit surface stays as it is."""
     kind = family.name_of(member)
     if kind is None:
         rule = f"be one of {', '.join(family)}, or be registered, to be written to a file"
         raise InvalidValueError(family.what, rule, type(member).__name__)
-    values = {name: _plain(member, name) for name in _parameters(family[kind])}
+    values = {name: _plain(member, name) for name in _names(family[kind])}
     return {"kind": kind, **{name: value for name, value in values.items() if value is not None}}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -51,12 +52,12 @@ class Segments:
 
     def __init__(self, scene, t_end: float, marks=()) -> None:
         own = scene.breaks(t_end)
-        self._breaks = breaks_between(np.concatenate([own[1:-1], marks]), t_end)
+        self._breaks = breaks_between(np.concatenate([own[1:-1], marks]), t_end) if len(marks) else own
         """Breaks of the signals and `marks` [s], [S + 1]."""
         self._load = [contact.normal_force.pieces(self._breaks) for contact in scene.contacts]
         self._force = None if scene.force is None else scene.force.pieces(self._breaks)
         self._velocity = None if scene.velocity is None else scene.velocity.pieces(self._breaks)
-        self._mover = [_mover(contact.support_velocity, self._breaks) for contact in scene.contacts]
+        self._mover = np.stack([_mover(contact.support_velocity, self._breaks) for contact in scene.contacts], axis=1)
         lengths, parts = np.diff(self._breaks), np.ones(len(self._breaks) - 1)
         for contact, (_, slope) in zip(scene.contacts, self._load, strict=True):
             if contact.model.patch.depends_on_load:
@@ -71,13 +72,15 @@ class Segments:
         self.count = int(self._first[-1])
         """Number of pieces."""
         moving = self._force is not None and (self._force[1][-1] != 0.0).any()
-        moving |= any((mover[-1, 3:] != 0.0).any() for mover in self._mover)
+        moving |= (self._mover[-1, :, 3:] != 0.0).any()
         changing = moving or any(slope[-1] != 0.0 for _, slope in self._load)
         self.settled = float(own[-1 if changing else -2])
         """Time of the last change of an input [s]."""
 
     def breaks(self, pieces: np.ndarray) -> np.ndarray:
         """Return the times [s] at which pieces begin; that of number `count` is the end."""
+        if self.count == len(self._step):  # a piece is all that lies between two breaks
+            return self._breaks[pieces]
         here = self._behind(pieces)
         begin = (pieces - self._first[here]) * self._step[here] + self._breaks[here]
         return np.where(pieces == self.count, self._breaks[-1], begin)
@@ -112,17 +115,18 @@ class Segments:
 
         Empty [0, C, 9] where all stand still.
         """
-        movers = np.stack(self._mover, axis=1)
-        if not movers.any():
-            return movers[:0]
+        if not self._mover.any():
+            return self._mover[:0]
         here = self._behind(pieces)
-        since, found = (self.breaks(pieces) - self._breaks[here])[:, None, None], movers[here]
+        since, found = (self.breaks(pieces) - self._breaks[here])[:, None, None], self._mover[here]
         by, velocity, slope = found[..., :3], found[..., 3:6], found[..., 6:]
         by = by + since * (velocity + 0.5 * since * slope)
         return np.concatenate([by, velocity + since * slope, slope], axis=-1)
 
     def _behind(self, pieces: np.ndarray) -> np.ndarray:
         """Return the break of the signals that pieces lie behind."""
+        if self.count == len(self._step):
+            return pieces
         return np.minimum(np.searchsorted(self._first, pieces, side="right") - 1, len(self._step) - 1)
 
     def _linear(self, signal: tuple[np.ndarray, np.ndarray], pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -190,10 +194,9 @@ class SegmentBatches:
 
     def _first(self) -> np.ndarray:
         """Return the bristles with which the scene starts, those that the solver has."""
-        states = first_states(self._scene, self._shaped)
-        return (
-            np.zeros(self._contacts.state[-1]) if states is None else self._flat([state[None] for state in states])[0]
-        )
+        if self._scene.start == "rest":
+            return np.zeros(self._contacts.state[-1])
+        return self._flat([state[None] for state in first_states(self._scene, self._shaped)])[0]
 
     def first_slopes(self, d_loads: np.ndarray, d_pull: np.ndarray) -> np.ndarray:
         """Return changes `[K, n]` of the bristles of an equilibrium (see `start.first_slopes`)."""
@@ -251,10 +254,10 @@ class SegmentBatches:
     def _system(self, row: np.ndarray, pieces: np.ndarray) -> System:
         scene, inputs, models = self._scene, self._pieces, self.models
         breaks = inputs.breaks(np.append(pieces, pieces[-1] + 1))
-        load = np.stack([np.stack(inputs.load(c, pieces), axis=1) for c in range(len(models))], axis=-1)
+        load = np.array([inputs.load(c, pieces) for c in range(len(models))]).transpose(2, 1, 0).copy()
         driven, body = inputs.velocity(pieces), scene.body
         if driven is None:
-            driven = np.empty((0, 3)), np.tile([*body.gravity, 0.0], (len(pieces), 1)).astype(float)
+            driven = np.empty((0, 3)), np.full((len(pieces), 3), [*body.gravity, 0.0])
         free = scene.velocity is None
         laws = [contact.model.law.numbers for contact in scene.contacts]
         motion = Motion(
@@ -305,7 +308,7 @@ def _meet(times: np.ndarray, breaks: np.ndarray) -> None:
 
 
 def _starts(sizes: list[int]) -> np.ndarray:
-    return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+    return np.array([0, *itertools.accumulate(sizes)], np.int64)
 
 
 def _mover(velocity: Signal | None, breaks: np.ndarray) -> np.ndarray:

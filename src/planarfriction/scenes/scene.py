@@ -35,6 +35,9 @@ MOST_CONTACTS = 1_000_000
 
 def _floats(name: str, value: Any, size: int) -> tuple[float, ...]:
     """Return `value` as a tuple of `size` finite numbers, or raise."""
+    fits = type(value) is tuple and len(value) == size
+    if fits and all(type(each) is float and abs(each) <= validation.LARGEST for each in value):
+        return value
     return tuple(validation.vector(name, value, size).tolist())
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -165,7 +166,7 @@ class Signal(ByValue):
         """Number of columns k of a vector signal, None for a scalar one."""
         return self.values.shape[1] if self.values.ndim == 2 else None
 
-    @property
+    @functools.cached_property
     def breaks(self) -> np.ndarray:
         """Increasing times [s] at which the value jumps or the slope changes; samples that change nothing are none."""
         if self.hold == "previous":
@@ -173,7 +174,9 @@ class Signal(ByValue):
         else:
             before = np.concatenate([np.zeros_like(self.values[:1]), self._slopes[:-1]])
             change = self._slopes - before
-        return self.times[(change != 0.0).reshape(len(self.times), -1).any(axis=1)]
+        found = self.times[(change != 0.0).reshape(len(self.times), -1).any(axis=1)]
+        found.setflags(write=False)
+        return found
 
     def pieces(self, breaks: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Return the linear pieces of the signal between `breaks` `[S + 1]` [s]: values at their starts, and slopes.
@@ -227,7 +230,7 @@ class Signal(ByValue):
             f"Signal({len(self.times)} samples{columns}, {self.times[0]:g} to {self.times[-1]:g} s, hold={self.hold!r})"
         )
 
-    @property
+    @functools.cached_property
     def _slopes(self) -> np.ndarray:
         """Slope on the interval that begins at each sample; 0 after the last one."""
         if self.hold == "previous":

@@ -19,13 +19,11 @@ _NEAR = 1e-3
 """Share of the load that the search of the least energy leaves unbalanced where it has found it."""
 
 
-def first_states(scene: Any, shaped: np.ndarray) -> list[np.ndarray] | None:
-    """Return the first state of each contact `[*state_shape]`, or None for bristles at rest.
+def first_states(scene: Any, shaped: np.ndarray) -> list[np.ndarray]:
+    """Return the first state of each contact `[*state_shape]` of a scene whose bristles do not start at rest.
 
     `shaped` `[C]` are the loads [N] whose shapes the contacts have at first.
     """
-    if scene.start == "rest":
-        return None
     for contact in scene.contacts:
         if not hasattr(contact.model, "state_of"):
             rule = f"be 'rest' for a {type(contact.model).__name__}, which has no state_of(deflections, normal_force)"

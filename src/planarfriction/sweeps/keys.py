@@ -17,7 +17,6 @@ from planarfriction import __version__
 from planarfriction.errors import InvalidValueError
 from planarfriction.scenes.files import scene_to_dict
 from planarfriction.scenes.model_files import model_to_dict
-from planarfriction.scenes.signal import Signal
 
 if TYPE_CHECKING:
     from planarfriction.scenes import Scene
@@ -78,16 +77,20 @@ class Keys:
 
     def key(self, scene: Scene) -> str:
         """Return the key of the run of a scene, the same in every process."""
-        return _digest([*self._common, scene_to_dict(scene, of_part=lambda part: {"digest": self._of_part(part)})])
+        return _digest([*self._common, scene_to_dict(scene, self._table)])
+
+    def _table(self, part: Any) -> dict[str, str]:
+        """Return the digest of a part as the table that stands for it in the plain form of a scene."""
+        return {"digest": self._of_part(part)}
 
     def _of_part(self, part: Any) -> str:
-        """Return the digest of the plain form of a model or a signal, which is made once."""
+        """Return the digest of the plain form of a model, a patch or a signal, which is made once."""
         return _kept(self._digests, id(part), lambda: (part, self._digest_of_part(part)))[1]
 
     def _digest_of_part(self, part: Any) -> str:
-        """Digest a model or a signal; a model without plain form counts as itself, unless its runs are to be kept."""
+        """Digest a model, patch or signal; what has no plain form counts as itself, unless its runs are to be kept."""
         try:
-            return _digest(part.to_dict() if isinstance(part, Signal) else model_to_dict(part))
+            return _digest(model_to_dict(part, self._table) if hasattr(part, "patch") else part.to_dict())
         except InvalidValueError:
             if self._kept:
                 raise

@@ -35,6 +35,9 @@ _ARRAYS = "arrays"
 _ALL_CHUNKS = {"array.write_empty_chunks": True}
 """Setting of zarr under which a chunk that is not there has been lost: by default one without values is not written."""
 
+_CODECS = [{"name": "zstd", "configuration": {"level": 0, "checksum": True}}]
+"""Codecs of the chunks of numbers; a store of an earlier version may have others."""
+
 _LOCKED_BYTE = 2**30
 """Place in the journal that is locked where only parts of a file can be."""
 
@@ -172,7 +175,7 @@ class ZarrBookkeeper(Bookkeeper):
 
     def _make(self, variables: Mapping[str, History]) -> None:
         """Make the empty arrays of all runs from the variables of the first one."""
-        from zarr.codecs import Crc32cCodec, ZstdCodec
+        from zarr.codecs import ZstdCodec
 
         ones = (1,) * len(self.grid.shape)
         for name, each in variables.items():
@@ -187,7 +190,7 @@ class ZarrBookkeeper(Bookkeeper):
                 dtype="string" if text else np.result_type(values.dtype, float),
                 chunks=(*ones, *(max(length, 1) for length in values.shape)),
                 fill_value="" if text else np.nan,
-                compressors=(ZstdCodec(), Crc32cCodec()),
+                compressors=(ZstdCodec(checksum=True),),
                 dimension_names=(*self.grid.labels, *each.dims),
                 attributes=dict(each.attrs),
                 config={"write_empty_chunks": True},
@@ -209,10 +212,13 @@ class ZarrBookkeeper(Bookkeeper):
 
     def _chunks(self, index: Index) -> Iterator[str]:
         """Yield the files of the chunks of a run."""
-        for name, array in self._arrays.items():
-            if array.size:
-                place = (*index, *(0 for _ in array.shape[len(index) :]))
-                yield f"{self.path}/{name}/{array.metadata.encode_chunk_key(place)}"
+        return (self._chunk(name, index) for name, array in self._arrays.items() if array.size)
+
+    def _chunk(self, name: str, index: Index) -> str:
+        """Return the file of the chunk of a run in an array."""
+        metadata = self._arrays[name].metadata
+        place = (*index, *(0 for _ in metadata.shape[len(index) :]))
+        return f"{self.path}/{name}/{metadata.encode_chunk_key(place)}"
 
     def _store(self, index: Index, key: str, record: Record, scene: Scene | None) -> Record:
         """Write the chunks of a run, then the line that makes them count; returns the record as it counts."""
@@ -239,11 +245,17 @@ class ZarrBookkeeper(Bookkeeper):
         return record._replace(variables={})
 
     def _fill(self, index: Index, found: Mapping[str, History]) -> None:
-        """Write the chunks of a run."""
-        for name, each in found.items():
-            if each.dims != (name,):
-                values = np.asarray(each.values)
-                self._arrays[name][index] = values.astype(object) if values.dtype.kind == "U" else values
+        """Write the chunks of a run: zarr takes milliseconds for each, as it hands them from thread to thread."""
+        from numcodecs.zstd import Zstd
+
+        for name, array in self._arrays.items():
+            values = np.asarray(found[name].values)
+            if values.dtype.kind == "U" or [each.to_dict() for each in array.compressors] != _CODECS:
+                array[index] = values.astype(object) if values.dtype.kind == "U" else values
+            elif array.size:
+                chunk = self._chunk(name, index)
+                os.makedirs(os.path.dirname(chunk), exist_ok=True)
+                put(chunk, Zstd(checksum=True).encode(values.astype(array.dtype).tobytes()))
 
     def _read_journal(self) -> None:
         """Read the last outcome of each run; a line that a kill has cut counts as no line."""
