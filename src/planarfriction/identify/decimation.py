@@ -7,6 +7,7 @@ that they slide, so they enter the window as after every sample.
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,13 +21,16 @@ from planarfriction.identify.rig import LONGEST, jitter
 WINDOW = 200
 """Least number of samples of a window."""
 
-GROWTH, LEVELS = 1.15, 120
+GROWTH, LEVELS = 1.03, 600
 """Ratio of the distances from a window at which steps before it begin, and number of these distances: they span a
-factor of 2e7, the last one a part of the deflection of a bristle."""
+factor of 5e7, the last one a part of the deflection of a bristle. Wrenches in a window are then off by 3e-4 of
+the largest at most (by 2e-2 with a ratio of 1.15)."""
 
 LEAST_SPEED, NOISE = 1e-3, 3.0
 """Speed below which windows count as alike, as a share of the largest speed, and in standard deviations of its noise;
 below the latter nothing moves."""
+
+TINY = np.finfo(float).tiny
 
 
 class Gap(NamedTuple):
@@ -38,12 +42,14 @@ class Gap(NamedTuple):
     """Mean loads [N], `[G]`; 0 in a step with a sample without load."""
     dt: np.ndarray
     """Durations [s], `[G]`."""
+    error: np.ndarray
+    """Noise of the mean twists over that of a sample [-], `[G]`."""
 
     def until(self, time: float, twist: np.ndarray) -> Gap:
         """Return the gap without its last `time` [s], which have this `twist` `[3]`."""
         (*_, moved), (*_, lasts) = self.twist, self.dt
         mean = (moved * lasts - twist * time) / (lasts - time)
-        return Gap(np.vstack([self.twist[:-1], mean]), self.load, np.append(self.dt[:-1], lasts - time))
+        return self._replace(twist=np.vstack([self.twist[:-1], mean]), dt=np.append(self.dt[:-1], lasts - time))
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +90,15 @@ def samples_of(logs: Sequence[Log]) -> tuple[int, int]:
     return used, total
 
 
+def redrawn(log: Log, noise: np.ndarray, random: np.random.Generator) -> Log:
+    """Return the log with `noise` `[3]` of a sample's twist drawn anew between its windows, if it has any."""
+    if not isinstance(log, DecimatedLog):
+        return log
+    draw = (gap.error[:, None] * noise * random.standard_normal(gap.twist.shape) for gap in log.gaps)
+    gaps = tuple(gap._replace(twist=gap.twist + error) for gap, error in zip(log.gaps, draw, strict=True))
+    return dataclasses.replace(log, gaps=gaps)
+
+
 def _decimated(log: Log, size: float, edges: np.ndarray, count: int) -> DecimatedLog:
     """Return `count` of the windows of a log between rows `edges`."""
     speed, still = np.zeros(len(log.time)), []
@@ -119,14 +134,14 @@ def features(log: Log, edges: np.ndarray, still: Sequence[float]) -> np.ndarray:
     """
     starts, lengths, columns = edges[:-1], np.diff(edges), [edges[:-1] / edges[-1]]
     for values, noise in zip(log.twist.T, still, strict=True):
-        largest = max(float(np.abs(values).max()), np.finfo(float).tiny)
+        largest = max(float(np.abs(values).max()), TINY)
         least = max(noise, LEAST_SPEED * largest)
         ends = (np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts))
         columns += [np.arcsinh(each / least) / np.arcsinh(largest / least) for each in ends]
     for of in (np.minimum, np.maximum):
-        columns.append(of.reduceat(log.normal_force, starts) / max(log.normal_force.max(), np.finfo(float).tiny))
+        columns.append(of.reduceat(log.normal_force, starts) / max(log.normal_force.max(), TINY))
     for values in log.wrench.T:
-        largest = max(float(np.abs(values).max()), np.finfo(float).tiny)
+        largest = max(float(np.abs(values).max()), TINY)
         mean, square = (np.add.reduceat((values / largest) ** power, starts) / lengths for power in (1, 2))
         columns += [mean, np.sqrt(np.maximum(square - mean**2, 0.0))]
     return np.stack(columns, -1)
@@ -161,4 +176,5 @@ def _gap(log: Log, path: np.ndarray, first: int, last: int) -> Gap:
     dt = np.diff(log.time[rows])
     mean = np.add.reduceat(since * steps[:, None], at, axis=0) / dt[:, None]
     loads = np.add.reduceat(0.5 * (load[1:] + load[:-1]) * steps, at) / dt
-    return Gap(mean, np.where(np.minimum.reduceat(load[1:], at) > 0.0, loads, 0.0), dt)
+    loads = np.where(np.minimum.reduceat(load[1:], at) > 0.0, loads, 0.0)
+    return Gap(mean, loads, dt, 1.0 / np.sqrt(np.diff(rows)))

@@ -9,6 +9,7 @@ import numpy as np
 from planarfriction.derivatives import PARAMETERS, parameters_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
+from planarfriction.identify.decimation import redrawn
 from planarfriction.identify.logs import Log
 from planarfriction.identify.options import FitOptions
 from planarfriction.identify.parameters import RADIUS, Coordinates, VectorMap
@@ -155,15 +156,15 @@ class LogProblem(Problem):
                 each.base[RADIUS] = float(self.fixed_patch.contact_radius())
         return maps
 
-    def _predictions(self, steps: int, twists: Sequence[np.ndarray] | None = None) -> list[Prediction]:
-        twists = [each.values for each in self.twists] if twists is None else twists
-        begins = self.options.begins
-        both = zip(self.logs, twists, strict=True)
-        kinds = [PartsPrediction if len(log.parts) > 1 else Prediction for log in self.logs]
-        return [
-            kind(self.simulator, log, twist, begins=begins, refine=steps)
-            for kind, (log, twist) in zip(kinds, both, strict=True)
-        ]
+    def _predictions(
+        self, steps: int, twists: Sequence[np.ndarray] | None = None, logs: Sequence[Log] | None = None
+    ) -> list[Prediction]:
+        twists, logs = [each.values for each in self.twists] if twists is None else twists, logs or self.logs
+        result = []
+        for log, twist in zip(logs, twists, strict=True):
+            kind = PartsPrediction if len(log.parts) > 1 else Prediction
+            result.append(kind(self.simulator, log, twist, begins=self.options.begins, refine=steps))
+        return result
 
     @property
     def work(self) -> float:
@@ -301,7 +302,9 @@ class LogProblem(Problem):
             channels = np.flatnonzero(twist.noisy & ("twist" in self.rig.groups))
             base = prediction.wrenches(vector) if len(channels) else None
             for k in channels:
-                square += (prediction.moved(vector, twist.left[k] * np.eye(3)[k]) - base) ** 2
+                square += (
+                    prediction.moved(vector, *(np.eye(3)[k] * each for each in (twist.left, twist.noise))) - base
+                ) ** 2
             sigma.append(np.sqrt(square))
         return sigma
 
@@ -316,9 +319,11 @@ class LogProblem(Problem):
         random, base = np.random.default_rng(0), self.shown(values)
         result = []
         for _ in range(draws):
-            both = zip(self.twists, noisy, strict=True)
+            both = [*zip(self.twists, noisy, strict=True)]
             drawn = [twist.values + np.where(on, twist.error(random), 0.0) for twist, on in both]
-            shown = self.shown(values, self._predictions(self.steps, drawn))
+            between = [(log, twist.noise * on) for log, (twist, on) in zip(self.logs, both, strict=True)]
+            logs = [redrawn(log, noise, random) for log, noise in between]
+            shown = self.shown(values, self._predictions(self.steps, drawn, logs))
             change = [new - old + log.wrench for new, old, log in zip(shown, base, self.logs, strict=True)]
             result.append(self._scaled(change, sigma))
         return np.array(result)

@@ -222,16 +222,20 @@ class Prediction:
         order = np.concatenate([before, order])
         self._inputs: tuple[np.ndarray, np.ndarray, Any] = twists[order], loads[order], self._half
         self._first = len(before) - 1
-        self._errs: Any = 1.0
+        self._between: Any = 0.0
 
     def wrenches(self, vector: np.ndarray, delay: float = 0.0) -> np.ndarray:
         """Compute the wrenches `[T, 3]` at the samples."""
         return self._read(self._nodes(self.simulator.wrenches(*self._inputs, vector)), delay)[0]
 
-    def moved(self, vector: np.ndarray, change: Sequence[float]) -> np.ndarray:
-        """Compute the wrenches `[T, 3]` at the samples with `change` `[3]` added to all twists."""
+    def moved(self, vector: np.ndarray, change: np.ndarray, noise: np.ndarray) -> np.ndarray:
+        """Compute the wrenches `[T, 3]` at the samples with `change` `[3]` added to all twists.
+
+        Between the windows of a decimated log it is what means leave of the `noise` `[3]` of single samples.
+        """
         twists, loads, half = self._inputs
-        changed = twists + np.multiply.outer(self._errs, change)
+        between = np.multiply.outer(self._between, noise)
+        changed = twists + np.where(between > 0.0, between, change)
         return self._read(self._nodes(self.simulator.wrenches(changed, loads, half, vector)), 0.0)[0]
 
     def sensitivities(
@@ -263,10 +267,7 @@ class Prediction:
 
 
 class PartsPrediction(Prediction):
-    """Simulated wrenches of a decimated log: of its parts, with the motion between them in longer steps.
-
-    The noise of twists has no mean over these longer steps, so that only twists of the parts err.
-    """
+    """Simulated wrenches of a decimated log: of its parts, with the motion between them in longer steps."""
 
     def __init__(self, simulator: Simulator, log: DecimatedLog, twist: np.ndarray, *, begins="rest", refine: int = 1):
         self.simulator, self.log = simulator, log
@@ -280,13 +281,12 @@ class PartsPrediction(Prediction):
         for gap, part in zip((None, *log.gaps), self._parts, strict=True):
             twists, loads, half = part._inputs
             if gap is not None:
-                before = gap.until(half, twists[0])
-                pieces.append((*before, np.zeros(len(gap.dt))))
+                pieces.append(gap.until(half, twists[0]))
                 at += len(gap.dt)
-            pieces.append((twists, loads, np.full(len(loads), half), np.ones(len(loads))))
+            pieces.append((twists, loads, np.full(len(loads), half), np.zeros(len(loads))))
             self._spans.append(slice(at, at + len(loads)))
             at += len(loads)
-        twists, loads, dt, self._errs = (np.concatenate(each) for each in zip(*pieces, strict=True))
+        twists, loads, dt, self._between = (np.concatenate(each) for each in zip(*pieces, strict=True))
         self._inputs = twists, loads, dt
 
     def _nodes(self, values):
