@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -78,10 +79,55 @@ def test_what_a_shell_pipes_is_read(tmp_path):
 
 
 def test_text_files_have_a_largest_size(tmp_path):
-    for name in ("scene.toml", "load.csv", "log.csv", "map.csv"):
+    for name, most in (("scene.toml", 256), ("load.csv", 4000), ("log.csv", 4000), ("map.csv", 256)):
         with (tmp_path / name).open("wb") as file:
             file.truncate(1 << 40)  # sparse: takes no place, and no memory holds it
-        assert "is larger than 256 MB, the most that is read" in one_line(READERS[name], tmp_path / name)
+        assert f"is larger than {most} MB, the most that is read" in one_line(READERS[name], tmp_path / name)
+
+
+def test_a_line_without_end_is_not_read_to_its_end(tmp_path, monkeypatch):
+    monkeypatch.setattr(reading, "MOST_TEXT", 1000)
+    (tmp_path / "log.csv").write_text(2000 * "t")
+    assert "is larger than 4000 MB" in one_line(READERS["log.csv"], tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize("at_once", [1, 2, 3, 1000])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "# a;remark\na,b,c\n1,2,3\n4,5,6\n7,8,9\n",
+        "a,b,c\r\n1,2,3\r\n\r\n# remark, \r\n4,5,6\r\n7,8,9\r\n",
+        'a,b,c\n1,2,3\n4,"5\n\n",6\n"7",8,9',
+        "a;b;c\n1;2,0;3\n4;5;6\n7;8;9\n",
+        "a\tb\tc\n1\t 2\t3\n4\t5\t6\n7\t8\t9e0\n",
+    ],
+)
+def test_tables_are_read_the_same_in_blocks_of_any_size(tmp_path, monkeypatch, text, at_once):
+    monkeypatch.setattr(reading, "AT_ONCE", at_once)
+    (tmp_path / "t.csv").write_bytes(text.encode())
+    found = reading.Table(tmp_path / "t.csv").numbers(["c", "b"])
+    assert found.tolist() == [[3.0, 2.0], [6.0, 5.0], [9.0, 8.0]]
+
+
+@pytest.mark.parametrize("at_once", [2, 1000])
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [("x,2", "line 4, column 'a': 'x' is not a number"), ("1,2,3", "line 4 has 3 columns"), ("inf,2", "is not finite")],
+)
+def test_what_is_wrong_in_a_block_is_named(tmp_path, monkeypatch, row, words, at_once):
+    monkeypatch.setattr(reading, "AT_ONCE", at_once)
+    (tmp_path / "t.csv").write_text(f"a,b\n1,2\n3,4\n{row}\n")
+    assert words in one_line(lambda path: reading.Table(path).numbers(["a", "b"]), tmp_path / "t.csv")
+
+
+def test_a_table_is_read_in_little_more_memory_than_its_numbers(tmp_path):
+    """Its numbers, the block that is parsed, and what a growing array has in reserve: less than the text."""
+    (tmp_path / "t.csv").write_text("a,b\n" + 300_000 * "1.000000001,2.000000000000001\n")
+    tracemalloc.start()
+    found = reading.Table(tmp_path / "t.csv").numbers(["a", "b"])
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 1.3 * found.nbytes + reading.AT_ONCE * 400
 
 
 def test_pipes_have_a_largest_size():

@@ -12,7 +12,10 @@ import re
 import stat
 from array import array
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from operator import length_hint
 from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -20,7 +23,13 @@ from planarfriction import validation
 from planarfriction.errors import FileError, shown
 
 MOST_TEXT = 256_000_000
-"""Largest text file that is read [bytes]: a log of a million samples fits."""
+"""Largest text file that is read at once [bytes]."""
+
+MOST_TABLE = 4_000_000_000
+"""Largest CSV file that is read, line by line [bytes]: a log of thirty million samples fits."""
+
+AT_ONCE = 50_000
+"""Number of lines of a CSV file that are parsed together."""
 
 SEPARATORS = (";", ",", "\t")
 """Separators of cells; the first that a file has is taken."""
@@ -34,6 +43,16 @@ def read_bytes(path: str | Path, what: str, most: int | None = None) -> bytes:
     Raises FileError in one line for a missing file, a folder, a device, a named pipe (nobody may ever write to it), and
     a file of more than `most` bytes. The pipes that a shell makes (`<(...)`, `/dev/stdin`) are read.
     """
+    with opened(path, what, most) as file:
+        content = file.read() if most is None else file.read(most + 1)
+    if most is not None and len(content) > most:
+        raise _too_large(path, what, most)
+    return content
+
+
+@contextmanager
+def opened(path: str | Path, what: str, most: int | None) -> Iterator[BinaryIO]:
+    """Open a file as `read_bytes` does, which see for what is refused; a pipe may have more than `most` bytes."""
     path = validation.path("path", path)
     try:
         status = os.stat(path)
@@ -45,17 +64,14 @@ def read_bytes(path: str | Path, what: str, most: int | None = None) -> bytes:
         if most is not None and status.st_size > most:
             raise _too_large(path, what, most)
         with path.open("rb") as file:
-            content = file.read() if regular or most is None else file.read(most + 1)
-    except FileError:
+            yield file
+    except (FileError, UnicodeDecodeError):
         raise
     except FileNotFoundError:
         raise FileError(f"{path}: no such file (expected {what})") from None
     except (OSError, ValueError, MemoryError) as error:  # ValueError: a path with a zero byte
         reason = getattr(error, "strerror", None) or " ".join(str(error).split()) or "not enough memory"
         raise FileError(f"{path}: cannot be read: {reason}") from None
-    if most is not None and len(content) > most:
-        raise _too_large(path, what, most)
-    return content
 
 
 def read_text(path: str | Path, what: str) -> str:
@@ -75,20 +91,46 @@ def read_rows(path: str | Path, what: str) -> Iterator[tuple[int, list[str]]]:
 
     Raises FileError in one line, also for a cell that is not well quoted or larger than `csv.field_size_limit`.
     """
-    content = io.BytesIO(read_bytes(path, what, MOST_TEXT))
-    lines = enumerate(io.TextIOWrapper(content, encoding="utf-8-sig", newline=""), 1)
-    number, separator = 0, ""
+    return _rows(path, _lines(path, what, MOST_TEXT))
+
+
+def _lines(path: str | Path, what: str, most: int) -> Iterator[tuple[int, str]]:
+    """Yield the lines of a text file with their numbers, without reading all of it first."""
+    size = 0
+    try:
+        with opened(path, what, most) as file:
+            text = io.TextIOWrapper(file, encoding="utf-8-sig", newline="")
+            for number, line in enumerate(iter(lambda: text.readline(MOST_TEXT + 1), ""), 1):
+                size += len(line)
+                if size > most or len(line) > MOST_TEXT:
+                    raise _too_large(path, what, most)
+                yield number, line
+    except UnicodeDecodeError:
+        raise FileError(f"{path}: not a text file (expected {what})") from None
+
+
+def _rows(path: str | Path, lines: Iterator[tuple[int, str]], separator: str = "") -> Iterator[tuple[int, list[str]]]:
+    """Yield the rows in numbered lines; their first one shows the separator, if it is not given."""
+    number = 0
     try:
         for number, line in lines:
-            if line.strip() and not line.lstrip().startswith("#"):
-                separator = separator or next((each for each in SEPARATORS if each in line), ",")
+            if _holds_cells(line):
+                separator = separator or _separator(line)
                 record = itertools.chain([line], (more for _, more in lines))
                 cells = [cell.strip() for cell in next(csv.reader(record, strict=True, delimiter=separator))]
                 yield number, cells if separator == "," else [_with_point(cell) for cell in cells]
     except csv.Error as error:
         raise FileError(f"{path}: line {number} is not CSV: {error}") from None
-    except UnicodeDecodeError:
-        raise FileError(f"{path}: not a text file (expected {what})") from None
+
+
+def _holds_cells(line: str) -> bool:
+    """Return True if a line is neither empty nor a remark."""
+    return bool(line.strip()) and not line.lstrip().startswith("#")
+
+
+def _separator(line: str) -> str:
+    """Return the separator of the cells of a line."""
+    return next((each for each in SEPARATORS if each in line), ",")
 
 
 def _with_point(cell: str) -> str:
@@ -100,8 +142,10 @@ class Table:
     """A CSV file with a header line and rows of numbers, read once: `names` first, then the columns that are wanted."""
 
     def __init__(self, path: str | Path):
-        self._path, self._rows = path, read_rows(path, "a CSV file with a header line")
-        line, self.names = next(self._rows, (0, []))
+        self._path, self._lines = path, _lines(path, "a CSV file with a header line", MOST_TABLE)
+        first = [*itertools.islice((each for each in self._lines if _holds_cells(each[1])), 1)]
+        self._separator = _separator(first[0][1]) if first else ","
+        line, self.names = next(_rows(path, itertools.chain(first, self._lines), self._separator), (0, []))
         """Names of the columns."""
         if not self.names:
             raise FileError(f"{path}: is empty (expected a header line and rows of numbers)")
@@ -121,13 +165,36 @@ class Table:
                 raise FileError(f"{self._path}: no column {shown(validation.quoted(name))} ({hint})")
         columns = [(name, self.names.index(name)) for name in names]
         values = array("d")
-        for line, row in self._rows:
+        while block := list(itertools.islice(self._lines, AT_ONCE)):
+            found = self._at_once([text for _, text in block], [column for _, column in columns])
+            if found is None:  # slowly, with the words for what is wrong
+                self._one_by_one(iter(block), columns, spare, values)
+            else:
+                values.frombytes(found.tobytes())
+        if not values:
+            raise FileError(f"{self._path}: has a header line but no rows")
+        return np.frombuffer(values).reshape(-1, len(names))
+
+    def _at_once(self, lines: Sequence[str], columns: Sequence[int]) -> np.ndarray | None:
+        """Return the columns of lines of plain numbers; None if any line or number is of another kind."""
+        text, separators = "".join(lines), len(self.names) - 1
+        odd = '"' in text or "#" in text or (self._separator != "," and "," in text)
+        if odd or not separators or any(line.count(self._separator) != separators for line in lines):
+            return None
+        try:
+            found = np.loadtxt(lines, delimiter=self._separator, comments=None, usecols=columns, ndmin=2)
+        except ValueError:
+            return None
+        return found if np.isfinite(found).all() and len(found) == len(lines) else None
+
+    def _one_by_one(self, lines: Iterator[Any], columns: Sequence[Any], spare: Sequence[str], values: array) -> None:
+        """Append the numbers of numbered lines row by row; a quoted cell may go on behind them."""
+        for line, row in _rows(self._path, itertools.chain(lines, self._lines), self._separator):
             if len(row) != len(self.names):
                 raise FileError(f"{self._path}: line {line} has {len(row)} columns, the header has {len(self.names)}")
             values.extend(self._number(line, name, row[column], name in spare) for name, column in columns)
-        if not values:
-            raise FileError(f"{self._path}: has a header line but no rows")
-        return np.array(values).reshape(-1, len(names))
+            if not length_hint(lines):
+                return
 
     def _number(self, line: int, name: str, cell: str, spare: bool) -> float:
         try:

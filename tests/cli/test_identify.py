@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import time
 
 import pytest
 
-from planarfriction.cli import main
+from planarfriction.cli import console, main
 from planarfriction.cli.output import write_csv
 from planarfriction.identify.logs import columns_of
 from tests.support.identification_logs import clean_log, excitation, noisy
@@ -31,6 +32,18 @@ def test_estimates_json_and_picture(path, tmp_path, capsys):
     data = json.loads((out / "slow-run-identification.json").read_text())
     assert data["parameters"]["mu_c"]["estimate"] == pytest.approx(0.5, abs=0.01)
     assert (out / "slow-run-residuals.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_progress_is_a_line_now_and_then_without_a_terminal(monkeypatch, capsys):
+    monkeypatch.setattr(console, "EVERY", 0.05)
+    with console.work_progress("identifying") as progress:
+        progress("start 1 of 4")
+        time.sleep(0.2)
+    first, *others = capsys.readouterr().err.splitlines()
+    assert first == "identifying: start 1 of 4, 0 s"
+    assert len(others) < 4
+    time.sleep(0.1)
+    assert capsys.readouterr().err == ""  # nothing after the end
 
 
 @pytest.mark.parametrize(

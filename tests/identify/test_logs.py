@@ -15,7 +15,8 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.identify import Log, Slide, differentiated
 from planarfriction.identify.checks import Sliding
 from planarfriction.identify.logs import is_mean, unwrapped
-from planarfriction.identify.problem import FitOptions, LogProblem
+from planarfriction.identify.options import FitOptions
+from planarfriction.identify.problem import LogProblem
 from planarfriction.identify.rig import first_noise
 from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, fitted, noisy, truth
 

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
+
+EVERY = 10.0
+"""Time between lines of progress where there is no terminal [s]."""
 
 
 @contextmanager
@@ -40,16 +46,38 @@ def count_progress(label: str) -> Iterator[Callable[[int, int, str], None]]:
 
 
 @contextmanager
-def _bar() -> Iterator[Progress]:
+def _bar() -> Iterator[Any]:
     console = Console(stderr=True)
     words = TextColumn("{task.description}", markup=False)
     columns = SpinnerColumn(), words, BarColumn(bar_width=30), TimeElapsedColumn()
     bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
-    if bar.disable:  # not even begun: rich before 15 ends such a bar with an empty line
-        yield bar
-    else:
-        with bar:
-            yield bar
+    with _Lines() if bar.disable else bar as shown:  # rich before 15 ends a bar that is not shown with an empty line
+        yield shown
+
+
+class _Lines:
+    """Progress for a file or a pipe: a line on stderr every `EVERY` seconds, written by a thread of its own."""
+
+    def __enter__(self) -> _Lines:
+        self._words, self._begin, self._done = "", time.monotonic(), threading.Event()
+        threading.Thread(target=self._write, daemon=True).start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._done.set()
+
+    def _write(self) -> None:
+        while not self._done.wait(EVERY):
+            note(f"{self._words}, {time.monotonic() - self._begin:.0f} s")
+
+    def add_task(self, description: str, total: float | None = None) -> int:
+        """Take the words that lines begin with."""
+        self._words = description
+        return 0
+
+    def update(self, task: int, *, description: str, **_: float) -> None:
+        """Take new words."""
+        self._words = description
 
 
 def note(text: str) -> None:

@@ -45,8 +45,11 @@ def identify(
     )
     if out is not None:
         make_folder(out)
-    logs = [Log.from_csv(path, normal_force=normal_force, contact=contact) for path in paths]
+    logs = []
     with work_progress("identifying") as progress:
+        for path in paths:
+            progress(f"reading {path.name}")
+            logs.append(Log.from_csv(path, normal_force=normal_force, contact=contact))
         found = identify_lugre(logs, patch, **chosen, options=options, progress=progress)
     samples = sum(len(log.time) for log in logs)
     title = f"{', '.join(log.name for log in logs)}: {samples} samples, {patch.name}"

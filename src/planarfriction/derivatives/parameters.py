@@ -9,6 +9,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.compiled.shapes_by_load import ShapesByLoad, cells_by_load, places_of
+from planarfriction.compiler import threads
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
@@ -48,6 +49,10 @@ _POSITIVE = ("sigma_0", "mu_c", "mu_s", "v_s", "gamma", "contact_radius")
 _NON_NEGATIVE = ("sigma_1", "sigma_2", "second_moment")
 
 
+WORTH_A_THREAD = 20_000
+"""Steps [-] below which starting a thread costs more than it saves."""
+
+
 class Family(NamedTuple):
     """Parameters and compiled roll-outs of one kind of model."""
 
@@ -83,14 +88,20 @@ def _cells(entries: cells_rollout.CellRollouts) -> Family:
     def sensitivities(
         inputs: Inputs, span: Any, z: np.ndarray, columns: np.ndarray, wrenches: Any, slopes: Any
     ) -> None:
-        """Change one number after the other."""
-        start, none = z[:, slice(*span)].copy(), np.zeros((1, len(inputs.dt), 3))
-        for d, column in enumerate(columns):
-            z[:, slice(*span)], wrenches[slice(*span)], numbers = start, 0.0, np.zeros((1, inputs.rows.shape[-1]))
-            numbers[:, column] = 1.0
-            changes, change = Bars(np.zeros_like(z), none, none[..., 0], numbers), np.zeros(wrenches.shape)
-            entries.tangent(inputs, span, z, changes, wrenches, change)
-            slopes[slice(*span), ..., d] = change[slice(*span)]
+        """Change one number after the other, on several threads where one contact leaves them idle."""
+        none, start, at = np.zeros((1, len(inputs.dt), 3)), z.copy(), slice(*span)
+
+        def some(first: int, last: int) -> None:
+            for d in range(first, last):
+                kept = d == len(columns) - 1  # the roll-out is the same for all
+                state, found = (z, wrenches) if kept else (start.copy(), np.zeros_like(wrenches))
+                numbers, change = np.zeros((1, inputs.rows.shape[-1])), np.zeros_like(wrenches)
+                numbers[:, columns[d]] = 1.0
+                entries.tangent(inputs, span, state, Bars(np.zeros_like(z), none, none[..., 0], numbers), found, change)
+                slopes[at, ..., d] = change[at]
+
+        alone = len(columns) * len(inputs.dt) // WORTH_A_THREAD if len(wrenches) == 1 else 1
+        threads.share(len(columns), alone, some)
 
     names, columns = cells_rollout.PARAMETERS, np.array(cells_rollout.COLUMNS)
     return Family(names, columns, entries.rollout, entries.gradient, sensitivities, entries.tangent)

@@ -7,7 +7,7 @@ suggests which motion to measure next.
 from planarfriction.identify.experiments import MotionPlan, candidate_motions, current_estimate, design_experiment
 from planarfriction.identify.logs import Log, differentiated
 from planarfriction.identify.motion import identify_motion
-from planarfriction.identify.problem import FitOptions
+from planarfriction.identify.options import FitOptions
 from planarfriction.identify.result import Identification
 from planarfriction.identify.slides import Slide, SlidingBody, fit_start, predict_slide
 from planarfriction.identify.verdicts import Verdict

@@ -107,7 +107,7 @@ def with_findings(result: Identification, logs: Sequence[Log], findings: Sequenc
 
 def check_log(log: Log, patch: ContactPatch) -> list[Finding]:
     """Check one log: sign of the work, axes and units, displacement between samples, friction against load."""
-    size, sliding = _size(log, patch), Sliding.of(log, patch)
+    size, sliding = size_of(log, patch), Sliding.of(log, patch)
     work = check_work(log, sliding)
     found = [work] if work else [check_directions(log, sliding, size)]
     found += [check_times(log, size), check_friction(log, size), check_unloaded(log, size)]
@@ -140,7 +140,7 @@ class Sliding:
         many = patch.cells > MOST_CELLS and not patch.depends_on_load and not patch.anisotropic
         few = patch.compressed() if many else patch
         weights = few.weights(_load(log)) if few.depends_on_load else few.weights()
-        size = _size(log, patch)
+        size = size_of(log, patch)
         speed, force = (np.linalg.norm(each, axis=1) for each in (log.twist * [1, 1, size], log.wrench / [1, 1, size]))
         enough = [each >= share * np.quantile(each, 0.95) for each, share in ((speed, FAST), (force, STRONG))]
         rows = np.flatnonzero(np.all([*enough, speed > 0.0, force > 0.0, log.normal_force > 0.0], axis=0))
@@ -302,6 +302,6 @@ def _load(log: Log) -> float:
     return float(np.median(loaded)) if len(loaded) else 1.0
 
 
-def _size(log: Log, patch: ContactPatch) -> float:
+def size_of(log: Log, patch: ContactPatch) -> float:
     """Return the length that turns spin into speed [m]: the contact radius at the load of the log."""
     return float(patch.contact_radius(_load(log)) if patch.depends_on_load else patch.contact_radius())

@@ -25,8 +25,9 @@ from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
 from planarfriction.identify.logs import Log, as_logs
+from planarfriction.identify.options import FitOptions, check_noise
 from planarfriction.identify.parameters import ALL, PRIOR, SHAPE_PRIOR, Coordinates, fitted_law
-from planarfriction.identify.problem import FitOptions, LogProblem, check_noise
+from planarfriction.identify.problem import LogProblem
 from planarfriction.identify.result import WIDTH, Identification
 from planarfriction.identify.rig import GROUPS, check_groups, first_noise
 from planarfriction.laws import LuGre

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,6 +48,9 @@ UNITS = {
     "tau": ("nm", "n*m", "n.m", "n·m"),
 }
 """Units that may stand in brackets behind a name, in small letters and without spaces."""
+
+AT_ONCE = 50_000
+"""Number of samples that are differentiated together."""
 
 _HEADING = re.compile(r"(?P<name>[^\[(]*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?")
 
@@ -129,6 +132,21 @@ class Log(ByValue):
         steps = np.arange(len(self.time)) * (self.time[-1] - self.time[0]) / (len(self.time) - 1)
         return bool(np.abs(self.time - self.time[0] - steps).max() <= EVEN * self.interval)
 
+    @property
+    def parts(self) -> tuple[Log, ...]:
+        """Parts with consecutive samples: the whole log, unless it was decimated."""
+        return (self,)
+
+    @property
+    def inner(self) -> Any:
+        """Places of the samples that are fitted: all, unless the log was decimated."""
+        return np.arange(len(self.time))
+
+    @property
+    def durations(self) -> np.ndarray:
+        """Times since the sample before, `[T]` [s]; 0 where there is none."""
+        return np.concatenate([np.diff(part.time, prepend=part.time[0]) for part in self.parts])
+
     @classmethod
     def from_motion(
         cls,
@@ -179,8 +197,8 @@ class Log(ByValue):
         found = find_columns(path, table.names, contact=contact, with_load=normal_force is None)
         motion = TWIST if "vx" in found else MOTION
         spare = [found["theta"]] if motion is TWIST and "theta" in found else []
-        columns = dict(zip(found, table.numbers(list(found.values()), spare).T, strict=True))
-        moved, wrench = (np.stack([columns[name] for name in names], -1) for names in (motion, WRENCH))
+        values = table.numbers(list(found.values()), spare)
+        columns, moved, wrench = dict(zip(found, values.T, strict=True)), values[:, 1:4], values[:, 4:7]  # no copies
         loads = columns.get("normal_force")
         if loads is None:
             loads = np.array(normal_force)
@@ -226,17 +244,20 @@ def differentiated(time: ArrayLike, motion: ArrayLike, *, window: int = 7) -> np
     """
     time = increasing(time)
     motion = validation.array("motion", motion, (len(time), 3))
-    motion[:, 2], _ = unwrapped(time, motion[:, 2])
+    motion[:, 2] = unwrapped(time, motion[:, 2])[0]
     window = validation.count("window", window, at_least=3)
     if len(time) < window:
         raise InvalidValueError("motion", f"hold at least window={window} samples", f"{len(time)}")
-    half, slopes = window // 2, np.empty_like(motion)
-    for i in range(len(time)):
-        first = min(max(i - half, 0), len(time) - window)
-        since = time[first : first + window] - time[i]
-        scale = np.abs(since).max()
-        powers = np.vander(since / scale, 3, increasing=True)
-        slopes[i] = np.linalg.lstsq(powers, motion[first : first + window], rcond=None)[0][1] / scale
+    slopes = np.empty_like(motion)
+    for begin in range(0, len(time), AT_ONCE):
+        rows = np.arange(begin, min(begin + AT_ONCE, len(time)))
+        around = np.clip(rows - window // 2, 0, len(time) - window)[:, None] + np.arange(window)
+        since = time[around] - time[rows, None]
+        scale = np.abs(since).max(axis=1, keepdims=True)
+        powers = np.stack([(since / scale) ** n for n in range(3)], -1)
+        across = powers.swapaxes(1, 2)
+        parabolas = np.linalg.pinv(across @ powers, hermitian=True) @ across @ (motion[around] - motion[rows, None])
+        slopes[rows] = parabolas[:, 1] / scale
     return rotate(slopes, -motion[:, 2])
 
 

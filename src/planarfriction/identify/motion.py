@@ -288,6 +288,7 @@ def _identification(fit: Fit, problem: SlideProblem, left_out: Sequence[Verdict]
         law=problem.fitted_law(fit.values),
         model=problem.fitted_model(fit.values),
         starts=fit.starts,
+        samples=(samples := sum(len(each["time"]) for each in histories), samples),
     )
 
 

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
 from planarfriction.derivatives import PARAMETERS, parameters_of
-from planarfriction.described import described
-from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
+from planarfriction.identify.decimation import redrawn
 from planarfriction.identify.logs import Log
+from planarfriction.identify.options import FitOptions
 from planarfriction.identify.parameters import RADIUS, Coordinates, VectorMap
-from planarfriction.identify.rig import GROUPS, Rig, as_measured, check_groups, smoothed, wrench_noise
-from planarfriction.identify.simulators import SIMULATORS, Prediction
+from planarfriction.identify.rig import Rig, as_measured, smoothed, wrench_noise
+from planarfriction.identify.simulators import SIMULATORS, PartsPrediction, Prediction
 from planarfriction.identify.uncertainty import covariance
-from planarfriction.laws import ElastoPlastic, LuGre
-from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
+from planarfriction.laws import LuGre
 from planarfriction.limit_surface.base import scaling
 from planarfriction.patch import ContactPatch, SoftFinger
 
@@ -33,57 +29,12 @@ KNOWN = 0.3
 FINEST = 32
 """Most steps between two samples."""
 
+NEARBY = 0.03
+"""Change of the values, as a share, up to which derivatives are kept: it moves no estimate by more than this share of
+its standard error, as they decide on the way to the minimum, and meet residuals of noise there."""
+
 CONSTANT = 0.1
 """Share by which the load of a log may stray from its mean if the patch changes with the load."""
-
-
-def check_noise(name: str, noise: Any) -> np.ndarray:
-    """Return the noise `[3]`, all of it > 0, or raise InvalidValueError."""
-    values = validation.vector(name, noise, 3)
-    if not (values > 0.0).all():
-        raise InvalidValueError(name, "be > 0", values.tolist())
-    return values
-
-
-def _noise(name: str, noise: Any) -> tuple[float, ...]:
-    return tuple(check_noise(name, noise).tolist())
-
-
-def _surface(name: str, value: Any) -> type[LimitSurface]:
-    if not (isinstance(value, type) and issubclass(value, LimitSurface)):
-        raise InvalidValueError(name, "be a class of limit surfaces", value)
-    return value
-
-
-def _bristles(_: str, value: Any) -> ElastoPlastic | float | None:
-    return LuGre(elasto_plastic=value).elasto_plastic
-
-
-@described
-@dataclass(frozen=True)
-class FitOptions(Checked):
-    """Options of `identify_lugre` that few fits change.
-
-    Raises InvalidValueError for an option that breaks its rule.
-    """
-
-    nuisance: Sequence[str] = checked(check_groups, default=GROUPS)
-    """Disturbances that the rig may add: "delay" between motion and wrench, "bias" (zeros of the wrench and their
-    drift), "load" (scale and drift of the load cell), "twist" (noise of the twist). All by default."""
-    noise: Sequence[float] | None = checked(_noise, default=None)
-    """Standard deviation of the measured fx, fy [N] and tau [N m]; None estimates each from its jitter."""
-    begins: str = checked(validation.choice, ("rest", "steady"), default="rest")
-    """Bristles at the begin of every log: relaxed ("rest"), or as in steady sliding at the first twist ("steady")."""
-    refine: int | None = checked(validation.count, default=None)
-    """Steps between two samples; None doubles them until no estimate changes by more than a fifth of its error."""
-    starts: int = checked(validation.count, default=4)
-    """Number of starting points."""
-    seed: int = checked(validation.count, 0, default=0)
-    """Random seed that scatters the starting points."""
-    elasto_plastic: ElastoPlastic | float | None = checked(_bristles, default=ElastoPlastic(0.9))
-    """Kind of bristles, unless a whole law is given as start."""
-    surface: type[LimitSurface] = checked(_surface, default=LimitSurfaceTablePublished)
-    """Class of the limit surface of the model "reduced-published"."""
 
 
 class Problem:
@@ -129,6 +80,9 @@ class Problem:
     def refine_steps(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> bool:
         """Take more steps between two samples if the estimates ask for it; returns True if they do."""
         return False
+
+    def forget(self) -> None:
+        """Forget derivatives that were kept, from other steps or other values."""
 
     def residuals(
         self, coordinates: Coordinates, sigma: Sequence[np.ndarray]
@@ -179,11 +133,12 @@ class LogProblem(Problem):
         self.rig = Rig(logs, options.nuisance)
         self.twists = [smoothed(log) if "twist" in options.nuisance else as_measured(log) for log in logs]
         # A log at rest has no sample before its first step; its first wrench shows bristles that nobody knows.
-        self.used = [slice(1 if options.begins == "rest" else 0, None) for _ in logs]
+        self.used = [log.inner[1 if options.begins == "rest" else 0 :] for log in logs]
         self.simulator = SIMULATORS[model](self.fixed_patch, law, options.surface)
         self.steps = options.refine or 1
         self.predictions = self._predictions(self.steps)
-        self._last: tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray]]] | None = None
+        self._shown: tuple[np.ndarray, list[np.ndarray]] | None = None
+        self._slopes: tuple[np.ndarray, list[np.ndarray]] | None = None
 
     def _maps(self, loads: Sequence[float]) -> list[VectorMap]:
         """Make the map from values to the vector of the model at the load of each log."""
@@ -201,11 +156,15 @@ class LogProblem(Problem):
                 each.base[RADIUS] = float(self.fixed_patch.contact_radius())
         return maps
 
-    def _predictions(self, steps: int, twists: Sequence[np.ndarray] | None = None) -> list[Prediction]:
-        twists = [each.values for each in self.twists] if twists is None else twists
-        begins = self.options.begins
-        both = zip(self.logs, twists, strict=True)
-        return [Prediction(self.simulator, log, twist, begins=begins, refine=steps) for log, twist in both]
+    def _predictions(
+        self, steps: int, twists: Sequence[np.ndarray] | None = None, logs: Sequence[Log] | None = None
+    ) -> list[Prediction]:
+        twists, logs = [each.values for each in self.twists] if twists is None else twists, logs or self.logs
+        result = []
+        for log, twist in zip(logs, twists, strict=True):
+            kind = PartsPrediction if len(log.parts) > 1 else Prediction
+            result.append(kind(self.simulator, log, twist, begins=self.options.begins, refine=steps))
+        return result
 
     @property
     def work(self) -> float:
@@ -242,8 +201,11 @@ class LogProblem(Problem):
         if most <= 1.0:
             return False
         self.steps *= min(int(2 ** np.ceil(0.5 * np.log2(most))), FINEST // self.steps)
-        self.predictions, self._last = self._predictions(self.steps), None
+        self.predictions, self._shown = self._predictions(self.steps), None
         return True
+
+    def forget(self) -> None:
+        self._slopes = None
 
     def start_values(self) -> np.ndarray:
         """Return the values `[F]` of the names in the law, the patch and its pressure."""
@@ -260,37 +222,50 @@ class LogProblem(Problem):
 
     def shown(self, values: np.ndarray, predictions: Sequence[Prediction] | None = None) -> list[np.ndarray]:
         """Compute the wrenches `[T, 3]` that the sensors of each log should show, for values `[F]` or `[F + K]`."""
-        if predictions is None and self._last is not None and np.array_equal(self._last[0], values):
-            return [shown for shown, _ in self._last[1]]
+        if predictions is None and self._shown is not None and np.array_equal(self._shown[0], values):
+            return self._shown[1]
         contact, rig = self.split(values)
         result = []
         for i, (prediction, each) in enumerate(zip(predictions or self.predictions, self.maps, strict=True)):
             wrench = prediction.wrenches(each.vector(contact), self.rig.delay(rig))
             result.append(self.rig.added(i, rig, wrench, np.zeros_like(wrench))[0])
+        if predictions is None:
+            self._shown = values.copy(), result
         return result
 
     def linearised(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        shown, slopes = zip(*self._derived(values), strict=True)
-        both = zip(slopes, self.logs, self.used, sigma, strict=True)
+        """Compute the residuals over `sigma`, `[M]`, and derivatives `[M, F + K]`, at `values` or nearby (`NEARBY`)."""
+        if self._slopes is None or not self._near(values, self._slopes[0]):
+            self._derive(values)
+        assert self._slopes is not None
+        both = zip(self._slopes[1], self.logs, self.used, sigma, strict=True)
         rows = [(slope * (log.channels / each)[..., None])[used] for slope, log, used, each in both]
-        return self._scaled(shown, sigma), np.concatenate([each.reshape(-1, each.shape[-1]) for each in rows])
+        jacobian = np.concatenate([each.reshape(-1, each.shape[-1]) for each in rows])
+        return self._scaled(self.shown(values), sigma), jacobian
 
-    def _derived(self, values: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Compute shown wrenches `[T, 3]` and their derivatives `[T, 3, F + K]`; the last ones are remembered."""
-        if self._last is None or not np.array_equal(self._last[0], values):
-            contact, rig = self.split(values)
-            found = []
-            for i, (prediction, each) in enumerate(zip(self.predictions, self.maps, strict=True)):
-                per_value = each.slopes(contact)
-                rows = np.flatnonzero(per_value.any(axis=1))
-                wrench, slope, later = prediction.sensitivities(
-                    each.vector(contact), [PARAMETERS[row] for row in rows], self.rig.delay(rig)
-                )
-                shown, factor, of_rig = self.rig.added(i, rig, wrench, later)
-                slope = factor[:, None, None] * (slope @ per_value[rows])
-                found.append((shown, np.concatenate([slope, of_rig], axis=-1)))
-            self._last = values.copy(), found
-        return self._last[1]
+    def _near(self, values: np.ndarray, others: np.ndarray) -> bool:
+        """Return True if no value differs by more than `NEARBY` from another one, as a share of its size."""
+        if len(values) != len(others):
+            return False
+        centre = [self.base["contact_radius"] if name in ("centre_x", "centre_y") else 0.0 for name in self.names]
+        sizes = np.concatenate([np.maximum(np.abs(values[: len(centre)]), centre), self.rig.widths])[: len(values)]
+        return bool((np.abs(values - others) <= NEARBY * sizes).all())
+
+    def _derive(self, values: np.ndarray) -> None:
+        """Compute shown wrenches `[T, 3]` and their derivatives `[T, 3, F + K]`, and remember them."""
+        contact, rig = self.split(values)
+        found = []
+        for i, (prediction, each) in enumerate(zip(self.predictions, self.maps, strict=True)):
+            per_value = each.slopes(contact)
+            rows = np.flatnonzero(per_value.any(axis=1))
+            wrench, slope, later = prediction.sensitivities(
+                each.vector(contact), [PARAMETERS[row] for row in rows], self.rig.delay(rig)
+            )
+            shown, factor, of_rig = self.rig.added(i, rig, wrench, later)
+            slope = factor[:, None, None] * (slope @ per_value[rows])
+            found.append((shown, np.concatenate([slope, of_rig], axis=-1)))
+        shown, slopes = zip(*found, strict=True)
+        self._shown, self._slopes = (values.copy(), [*shown]), (values.copy(), [*slopes])
 
     def residual(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> np.ndarray:
         """Compute the residuals over `sigma`, `[M]`."""
@@ -327,7 +302,9 @@ class LogProblem(Problem):
             channels = np.flatnonzero(twist.noisy & ("twist" in self.rig.groups))
             base = prediction.wrenches(vector) if len(channels) else None
             for k in channels:
-                square += (prediction.moved(vector, twist.left[k] * np.eye(3)[k]) - base) ** 2
+                square += (
+                    prediction.moved(vector, *(np.eye(3)[k] * each for each in (twist.left, twist.noise))) - base
+                ) ** 2
             sigma.append(np.sqrt(square))
         return sigma
 
@@ -342,9 +319,11 @@ class LogProblem(Problem):
         random, base = np.random.default_rng(0), self.shown(values)
         result = []
         for _ in range(draws):
-            both = zip(self.twists, noisy, strict=True)
+            both = [*zip(self.twists, noisy, strict=True)]
             drawn = [twist.values + np.where(on, twist.error(random), 0.0) for twist, on in both]
-            shown = self.shown(values, self._predictions(self.steps, drawn))
+            between = [(log, twist.noise * on) for log, (twist, on) in zip(self.logs, both, strict=True)]
+            logs = [redrawn(log, noise, random) for log, noise in between]
+            shown = self.shown(values, self._predictions(self.steps, drawn, logs))
             change = [new - old + log.wrench for new, old, log in zip(shown, base, self.logs, strict=True)]
             result.append(self._scaled(change, sigma))
         return np.array(result)

@@ -62,6 +62,8 @@ class Identification(ByValue):
     """The models that were fitted."""
     chosen: str = ""
     """Name of the model that explains the data best."""
+    samples: tuple[int, int] = (0, 0)
+    """Number of samples that were fitted, and number of all, as a long log is decimated (`FitOptions.samples`)."""
 
     @property
     def residuals(self) -> list[np.ndarray]:
@@ -213,6 +215,7 @@ class Identification(ByValue):
                 name: column.tolist()
                 for (name, _), column in zip(self.channels, self.residual_correlations().T, strict=True)
             },
+            "samples": {"used": self.samples[0], "total": self.samples[1]},
             "starts": {"agreeing": self.starts[0], "total": self.starts[1]},
         }
 

@@ -247,6 +247,8 @@ def smoothed(log: Log) -> SmoothTwist:
 
     Samples that are not evenly spaced in time, and twists with hardly any noise, stay as they are.
     """
+    if len(log.parts) > 1:
+        return _joined([smoothed(part) for part in log.parts])
     found = as_measured(log)
     if not log.even or len(log.time) < LEAST_TO_SMOOTH:
         return found
@@ -261,6 +263,17 @@ def as_measured(log: Log) -> SmoothTwist:
     """Return the twist of a log as it was measured, with the noise that it has."""
     noise = jitter(log.twist)
     return SmoothTwist(log.twist, noise, noise.copy(), np.zeros(3))
+
+
+def _joined(parts: Sequence[SmoothTwist]) -> SmoothTwist:
+    """Join the parts of a log: mean squares of errors, and the median weights."""
+    sizes = [len(part.values) for part in parts]
+    noise, left = (
+        np.sqrt(np.average([getattr(part, name) ** 2 for part in parts], axis=0, weights=sizes))
+        for name in ("noise", "left")
+    )
+    weights = np.median([part.weights for part in parts], axis=0)
+    return SmoothTwist(np.concatenate([part.values for part in parts]), noise, left, weights)
 
 
 def _smooth(values: np.ndarray) -> tuple[np.ndarray, float, float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -83,6 +84,7 @@ def refine(fit: Fit, *, report: Report) -> Fit:
         elif settled:
             break
         fit = _best(problem, coordinates, [fit.x], noise, sigma, ROUGH if finer else FINE, report)
+    problem.forget()
     found = _best(problem, coordinates, [fit.x], noise, sigma, FINE, report)
     return dataclasses.replace(found, starts=starts)
 
@@ -126,12 +128,13 @@ def _best(
         key = x.tobytes()
         if key not in memory:  # least_squares asks for the residuals, then for their derivatives
             memory.clear()
+            report(f"{words}, evaluation {next(evaluations)}")
             memory[key] = condensed(*residuals(x))
         return memory[key]
 
-    found = []
+    found, evaluations, words = [], itertools.count(1), ""
     for number, point in enumerate(points, start=1):
-        report(f"start {number} of {len(points)}")
+        words = f"start {number} of {len(points)}"
         each = least_squares(
             lambda x: evaluate(x)[0],
             point,
@@ -217,7 +220,7 @@ def _speeds(speeds: np.ndarray) -> np.ndarray:
 
 def _stiffnesses(problem: LogProblem, speeds: list[np.ndarray], mu_c: float) -> np.ndarray:
     """Return stiffnesses to try [1/m]: full deflection after a tenth of a usual step up to a tenth of all travel."""
-    steps = np.concatenate([s[1:] * np.diff(log.time) for s, log in zip(speeds, problem.logs, strict=True)])
+    steps = np.concatenate([s * log.durations for s, log in zip(speeds, problem.logs, strict=True)])
     moving = steps[steps > 0.0]
     if not len(moving):
         return np.array([LuGre.sigma_0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
+
+if TYPE_CHECKING:
+    from planarfriction.identify.decimation import DecimatedLog
 
 CHANGE = 1e-6
 """Step of difference quotients as a share of the parameter: rounding and curvature both stay below 1e-5."""
@@ -217,17 +220,23 @@ class Prediction:
         order = order[2:] if log.held else order[1:-1]
         before = np.zeros(STEADY_STEPS if begins == "steady" else 1, dtype=int)
         order = np.concatenate([before, order])
-        self._inputs = twists[order], loads[order], self._half
+        self._inputs: tuple[np.ndarray, np.ndarray, Any] = twists[order], loads[order], self._half
         self._first = len(before) - 1
+        self._between: Any = 0.0
 
     def wrenches(self, vector: np.ndarray, delay: float = 0.0) -> np.ndarray:
         """Compute the wrenches `[T, 3]` at the samples."""
         return self._read(self._nodes(self.simulator.wrenches(*self._inputs, vector)), delay)[0]
 
-    def moved(self, vector: np.ndarray, change: Sequence[float]) -> np.ndarray:
-        """Compute the wrenches `[T, 3]` at the samples with `change` `[3]` added to all twists."""
+    def moved(self, vector: np.ndarray, change: np.ndarray, noise: np.ndarray) -> np.ndarray:
+        """Compute the wrenches `[T, 3]` at the samples with `change` `[3]` added to all twists.
+
+        Between the windows of a decimated log it is what means leave of the `noise` `[3]` of single samples.
+        """
         twists, loads, half = self._inputs
-        return self._read(self._nodes(self.simulator.wrenches(twists + change, loads, half, vector)), 0.0)[0]
+        between = np.multiply.outer(self._between, noise)
+        changed = twists + np.where(between > 0.0, between, change)
+        return self._read(self._nodes(self.simulator.wrenches(changed, loads, half, vector)), 0.0)[0]
 
     def sensitivities(
         self, vector: np.ndarray, names: Sequence[str], delay: float = 0.0
@@ -237,11 +246,11 @@ class Prediction:
         wrenches, per_second = self._read(self._nodes(values), delay)
         return wrenches, self._read(self._nodes(slopes), delay)[0], -per_second
 
-    def _nodes(self, values: np.ndarray) -> np.ndarray:
+    def _nodes(self, values: np.ndarray) -> Any:
         """Return the values at the nodes among those at the ends of all steps."""
         return values[self._first :: 2]
 
-    def _read(self, nodes: np.ndarray, delay: float) -> tuple[np.ndarray, np.ndarray]:
+    def _read(self, nodes: Any, delay: float) -> tuple[np.ndarray, np.ndarray]:
         """Interpolate values at the samples, later by `delay` [s]; returns them and their derivatives over time."""
         step = 2.0 * self._half
         wanted = (self.log.time - self.log.time[0] - delay) / step
@@ -255,3 +264,35 @@ class Prediction:
         inside = (wanted == place).reshape(t.shape)  # before the log the contact rests
         slopes = np.where(inside, (one + t * (2.0 * two + 3.0 * t * three)) / step, 0.0)
         return b + t * (one + t * (two + t * three)), slopes
+
+
+class PartsPrediction(Prediction):
+    """Simulated wrenches of a decimated log: of its parts, with the motion between them in longer steps."""
+
+    def __init__(self, simulator: Simulator, log: DecimatedLog, twist: np.ndarray, *, begins="rest", refine: int = 1):
+        self.simulator, self.log = simulator, log
+        ends = np.cumsum([len(part.time) for part in log.parts])
+        self._parts = [
+            Prediction(simulator, part, own, begins=begins if number == 0 else "rest", refine=refine)
+            for number, (part, own) in enumerate(zip(log.parts, np.split(twist, ends[:-1]), strict=True))
+        ]
+        self.steps = sum(part.steps for part in self._parts)
+        pieces, self._spans, at = [], [], 0
+        for gap, part in zip((None, *log.gaps), self._parts, strict=True):
+            twists, loads, half = part._inputs
+            if gap is not None:
+                pieces.append(gap.until(half, twists[0]))
+                at += len(gap.dt)
+            pieces.append((twists, loads, np.full(len(loads), half), np.zeros(len(loads))))
+            self._spans.append(slice(at, at + len(loads)))
+            at += len(loads)
+        twists, loads, dt, self._between = (np.concatenate(each) for each in zip(*pieces, strict=True))
+        self._inputs = twists, loads, dt
+
+    def _nodes(self, values):
+        return [part._nodes(values[span]) for part, span in zip(self._parts, self._spans, strict=True)]
+
+    def _read(self, nodes, delay):
+        found = [part._read(own, delay) for part, own in zip(self._parts, nodes, strict=True)]
+        read, slopes = zip(*found, strict=True)
+        return np.concatenate(read), np.concatenate(slopes)

@@ -17,7 +17,7 @@ from planarfriction.described import described
 from planarfriction.equality import ByValue, Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.logs import increasing, unwrapped
-from planarfriction.identify.problem import check_noise
+from planarfriction.identify.options import check_noise
 from planarfriction.identify.verdicts import Verdict
 from planarfriction.scenes import simulate
 from planarfriction.scenes.ready import free_slide

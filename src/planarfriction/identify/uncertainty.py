@@ -158,10 +158,11 @@ def _over_time(fit: Fit, residual, jacobian, pull, neighbours: float, bread: np.
         near = min(max(neighbours, 0.0), 0.999)
         lags = int(max(np.cbrt(len(vote)), 3.0 * (1.0 + near) / (1.0 - near)))
         lags = max(min(lags, int(LONGEST * len(vote))), 1)
-        filling = filling + vote.T @ vote
-        for lag in range(1, lags + 1):
-            both = vote[lag:].T @ vote[:-lag]
-            filling = filling + (1.0 - lag / (lags + 1.0)) * (both + both.T)
+        # weights that fall linearly are those of sums over a window that slides over the samples
+        zeros = np.zeros((lags + 1, vote.shape[1]))
+        upto = np.cumsum(np.concatenate([zeros, vote, zeros[1:]]), axis=0)
+        sums = upto[lags + 1 :] - upto[: -lags - 1]
+        filling = filling + sums.T @ sums / (lags + 1.0)
     return np.maximum(np.einsum("ij,jk,ik->i", bread, filling, bread), 0.0)
 
 

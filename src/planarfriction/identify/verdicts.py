@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 
 from planarfriction.described import described
+from planarfriction.identify.decimation import samples_of
+from planarfriction.identify.logs import Log
 from planarfriction.identify.parameters import ALL, SOFT_FINGER
 from planarfriction.identify.search import Fit
 from planarfriction.identify.uncertainty import Uncertainty
@@ -63,6 +65,16 @@ class Verdict:
         if self.parameter == "fit":
             return f"fit: {self.reason}"
         return f"{self.parameter}: {'' if self.identifiable else 'not identifiable, '}{self.reason}"
+
+
+def verdicts_on_samples(logs: Sequence[Log]) -> list[Verdict]:
+    """Return a verdict that says how many samples were used, if some were not."""
+    used, total = samples_of(logs)
+    if used == total:
+        return []
+    windows = sum(len(log.parts) for log in logs)
+    text = f"of {total:,} samples, {used:,} were used: {windows} windows in which motion, load and friction differ most"
+    return [Verdict("fit", True, f"{text}; between them the model follows the motion in longer steps")]
 
 
 def verdicts_on_turns(measured: Sequence[Any]) -> list[Verdict]:

@@ -12,16 +12,18 @@ from planarfriction import validation
 from planarfriction.derivatives import PARAMETERS
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
-from planarfriction.identify.checks import check_logs, with_findings
+from planarfriction.identify.checks import check_logs, size_of, with_findings
+from planarfriction.identify.decimation import decimated, samples_of
 from planarfriction.identify.logs import Log, as_logs
+from planarfriction.identify.options import FitOptions
 from planarfriction.identify.parameters import fitted_law, scaled_patch
-from planarfriction.identify.problem import FitOptions, LogProblem, mean_load
+from planarfriction.identify.problem import LogProblem, mean_load
 from planarfriction.identify.result import Identification
 from planarfriction.identify.rig import CHANNELS, Nuisance, first_noise
 from planarfriction.identify.search import guess_starts, multistart, refine, warm_start
 from planarfriction.identify.simulators import SIMULATORS
 from planarfriction.identify.uncertainty import correlations, uncertainty
-from planarfriction.identify.verdicts import Candidate, Evidence, judge, verdicts_on_turns
+from planarfriction.identify.verdicts import Candidate, Evidence, judge, verdicts_on_samples, verdicts_on_turns
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models import ReducedModelPublished
 from planarfriction.patch import ContactPatch
@@ -86,6 +88,7 @@ def identify_lugre(
     validation.instance("options", options, FitOptions, "a FitOptions record")
     law, given = _start_law(start, options.elasto_plastic)
     findings = check_logs(logs, patch, names)
+    whole, logs = logs, decimated(logs, size_of(logs[0], patch), options.samples)
     noise = first_noise(logs) if options.noise is None else np.array(options.noise)
     # The quickest model leads: it finds where the others begin.
     guesses, candidates, skipped, lead = [], [], [], None
@@ -108,7 +111,7 @@ def identify_lugre(
     assert lead is not None
     best = min(candidates, key=lambda each: each.uncertainty.score)
     found = _identification(best, candidates, skipped, lead.starts)
-    return with_findings(found, logs, findings)
+    return with_findings(found, whole, findings)
 
 
 def _models_to_fit(model: str, patch: ContactPatch, names: Sequence[str]) -> tuple[str, ...]:
@@ -159,7 +162,7 @@ def _identification(
     """Make the result from the best of several models: errors, verdicts, histories, the fitted law and model."""
     fit, u = best.fit, best.uncertainty
     problem = fit.problem
-    count = len(problem.names)
+    count, logs = len(problem.names), problem.logs
     values, rig = problem.split(fit.values)
     errors = np.sqrt(np.diag(u.covariance))
     histories = _histories(best)
@@ -170,7 +173,7 @@ def _identification(
         values=values,
         standard_errors=errors[:count],
         correlations=evidence.correlations,
-        verdicts=(*judge(evidence, best, candidates, skipped), *verdicts_on_turns(problem.logs)),
+        verdicts=(*judge(evidence, best, candidates, skipped), *verdicts_on_samples(logs), *verdicts_on_turns(logs)),
         noise=fit.noise,
         channels=CHANNELS,
         histories=tuple(histories),
@@ -180,6 +183,7 @@ def _identification(
         rig=(*problem.rig.found(rig, errors[count:]), *_noise_of_twists(problem)),
         scores=tuple(each.score for each in candidates),
         chosen=problem.model,
+        samples=samples_of(logs),
     )
 
 

@@ -1,0 +1,180 @@
+"""Decimation of long logs: windows of consecutive samples that differ most, and the motion between them in few steps.
+
+The model steps through all motion, as bristles remember it: through every sample of a window, and between windows in
+steps with the mean twist, which get shorter towards the next window. Bristles forget exponentially over the distance
+that they slide, so they enter the window as after every sample.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planarfriction.identify.logs import Log
+from planarfriction.identify.rig import LONGEST, jitter
+
+WINDOW = 200
+"""Least number of samples of a window."""
+
+GROWTH, LEVELS = 1.03, 600
+"""Ratio of the distances from a window at which steps before it begin, and number of these distances: they span a
+factor of 5e7, the last one a part of the deflection of a bristle. Wrenches in a window are then off by 3e-4 of
+the largest at most (by 2e-2 with a ratio of 1.15)."""
+
+LEAST_SPEED, NOISE = 1e-3, 3.0
+"""Speed below which windows count as alike, as a share of the largest speed, and in standard deviations of its noise;
+below the latter nothing moves."""
+
+TINY = np.finfo(float).tiny
+
+
+class Gap(NamedTuple):
+    """Motion between two windows in G steps."""
+
+    twist: np.ndarray
+    """Mean twists [m/s, m/s, rad/s], `[G, 3]`."""
+    load: np.ndarray
+    """Mean loads [N], `[G]`; 0 in a step with a sample without load."""
+    dt: np.ndarray
+    """Durations [s], `[G]`."""
+    error: np.ndarray
+    """Noise of the mean twists over that of a sample [-], `[G]`."""
+
+    def until(self, time: float, twist: np.ndarray) -> Gap:
+        """Return the gap without its last `time` [s], which have this `twist` `[3]`."""
+        (*_, moved), (*_, lasts) = self.twist, self.dt
+        mean = (moved * lasts - twist * time) / (lasts - time)
+        return self._replace(twist=np.vstack([self.twist[:-1], mean]), dt=np.append(self.dt[:-1], lasts - time))
+
+
+@dataclass(frozen=True, eq=False)
+class DecimatedLog(Log):
+    """Log of which only windows are left."""
+
+    parts: tuple[Log, ...] = ()
+    """Windows, each with samples before and after it that the delay of a rig may ask for."""
+    gaps: tuple[Gap, ...] = ()
+    """Motion between one window and the next."""
+    inner: Any = ()
+    """Places of the samples that are fitted."""
+    total: int = 0
+    """Number of samples of the whole log."""
+
+
+def decimated(logs: Sequence[Log], size: float, most: int) -> tuple[Log, ...]:
+    """Return the logs if they have `most` samples or fewer, else windows of them with about as many.
+
+    `size` is the length that turns spin into speed [m]. Each log keeps one window at least.
+    """
+    total = sum(len(log.time) for log in logs)
+    if total <= most:
+        return tuple(logs)
+    result = []
+    for log in logs:
+        count, blocks = max(most * len(log.time) // total // WINDOW, 1), len(log.time) // WINDOW
+        result.append(
+            log if blocks <= count else _decimated(log, size, np.arange(blocks + 1) * len(log.time) // blocks, count)
+        )
+    return tuple(result)
+
+
+def samples_of(logs: Sequence[Log]) -> tuple[int, int]:
+    """Return the number of samples that are fitted, and the number of all."""
+    cut = [(len(log.inner), log.total) if isinstance(log, DecimatedLog) else (len(log.time),) * 2 for log in logs]
+    used, total = np.sum(cut, axis=0).tolist()
+    return used, total
+
+
+def redrawn(log: Log, noise: np.ndarray, random: np.random.Generator) -> Log:
+    """Return the log with `noise` `[3]` of a sample's twist drawn anew between its windows, if it has any."""
+    if not isinstance(log, DecimatedLog):
+        return log
+    draw = (gap.error[:, None] * noise * random.standard_normal(gap.twist.shape) for gap in log.gaps)
+    gaps = tuple(gap._replace(twist=gap.twist + error) for gap, error in zip(log.gaps, draw, strict=True))
+    return dataclasses.replace(log, gaps=gaps)
+
+
+def _decimated(log: Log, size: float, edges: np.ndarray, count: int) -> DecimatedLog:
+    """Return `count` of the windows of a log between rows `edges`."""
+    speed, still = np.zeros(len(log.time)), []
+    for values, scale in zip(log.twist.T, (1.0, 1.0, size), strict=True):
+        still.append(float(NOISE * jitter(values[:, None])[0]))
+        speed += scale * np.where(np.abs(values) > still[-1], np.abs(values), 0.0)
+    path = np.concatenate([[0.0], np.cumsum(speed[1:] * np.diff(log.time))])
+    chosen = farthest(features(log, edges, still), count)
+    rows = np.unique(np.concatenate([np.arange(edges[i], edges[i + 1]) for i in chosen]))
+    around = min(int(np.ceil(LONGEST / log.interval)), WINDOW // 2)
+    mask = np.zeros(len(log.time) + 1, dtype=int)
+    np.add.at(mask, np.maximum(edges[chosen] - around, 0), 1)
+    np.add.at(mask, np.minimum(edges[chosen + 1] + around, len(log.time)), -1)
+    stepped = np.flatnonzero(np.cumsum(mask[:-1]) > 0)
+    spans = np.split(stepped, np.flatnonzero(np.diff(stepped) > 1) + 1)
+    parts = [
+        Log(log.time[s], log.twist[s], log.wrench[s], log.normal_force[s], log.name, held=log.held)
+        for s in (slice(span[0], span[-1] + 1) for span in spans)
+    ]
+    gaps = [_gap(log, path, a[-1], b[0]) for a, b in itertools.pairwise(spans)]
+    all_of = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("time", "twist", "wrench", "normal_force")
+    )
+    inner = np.searchsorted(stepped, rows)
+    return DecimatedLog(*all_of, log.name, log.turns, log.held, tuple(parts), tuple(gaps), inner, len(log.time))
+
+
+def features(log: Log, edges: np.ndarray, still: Sequence[float]) -> np.ndarray:
+    """Compute what tells windows between rows `edges` apart, `[B, 15]` with values of about one.
+
+    These are the largest twist in either direction on a scale that is logarithmic above the speeds `still` `[3]`, the
+    least and the largest load, mean and spread of the wrench, and the place in time: a slip of one sample shows.
+    """
+    starts, lengths, columns = edges[:-1], np.diff(edges), [edges[:-1] / edges[-1]]
+    for values, noise in zip(log.twist.T, still, strict=True):
+        largest = max(float(np.abs(values).max()), TINY)
+        least = max(noise, LEAST_SPEED * largest)
+        ends = (np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts))
+        columns += [np.arcsinh(each / least) / np.arcsinh(largest / least) for each in ends]
+    for of in (np.minimum, np.maximum):
+        columns.append(of.reduceat(log.normal_force, starts) / max(log.normal_force.max(), TINY))
+    for values in log.wrench.T:
+        largest = max(float(np.abs(values).max()), TINY)
+        mean, square = (np.add.reduceat((values / largest) ** power, starts) / lengths for power in (1, 2))
+        columns += [mean, np.sqrt(np.maximum(square - mean**2, 0.0))]
+    return np.stack(columns, -1)
+
+
+def farthest(points: np.ndarray, count: int) -> np.ndarray:
+    """Choose `count` points `[B, D]`, the first, then each the farthest from those chosen; returns sorted places.
+
+    No point is left farther from a chosen one than chosen ones are from each other (Gonzalez 1985).
+    """
+    chosen, distance = [0], np.full(len(points), np.inf)
+    while len(chosen) < count:
+        distance = np.minimum(distance, ((points - points[chosen[-1]]) ** 2).sum(axis=1))
+        chosen.append(int(np.argmax(distance)))
+    return np.unique(chosen)
+
+
+def _gap(log: Log, path: np.ndarray, first: int, last: int) -> Gap:
+    """Return the motion from row `first` to row `last` in steps that begin at `GROWTH`-fold distances from `last`.
+
+    Distances are those along the `path` `[T]` [m], and rows; a hold before a window or after one is apart.
+    """
+    shares = GROWTH ** -np.arange(LEVELS)
+    own = path[first : last + 1]
+    by_path = first + np.searchsorted(own, own[-1] - (own[-1] - own[0]) * shares, side="right") - 1
+    ends = first + np.searchsorted(own, own[-1]), first + np.searchsorted(own, own[0], side="right") - 1
+    by_row = last - np.round((last - first) * shares).astype(int)
+    rows = np.unique(np.clip(np.concatenate([by_path, by_row, ends, [last]]), first, last))
+    time, twist, load = (values[first : last + 1] for values in (log.time, log.twist, log.normal_force))
+    steps, at = np.diff(time), rows[:-1] - first
+    since = twist[1:] if log.held else 0.5 * (twist[1:] + twist[:-1])
+    dt = np.diff(log.time[rows])
+    mean = np.add.reduceat(since * steps[:, None], at, axis=0) / dt[:, None]
+    loads = np.add.reduceat(0.5 * (load[1:] + load[:-1]) * steps, at) / dt
+    loads = np.where(np.minimum.reduceat(load[1:], at) > 0.0, loads, 0.0)
+    return Gap(mean, loads, dt, 1.0 / np.sqrt(np.diff(rows)))
