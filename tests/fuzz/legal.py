@@ -245,7 +245,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "nuisance": (),
         "noise": (1e-3, 1e-3, 1e-5),
     },
-    "identify.FitOptions": {"noise": (1e-3, 1e-3, 1e-5), "surface": pf.LimitSurfaceCells},
+    "identify.FitOptions": {"noise": (1e-3, 1e-3, 1e-5), "surface": pf.LimitSurfaceCells, "samples": 5000},
     "identify.candidate_motions": {"duration": 0.5, "rate": 500.0},
     "identify.fit_start": {"body": Fresh(lambda: pf.identify.SlidingBody(0.2, 1e-4)), "noise": (1e-3, 1e-3, 0.02)},
     "identify.predict_slide": {"body": Fresh(lambda: pf.identify.SlidingBody(0.2, 1e-4))},

@@ -87,7 +87,7 @@ def test_threads_share_contacts_and_parts(model, monkeypatch):
     twist, loads, dt = runs(21, 50)
     whole = derivatives.rollout(model, None, twist, loads, dt)
     gradient = derivatives.rollout_vjp(model, None, twist, loads, dt, whole.wrenches)
-    monkeypatch.setattr("planarfriction.derivatives.inputs._WORTH_A_THREAD", 100)
+    monkeypatch.setattr("planarfriction.derivatives.inputs.WORTH_A_THREAD", 100)
     monkeypatch.setattr("os.sched_getaffinity", lambda _: range(5), raising=False)
     shared = derivatives.rollout(model, None, twist, loads, dt)
     close(shared.wrenches, whole.wrenches)

@@ -91,7 +91,7 @@ def samples_of(logs: Sequence[Log]) -> tuple[int, int]:
 
 
 def redrawn(log: Log, noise: np.ndarray, random: np.random.Generator) -> Log:
-    """Return the log with `noise` `[3]` of a sample's twist drawn anew between its windows, if it has any."""
+    """Return the log with `noise` `[3]` of a sample's twist drawn again between its windows, if it has any."""
     if not isinstance(log, DecimatedLog):
         return log
     draw = (gap.error[:, None] * noise * random.standard_normal(gap.twist.shape) for gap in log.gaps)
