@@ -75,7 +75,7 @@ def bench(only: tuple[str, ...], full: bool, rounds: int | None, old: Path | Non
         print(json.dumps([dataclasses.asdict(line) for line in lines], indent=2))
     elif then is not None:
         headings = ["name", "then", "now", "ratio then", "ratio now", "change", "spread", ""]
-        print_table("Ratios to the baselines", headings, comparison.rows(comparison.changes(lines, then)))
+        print_table("Ratios to the baselines", headings, comparison.rows(comparison.changes(lines, then)), width=WIDEST)
     else:
         shown = lambda value, unit="": "" if value is None else f"{value:.4g} {unit}".strip()  # noqa: E731
         rows = [
