@@ -12,7 +12,7 @@ import numpy as np
 import planarfriction as pf
 
 law = pf.LuGre(mu_c=0.3, mu_s=0.3, sigma_0=1e5, sigma_1=20.0, sigma_2=0.0, elasto_plastic=0.9)
-model = pf.ReducedModel(pf.ContactPatch.disc(0.04), law)
+model = pf.DistributedModel(pf.ContactPatch.disc(0.04), law)
 figure, ax = plt.subplots(figsize=(5.4, 4.4), layout="constrained")
 for speed, spin in ((1.0, 5.0), (0.3, 25.0), (0.1, 25.0), (0.7, 15.0)):
     scene = pf.scenes.free_slide(model, inertia=0.2 * 0.04**2 / 2, twist=(speed, 0.0, spin), save_every=1e-3)
