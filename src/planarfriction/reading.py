@@ -216,5 +216,5 @@ def number(path: str | Path, line: int, place: str, cell: str) -> float:
     return value
 
 
-def _too_large(path: Path, what: str, most: int) -> FileError:
+def _too_large(path: str | Path, what: str, most: int) -> FileError:
     return FileError(f"{path}: is larger than {most / 1e6:g} MB, the most that is read as {what}")

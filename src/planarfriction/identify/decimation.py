@@ -107,7 +107,7 @@ def _decimated(log: Log, size: float, edges: np.ndarray, count: int) -> Decimate
         speed += scale * np.where(np.abs(values) > still[-1], np.abs(values), 0.0)
     path = np.concatenate([[0.0], np.cumsum(speed[1:] * np.diff(log.time))])
     chosen = farthest(features(log, edges, still), count)
-    rows = np.unique(np.concatenate([np.arange(edges[i], edges[i + 1]) for i in chosen]))
+    rows = np.unique(np.concatenate([np.arange(int(edges[i]), int(edges[i + 1])) for i in chosen]))
     around = min(int(np.ceil(LONGEST / log.interval)), WINDOW // 2)
     mask = np.zeros(len(log.time) + 1, dtype=int)
     np.add.at(mask, np.maximum(edges[chosen] - around, 0), 1)
@@ -119,11 +119,13 @@ def _decimated(log: Log, size: float, edges: np.ndarray, count: int) -> Decimate
         for s in (slice(span[0], span[-1] + 1) for span in spans)
     ]
     gaps = [_gap(log, path, a[-1], b[0]) for a, b in itertools.pairwise(spans)]
-    all_of = (
+    time, twist, wrench, load = (
         np.concatenate([getattr(part, name) for part in parts]) for name in ("time", "twist", "wrench", "normal_force")
     )
     inner = np.searchsorted(stepped, rows)
-    return DecimatedLog(*all_of, log.name, log.turns, log.held, tuple(parts), tuple(gaps), inner, len(log.time))
+    return DecimatedLog(
+        time, twist, wrench, load, log.name, log.turns, log.held, tuple(parts), tuple(gaps), inner, len(log.time)
+    )  # fmt: skip
 
 
 def features(log: Log, edges: np.ndarray, still: Sequence[float]) -> np.ndarray:

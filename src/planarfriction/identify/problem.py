@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -162,7 +163,7 @@ class LogProblem(Problem):
         twists, logs = [each.values for each in self.twists] if twists is None else twists, logs or self.logs
         result = []
         for log, twist in zip(logs, twists, strict=True):
-            kind = PartsPrediction if len(log.parts) > 1 else Prediction
+            kind: Any = PartsPrediction if len(log.parts) > 1 else Prediction
             result.append(kind(self.simulator, log, twist, begins=self.options.begins, refine=steps))
         return result
 
