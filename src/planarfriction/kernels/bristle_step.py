@@ -57,52 +57,36 @@ rule(reachable, "s", {0: "beyond_full({0})"}, beyond_full=_beyond_full)
 
 
 @kernel
-def _along(z, size, u, per_h):
-    """Compute the speed at which a bristle of norm `size` is being stretched; 0 for none."""
-    return per_h * ratio(dot(z, u), size)
+def seen(z, u, per_h, q):
+    """Return the deflection of a bristle, and the speed at which it is being stretched; 0 and 0 for none."""
+    size = norm(z)
+    return size * (q * per_h), per_h * ratio(dot(z, u), size)
 
 
 @kernel
-def begin(law, z, u, v, per_h, q):
-    """Return the deflection of a bristle, and its k."""
-    to_deflection, size = q * per_h, norm(z)
-    deflection = size * to_deflection
-    return deflection, formulas.bristle_decay(xp, deflection, _along(z, size, u, per_h), v, q, law)
-
-
-@kernel
-def aim(law, z, u, v, per_h, q, dt, deflection, start):
-    """Return x: the mean decay over a step, from its start and a predicted end, times dt."""
-    ahead = plus(z, dt, u)
-    far = norm(ahead)
-    reached = far * (q * per_h) / (1.0 + start * dt)
+def ahead(z, u, per_h, q, dt, deflection, start):
+    """Return `seen` of the predicted end of a step, at the start of which the bristle has this deflection and k."""
+    far, along = seen(plus(z, dt, u), u, per_h, q)
     # the bound of the prediction is full deflection or more, where k no longer depends on the deflection
-    bounded = xp.minimum(reached, xp.maximum(deflection, 1.0))
-    end = formulas.bristle_decay(xp, bounded, _along(ahead, far, u, per_h), v, q, law)
-    return formulas.mean_decay(start, end, dt) * dt
+    return xp.minimum(far / (1.0 + start * dt), xp.maximum(deflection, 1.0)), along
 
 
 @kernel
-def relax(z, u, dt, decay_dt):
-    """Return the bristle after dt, which may be beyond its cap."""
-    left, mean = formulas.relaxation(xp, decay_dt)
-    return plus(times(left, z), dt * mean, u)
-
-
-@kernel
-def settle(law, free, u, v, per_h, q, deflection):
-    """Return the bristle within its cap, and its k; `deflection`: that at the start of the step."""
-    size = norm(free)
-    reached = size * q * per_h
+def settle(law, free, u, per_h, q, deflection):
+    """Return the bristle within its cap, and `seen` of it; `deflection`: that at the start of the step."""
+    reached, along = seen(free, u, per_h, q)
     back = cap(reached, reachable(deflection, law))
-    k = formulas.bristle_decay(xp, reached * back, _along(free, size, u, per_h), v, q, law)
-    return times(back, free), k
+    return times(back, free), reached * back, along
 
 
 @kernel
 def step(law, z, u, v, per_h, q, dt):
     """Return the bristle after dt, and its k."""
-    deflection, start = begin(law, z, u, v, per_h, q)
-    decay_dt = aim(law, z, u, v, per_h, q, dt, deflection, start)
-    free = relax(z, u, dt, decay_dt)
-    return settle(law, free, u, v, per_h, q, deflection)
+    deflection, along = seen(z, u, per_h, q)
+    start = formulas.bristle_decay(xp, deflection, along, v, q, law)
+    predicted, along_end = ahead(z, u, per_h, q, dt, deflection, start)
+    end = formulas.bristle_decay(xp, predicted, along_end, v, q, law)
+    left, mean = formulas.relaxation(xp, formulas.mean_decay(start, end, dt) * dt)
+    free = plus(times(left, z), dt * mean, u)  # perhaps beyond its cap
+    new, reached, along_new = settle(law, free, u, per_h, q, deflection)
+    return new, formulas.bristle_decay(xp, reached, along_new, v, q, law)

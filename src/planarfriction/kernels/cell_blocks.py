@@ -13,12 +13,14 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
+from planarfriction import formulas
+from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import at
 from planarfriction.kernels import bristle_step
 from planarfriction.kernels.contacts import traction
 from planarfriction.kernels.law import grip
-from planarfriction.kernels.vectors import norm, plus, scatter, times
+from planarfriction.kernels.vectors import norm, plus, times
 
 VECTOR = 8
 """Numbers of the longest vectors that processors have."""
@@ -32,10 +34,7 @@ the state, what adds up over the cells (the wrench and its change; on the way ba
 and what adds up over the steps too: the cotangent of the law. Blocks share nothing, so that each is seen to be free of
 dependences."""
 
-_U, _SPEED, _GRIP, _DEFLECTION, _START, _DECAY = (LANES * n for n in (25, 27, 28, 29, 30, 31))
-"""Fields that passes of a step hand on."""
-
-BLOCK = LANES * 33
+BLOCK = LANES * 25
 """Numbers of a block: an odd number of fields, for if it were a power of two, blocks would drive each other out of the
 cache."""
 
@@ -120,6 +119,104 @@ def room(typingctx, count):
 # ---------------------------------------------------------------------- a step, pass by pass
 
 
+class _Step(NamedTuple):
+    """A block, what the passes of its step hand on, and what drives it."""
+
+    block: Any
+    work: Any
+    twist: tuple
+    dt: float
+
+
+_U, _SPEED, _GRIP, _DEFLECTION, _REACHED, _ALONG, _START, _DECAY, _MEAN = (LANES * n for n in (0, *range(2, 10)))
+"""Fields that passes hand on; all blocks share them, so that they stay in the nearest cache."""
+
+_WORK = LANES * 10
+
+
+def _pass(body: Any) -> Any:
+    """Return the pass over a block that does `body(lever, law, on, i)` for its cells."""
+
+    @kernel
+    def over_cells(lever, law, on, lanes):
+        for i in range(lanes):  # the body apart: kernel later, it leaves the compiler a loop that it can count
+            body(lever, law, on, i)
+
+    return over_cells
+
+
+@kernel
+def _decay(law, on, deflection, i):
+    """Return the decay of a bristle of this deflection, the last that was seen."""
+    work = on.work
+    return formulas.bristle_decay(xp, work[deflection + i], work[_ALONG + i], work[_SPEED + i], work[_GRIP + i], law)
+
+
+@_pass
+@kernel
+def _drive(lever, law, on, i):
+    u = lever.seen(lever_at(lever, on.block, i), on.twist)
+    put_pair(on.work, _U, i, u)
+    on.work[_SPEED + i] = norm(u)
+
+
+@_pass
+@kernel
+def _hold(lever, law, on, i):
+    on.work[_GRIP + i] = grip(law, on.work[_SPEED + i])
+
+
+@_pass
+@kernel
+def _see(lever, law, on, i):
+    seen = bristle_step.seen(pair(on.block, Z, i), pair(on.work, _U, i), 1.0, on.work[_GRIP + i])
+    on.work[_DEFLECTION + i], on.work[_ALONG + i] = seen
+
+
+@_pass
+@kernel
+def _start(lever, law, on, i):
+    on.work[_START + i] = _decay(law, on, _DEFLECTION, i)
+
+
+@_pass
+@kernel
+def _look_ahead(lever, law, on, i):
+    work, z, u = on.work, pair(on.block, Z, i), pair(on.work, _U, i)
+    deflection, start = work[_DEFLECTION + i], work[_START + i]
+    work[_REACHED + i], work[_ALONG + i] = bristle_step.ahead(z, u, 1.0, work[_GRIP + i], on.dt, deflection, start)
+
+
+@_pass
+@kernel
+def _end(lever, law, on, i):
+    on.work[_DECAY + i] = _decay(law, on, _REACHED, i)
+
+
+@_pass
+@kernel
+def _average(lever, law, on, i):
+    work = on.work
+    work[_DECAY + i] = formulas.mean_decay(work[_START + i], work[_DECAY + i], on.dt) * on.dt
+
+
+@_pass
+@kernel
+def _relax(lever, law, on, i):
+    on.work[_DECAY + i], on.work[_MEAN + i] = formulas.relaxation(xp, on.work[_DECAY + i])
+
+
+@_pass
+@kernel
+def _settle(lever, law, on, i):
+    work, u = on.work, pair(on.work, _U, i)
+    free = plus(times(work[_DECAY + i], pair(on.block, Z, i)), on.dt * work[_MEAN + i], u)
+    new, work[_REACHED + i], work[_ALONG + i] = bristle_step.settle(
+        law, free, u, 1.0, work[_GRIP + i], work[_DEFLECTION + i]
+    )
+    put_pair(on.block, Z, i, new)
+
+
 @kernel
 def end_traction(law, new, k, u):
     """Return the traction of a cell at the end of its step, per unit load."""
@@ -127,84 +224,39 @@ def end_traction(law, new, k, u):
 
 
 @kernel
-def _drive(lever, law, block, i, twist):
-    u = lever.seen(lever_at(lever, block, i), twist)
-    speed = norm(u)
-    put_pair(block, _U, i, u)
-    block[_SPEED + i], block[_GRIP + i] = speed, grip(law, speed)
+def _pull(lever, law, on, i):
+    """Return the wrench of a cell."""
+    t = end_traction(law, pair(on.block, Z, i), on.work[_DECAY + i], pair(on.work, _U, i))
+    return lever.wrench(lever_at(lever, on.block, i), times(on.block[WEIGHT + i], t))
 
 
 @kernel
-def _begin(law, block, i):
-    deflection, start = bristle_step.begin(
-        law, pair(block, Z, i), pair(block, _U, i), block[_SPEED + i], 1.0, block[_GRIP + i]
-    )
-    block[_DEFLECTION + i], block[_START + i] = deflection, start
-
-
-@kernel
-def _aim(law, block, i, dt):
-    z, u, v, q = pair(block, Z, i), pair(block, _U, i), block[_SPEED + i], block[_GRIP + i]
-    block[_DECAY + i] = bristle_step.aim(law, z, u, v, 1.0, q, dt, block[_DEFLECTION + i], block[_START + i])
-
-
-@kernel
-def _relax(block, i, dt):
-    put_pair(block, Z, i, bristle_step.relax(pair(block, Z, i), pair(block, _U, i), dt, block[_DECAY + i]))
-
-
-@kernel
-def _settle(lever, law, block, i):
-    free, u, v, q = pair(block, Z, i), pair(block, _U, i), block[_SPEED + i], block[_GRIP + i]
-    new, k = bristle_step.settle(law, free, u, v, 1.0, q, block[_DEFLECTION + i])
-    put_pair(block, Z, i, new)
-    pull = times(block[WEIGHT + i], end_traction(law, new, k, u))
-    scatter(block, OUT + i, LANES, lever.wrench(lever_at(lever, block, i), pull))
-
-
-@kernel
-def _drive_all(lever, law, block, twist, lanes):
-    for i in range(lanes):  # the body apart: kernel later, it leaves the compiler a loop that it can count
-        _drive(lever, law, block, i, twist)
-
-
-@kernel
-def _begin_all(law, block, lanes):
+def _pull_all(lever, law, on, lanes):
+    total = (0.0, 0.0, 0.0)
     for i in range(lanes):
-        _begin(law, block, i)
-
-
-@kernel
-def _aim_all(law, block, dt, lanes):
-    for i in range(lanes):
-        _aim(law, block, i, dt)
-
-
-@kernel
-def _relax_all(block, dt, lanes):
-    for i in range(lanes):
-        _relax(block, i, dt)
-
-
-@kernel
-def _settle_all(lever, law, block, lanes):
-    for i in range(lanes):
-        _settle(lever, law, block, i)
+        total = plus(total, 1.0, _pull(lever, law, on, i))
+    return total
 
 
 @kernel
 def advance(lever, law, w, blocks, lanes, twist, dt):
-    """Step the cells at a held twist, and write their wrenches.
+    """Step the cells at a held twist, and return their wrench.
 
-    `lanes` is `LANES`, but the compiler must not know it: a loop of constant count it would write out cell by cell.
+    `lanes` is `LANES` or less, but the compiler must not know it: a loop of constant count it would write out cell by
+    cell.
     """
+    work, total = room(_WORK), (0.0, 0.0, 0.0)
     for k in range(blocks):
-        _drive_all(lever, law, at(w, k * BLOCK), twist, lanes)
-    for k in range(blocks):
-        _begin_all(law, at(w, k * BLOCK), lanes)
-    for k in range(blocks):
-        _aim_all(law, at(w, k * BLOCK), dt, lanes)
-    for k in range(blocks):
-        _relax_all(at(w, k * BLOCK), dt, lanes)
-    for k in range(blocks):
-        _settle_all(lever, law, at(w, k * BLOCK), lanes)
+        on = _Step(at(w, k * BLOCK), work, twist, dt)
+        _drive(lever, law, on, lanes)
+        _hold(lever, law, on, lanes)
+        _see(lever, law, on, lanes)
+        _start(lever, law, on, lanes)
+        _look_ahead(lever, law, on, lanes)
+        _end(lever, law, on, lanes)
+        _average(lever, law, on, lanes)
+        _relax(lever, law, on, lanes)
+        _settle(lever, law, on, lanes)
+        _end(lever, law, on, lanes)
+        total = plus(total, 1.0, _pull_all(lever, law, on, lanes))
+    return total

@@ -121,8 +121,7 @@ def _roll(lever, law, inputs, b, n, w, wrench, states):
         if load == 0.0:
             _forget(w, blocks, Z)
         else:
-            advance(lever, law, w, blocks, lanes, twist, dt)
-            add(wrench[t], times(load, totals(w, blocks, OUT, lanes)))
+            add(wrench[t], times(load, advance(lever, law, w, blocks, lanes, twist, dt)))
 
 
 @kernel

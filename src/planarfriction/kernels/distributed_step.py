@@ -12,7 +12,6 @@ from planarfriction.kernels import bristle_step, cells
 from planarfriction.kernels.cell_blocks import (
     BLOCK,
     LANES,
-    OUT,
     WEIGHT,
     Z,
     advance,
@@ -20,7 +19,6 @@ from planarfriction.kernels.cell_blocks import (
     divided,
     end_traction,
     room,
-    totals,
 )
 from planarfriction.kernels.general_cells import Bristle, slopes, slopes_of
 from planarfriction.kernels.law import grip, squared
@@ -67,8 +65,7 @@ def _step(lever, law, own, z, twist, dt, new, out):
         if count < lanes:
             clear(block, WEIGHT + LANES)
         _fill(lever, own, z, first, count, block)
-        advance(lever, law, block, 1, lanes, twist, dt)
-        all_of = plus(all_of, 1.0, totals(block, 1, OUT, lanes))
+        all_of = plus(all_of, 1.0, advance(lever, law, block, 1, lanes, twist, dt))
         _empty(block, first, count, n, new)
     put(out, all_of)
 
