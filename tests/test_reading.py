@@ -13,7 +13,7 @@ import planarfriction as pf
 from planarfriction import FrictionError, Scene, Signal, reading
 from planarfriction.errors import FileError
 from planarfriction.identify import Log
-from planarfriction.patch import files as patch_files
+from planarfriction.patch import pressure_maps as patch_files
 from planarfriction.patch import read_pressure_map
 
 NOISE = np.random.default_rng(0).bytes(300)

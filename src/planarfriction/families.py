@@ -92,10 +92,10 @@ LAWS = Family(
     "law",
     {
         "lugre": ("LuGre bristles, plain or elasto-plastic, with Stribeck and viscous terms", "laws.lugre:LuGre"),
-        "dahl": ("Dahl's bristles: a force that depends on the distance, not on the speed", "laws.dahl:Dahl"),
+        "dahl": ("Dahl's bristles: a force that depends on the distance, not on the speed", "laws.lugre:Dahl"),
         "coulomb-stribeck": (
             "Coulomb with Stribeck and viscous terms, regularised by a creep speed",
-            "laws.coulomb_stribeck:CoulombStribeck",
+            "laws.lugre:CoulombStribeck",
         ),
     },
 )
@@ -103,11 +103,11 @@ LAWS = Family(
 SURFACES = Family(
     "limit surface",
     {
-        "cells": ("sum over the cells", "limit_surface.cells:LimitSurfaceCells"),
+        "cells": ("sum over the cells", "limit_surface.compiled:LimitSurfaceCells"),
         "exact": ("exact", "limit_surface.exact:LimitSurfaceExact"),
         "table": ("table, smooth", "limit_surface.table:LimitSurfaceTable"),
-        "table-published": ("table, as published", "limit_surface.table_published:LimitSurfaceTablePublished"),
-        "ellipsoid": ("ellipsoid", "limit_surface.ellipsoid:LimitSurfaceEllipsoid"),
+        "table-published": ("table, as published", "limit_surface.table:LimitSurfaceTablePublished"),
+        "ellipsoid": ("ellipsoid", "limit_surface.compiled:LimitSurfaceEllipsoid"),
         "quartic": ("convex quartic", "limit_surface.quartic:LimitSurfaceQuartic"),
     },
 )
@@ -147,9 +147,9 @@ SHAPES = Family(
         "line": ("a line", "patch:ContactPatch.line"),
         "polygon": ("a simple polygon", "patch:ContactPatch.polygon"),
         "points": ("points", "patch:ContactPatch.points"),
-        "pressure-map": ("a measured pressure map, or several", "patch.named:pressure_map"),
-        "published": ("a patch of the published experiments", "patch.named:published"),
-        "cells": ("the cells themselves", "patch.named:cells"),
+        "pressure-map": ("a measured pressure map, or several", "patch.published:pressure_map"),
+        "published": ("a patch of the published experiments", "patch.published:published"),
+        "cells": ("the cells themselves", "patch.published:cells"),
     },
 )
 

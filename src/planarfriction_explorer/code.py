@@ -9,7 +9,7 @@ import planarfriction
 from planarfriction.laws import ElastoPlastic
 from planarfriction.models import DistributedModel
 from planarfriction.scenes import Scene, driven
-from planarfriction.scenes.toml_writer import to_toml
+from planarfriction.scenes.files import to_toml
 from planarfriction_explorer.drawing import Drawing
 from planarfriction_explorer.state import State
 

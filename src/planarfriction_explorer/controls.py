@@ -14,8 +14,7 @@ from planarfriction.laws import LAWS
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction_explorer import looks
 from planarfriction_explorer.drawing import Drawing
-from planarfriction_explorer.presets import PRESETS
-from planarfriction_explorer.state import State, law_parameters
+from planarfriction_explorer.state import PRESETS, State, law_parameters
 
 TOOLS = {"Centre of rotation": "turn", "Velocity": "slide", "Brush": "brush", "Eraser": "erase"}
 """Actions of a drag over the map."""

@@ -2,19 +2,43 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
+import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Literal
 
 import numpy as np
 
 from planarfriction import geometry, validation
-from planarfriction.errors import InvalidValueError
+from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceExact, LimitSurfaceTable
 from planarfriction.limit_surface.comparison import directions
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, Grid, GridError, read_pressure_map
-from planarfriction_explorer.uploads import as_file, plain_name
+
+
+def plain_name(name: str) -> str:
+    """Return the name of a file without the path that a browser may send with it."""
+    return PurePosixPath(PureWindowsPath(name).name).name
+
+
+@contextlib.contextmanager
+def as_file(name: str, content: bytes) -> Iterator[Path]:
+    """Yield a file of the same suffix with the content; errors raised meanwhile name the file as the user does.
+
+    Raises `FileError` for what a reader does not take.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"file{Path(name).suffix}"
+        try:
+            path.write_bytes(content)
+            yield path
+        except (FileError, OSError, ValueError) as error:
+            raise FileError(str(error).replace(str(path), name)) from None
+
 
 MOST_SIDE = 64
 """Most rows and columns of a map: with more, a stroke of the brush would no longer follow the hand."""

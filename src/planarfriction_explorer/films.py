@@ -12,8 +12,8 @@ from planarfriction.families import MODELS, SCENES
 from planarfriction.plots import plot_histories
 from planarfriction.scenes import Scene, simulate
 from planarfriction.scenes.files import read_table, scene_from_dict
+from planarfriction_explorer.drawing import as_file, plain_name
 from planarfriction_explorer.state import State
-from planarfriction_explorer.uploads import as_file, plain_name
 
 DPI = 80.0
 """Dots per inch of the film: 768 across."""

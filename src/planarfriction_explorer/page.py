@@ -13,17 +13,13 @@ import panel as pn
 from planarfriction.errors import FrictionError
 from planarfriction.laws import LAWS, FrictionLaw
 from planarfriction_explorer import code, looks, pictures
-from planarfriction_explorer.answers import Answer, answer
 from planarfriction_explorer.controls import OWN, Controls
 from planarfriction_explorer.drawing import Drawing
 from planarfriction_explorer.ladder_tab import LadderTab
-from planarfriction_explorer.links import from_link, to_link
 from planarfriction_explorer.live import Paced
-from planarfriction_explorer.map_view import MapView, legend
-from planarfriction_explorer.presets import PRESETS
 from planarfriction_explorer.scene_tab import SceneTab
-from planarfriction_explorer.section_view import SectionView
-from planarfriction_explorer.state import State
+from planarfriction_explorer.state import PRESETS, Answer, State, answer, from_link, to_link
+from planarfriction_explorer.views import MapView, SectionView, legend
 
 FASTEST = 0.1
 """Velocity [m/s] that a drag from the middle to the edge of the map gives."""

@@ -13,9 +13,8 @@ from planarfriction.limit_surface import LimitSurface, LimitSurfaceCells
 from planarfriction.plots.limit_surface import scaled_samples
 from planarfriction.plots.style import DISTRIBUTED, ELLIPSOID, EXACT
 from planarfriction_explorer import looks
-from planarfriction_explorer.answers import Answer
 from planarfriction_explorer.drawing import Drawing
-from planarfriction_explorer.state import State
+from planarfriction_explorer.state import Answer, State
 
 MM = 1e3
 """Millimetres in a metre."""

@@ -21,9 +21,8 @@ from planarfriction import __version__, scenes
 from planarfriction.cli import commands, main, output
 from planarfriction.cli.app import app
 from planarfriction.cli.commands import OWN
-from planarfriction.cli.patches import find_patch
-from planarfriction.cli.report import largest_differences
-from planarfriction.cli.run import build_scenes
+from planarfriction.cli.options import find_patch
+from planarfriction.cli.run import build_scenes, largest_differences
 from planarfriction.errors import SimulationInterrupted, SolverError
 from planarfriction.kernels import rosenbrock
 from planarfriction.patch import PUBLISHED_PATCHES

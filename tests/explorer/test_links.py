@@ -11,10 +11,8 @@ import planarfriction as pf
 from planarfriction.errors import FrictionError
 from planarfriction.laws import LAWS
 from planarfriction.patch import PUBLISHED_PATCHES
-from planarfriction_explorer.answers import answer
 from planarfriction_explorer.drawing import MOST_SIDE, Drawing
-from planarfriction_explorer.links import MOST_TEXT, from_json, from_link, to_json, to_link
-from planarfriction_explorer.state import State
+from planarfriction_explorer.state import MOST_TEXT, State, answer, from_json, from_link, to_json, to_link
 
 PAINTED = Drawing.published("Square").painted(0.004, 0.002, radius=0.003, pressure=0.1 + 0.2)
 

@@ -16,11 +16,8 @@ import pytest
 from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.laws import LAWS, Dahl
 from planarfriction.planning import holding_load
-from planarfriction_explorer.answers import answer
 from planarfriction_explorer.drawing import Drawing
-from planarfriction_explorer.links import to_json, to_link
-from planarfriction_explorer.presets import PRESETS
-from planarfriction_explorer.state import State
+from planarfriction_explorer.state import PRESETS, State, answer, to_json, to_link
 
 pn = pytest.importorskip("panel", reason="needs Panel, the extra [explore]")
 

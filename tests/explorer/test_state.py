@@ -15,11 +15,10 @@ from planarfriction.errors import FileError, FrictionError, InvalidValueError
 from planarfriction.laws import LAWS
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction_explorer import code, films, pictures
-from planarfriction_explorer.answers import answer
 from planarfriction_explorer.drawing import MOST_SIDE, Drawing
 from planarfriction_explorer.films import film, read_scene, ready_scene
 from planarfriction_explorer.ladder import RUNGS, climb, motion
-from planarfriction_explorer.state import State, law_parameters
+from planarfriction_explorer.state import State, answer, law_parameters
 
 PAINTED = Drawing.published("Square").painted(0.004, 0.002, radius=0.003, pressure=0.4)
 

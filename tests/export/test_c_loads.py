@@ -6,14 +6,14 @@ import subprocess
 import numpy as np
 import pytest
 
-from planarfriction.export import loads
+from planarfriction.export import pieces
 from tests.support.c_libraries import library, run, run_steady, samples
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
 
 def ladder(made):
-    return loads.ladder_of(getattr(made.model, "reduction", made.model).patch)
+    return pieces.ladder_of(getattr(made.model, "reduction", made.model).patch)
 
 
 def inputs(made, load):
@@ -38,7 +38,7 @@ def test_steps(precision):
     assert exact.max() < (1e-12 if precision == "double" else 1e-3)
     between = misfit(made, inputs(made, rng.uniform(rungs[0], rungs[-1], 300)))
     print(f"\nbetween rungs: {between.max():.1e}")
-    assert 1e-7 < between.max() < 2.0 * loads.ERROR
+    assert 1e-7 < between.max() < 2.0 * pieces.ERROR
 
 
 def test_measured_maps():
@@ -72,6 +72,6 @@ def test_the_test_that_is_written():
 
 
 def test_too_many_rungs(monkeypatch):
-    monkeypatch.setattr(loads, "MOST_RUNGS", 20)
-    with pytest.raises(loads.InvalidValueError, match="model must have a patch whose shape 20 loads describe"):
+    monkeypatch.setattr(pieces, "MOST_RUNGS", 20)
+    with pytest.raises(pieces.InvalidValueError, match="model must have a patch whose shape 20 loads describe"):
         ladder(library("soft"))

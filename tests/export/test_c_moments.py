@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pytest
 
-from planarfriction.export.loads import ladder_of
+from planarfriction.export.pieces import ladder_of
 from tests.support.c_libraries import library, samples
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")

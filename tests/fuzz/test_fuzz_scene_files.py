@@ -15,7 +15,7 @@ from mutation import mutated, mutated_bytes
 from working import use
 
 import planarfriction as pf
-from planarfriction.scenes.toml_writer import to_toml
+from planarfriction.scenes.files import to_toml
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"
 FILES = sorted(EXAMPLES.glob("*.toml"))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError, MissingExtraError
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.limit_surface import quartic_fit
+from planarfriction.limit_surface import quartic as quartic_fit
 from planarfriction.patch import PUBLISHED_PATCHES
 
 pytest.importorskip("cvxpy", reason="cvxpy is not installed: the convex quartic is an extra")

@@ -7,7 +7,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
-from planarfriction.models.few_cells import few_cells
+from planarfriction.models.reduced import few_cells
 from planarfriction.patch import PUBLISHED_PATCHES
 
 LAW = pf.LuGre(mu_c=1.0, mu_s=1.2, v_s=1e-3, sigma_0=1e6, sigma_1=8e2, sigma_2=0.2, elasto_plastic=0.9)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -50,6 +52,15 @@ def test_the_slip_factor_is_that_of_the_very_load():
         np.testing.assert_allclose(factor, slip_factor(SOFT, load), rtol=1e-13, atol=1e-18)
         np.testing.assert_array_equal(shape.factor, factor)
         assert shape.contact_radius**2 == pytest.approx(SOFT.second_moment(load), rel=1e-13)
+
+
+def test_a_copy_begins_without_maps_and_builds_the_same():
+    loads, twist, whole = np.geomspace(0.7, 3.0, 9), spread(5), model()
+    found = [steady(whole, twist, load) for load in loads]
+    copy = pickle.loads(pickle.dumps(whole))
+    assert copy.load_rungs == [] and len(whole.load_rungs) > 2
+    np.testing.assert_array_equal([steady(copy, twist, load) for load in loads], found)
+    assert copy.load_rungs == whole.load_rungs
 
 
 def test_a_shape_that_stays_needs_one_map_an_octave():

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import planarfriction as pf
 from planarfriction import FrictionError, Scene, Signal
 from planarfriction.scenes import drift, in_hand, published_velocity
-from planarfriction.scenes.toml_writer import to_toml
+from planarfriction.scenes.files import to_toml
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 CSV_DIGITS = 1e-11  # the tables of the examples are printed with 12 digits

@@ -10,7 +10,7 @@ import pytest
 import planarfriction as pf
 from planarfriction.derivatives import scene_sensitivities
 from planarfriction.scenes import pushed
-from planarfriction.scenes.movers import displacement
+from planarfriction.scenes.signal import displacement
 from planarfriction.solvers import RODAS4
 
 LAW = pf.LuGre(mu_c=0.4, mu_s=0.5, v_s=5e-3, sigma_0=1e5, sigma_1=50.0, sigma_2=0.2)

@@ -208,7 +208,7 @@ def test_shapes_of_a_long_run_are_not_kept_together(monkeypatch, name):
     size = {"distributed": 8 * 69, "published": 5 * 17 * 4 * 8}[name]
     peak(0.005, name)  # compiles, which takes memory too
     monkeypatch.setattr(limits, "MAX_PACK_BYTES", 20.0 * size)
-    monkeypatch.setattr("planarfriction.models.published_shapes.REMEMBERED", 4)
+    monkeypatch.setattr("planarfriction.models.reduced_published.REMEMBERED", 4)
     assert peak(0.2, name) - peak(0.05, name) < 0.4 * 150 * size
 
 

@@ -15,7 +15,7 @@ from planarfriction_studies.experiments import EXPERIMENTS
 from planarfriction_studies.experiments.beyond import contacts, ladder
 from planarfriction_studies.experiments.beyond import run as beyond
 from planarfriction_studies.experiments.beyond import surfaces as beyond_surfaces
-from planarfriction_studies.experiments.beyond.figures import FAMILIES
+from planarfriction_studies.experiments.beyond.tables import FAMILIES
 from planarfriction_studies.experiments.experiment import Work
 from planarfriction_studies.experiments.in_hand.runs import Case
 from planarfriction_studies.experiments.runs import IN_WORDS

@@ -14,8 +14,7 @@ from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction_studies.experiments import facts
 from planarfriction_studies.experiments.experiment import Work
 from planarfriction_studies.experiments.limit_surfaces import run as limit_surfaces
-from planarfriction_studies.experiments.limit_surfaces.gradient import half_load_cell, linear_line
-from planarfriction_studies.experiments.limit_surfaces.patches import patch_comparisons
+from planarfriction_studies.experiments.limit_surfaces.patches import half_load_cell, linear_line, patch_comparisons
 from planarfriction_studies.experiments.runs import SIX_SHAPES
 
 

@@ -8,7 +8,7 @@ import itertools
 import numpy as np
 import pytest
 
-from planarfriction_studies.measured import online_replay
+from tests.support import online_replay
 
 
 @pytest.mark.parametrize(

@@ -19,11 +19,9 @@ from planarfriction.cli import main
 from planarfriction.errors import FileError
 from planarfriction_studies.referee import engines, truths
 from planarfriction_studies.referee.case import FOLDER, all_cases, read_case
-from planarfriction_studies.referee.export import export_case
-from planarfriction_studies.referee.film import film
-from planarfriction_studies.referee.pictures import scene
+from planarfriction_studies.referee.export import export_case, sdf
+from planarfriction_studies.referee.pictures import film, scene
 from planarfriction_studies.referee.run import Apart, Kept, judge, no_result, run
-from planarfriction_studies.referee.sdf import sdf
 
 CASES = all_cases()
 TRUTHS = {

@@ -209,7 +209,7 @@ def export(file: Path, **options: Any) -> None:
 def identify(logs: tuple[Path, ...], patch: str | None, cell_size: float | None, width: float, **options: Any) -> int:
     """Identify (the help above is what users see)."""
     from planarfriction.cli import identify as command
-    from planarfriction.cli.patches import find_patch
+    from planarfriction.cli.options import find_patch
 
     return command.identify(logs, find_patch(patch, cell_size=cell_size, width=width), **options)
 

@@ -88,7 +88,7 @@ def plan(
     """Plan (the help above is what users see)."""
     from planarfriction.cli import identify, output
     from planarfriction.cli.console import note
-    from planarfriction.cli.patches import find_patch
+    from planarfriction.cli.options import find_patch
     from planarfriction.identify import candidate_motions, design_experiment
     from planarfriction.identify.logs import columns_of
 

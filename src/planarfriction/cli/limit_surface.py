@@ -9,8 +9,8 @@ import numpy as np
 
 import planarfriction as pf
 from planarfriction.cli.console import note, print_table
+from planarfriction.cli.options import find_patch, pressure_map
 from planarfriction.cli.output import check_picture, check_table, write_csv, write_picture
-from planarfriction.cli.patches import find_patch, pressure_map
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import SURFACES
 from planarfriction.writing import write_text

@@ -20,6 +20,9 @@ class Remembered(Generic[T]):
         self._results: dict[Hashable, T] = {}
         self._lock = threading.Lock()
 
+    def __reduce__(self) -> tuple[type, tuple[int]]:
+        return Remembered, (self._most,)  # threads share a memory, copies of a model do not
+
     def get(self, key: Hashable, build: Callable[[], T]) -> T:
         """Return the result for `key`; `build` makes it if it is missing."""
         found = self._results.get(key)

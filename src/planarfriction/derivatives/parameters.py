@@ -25,9 +25,8 @@ from planarfriction.kernels.law import LAW
 from planarfriction.kernels.rollouts import Bars, Inputs
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, MomentModel, ReducedModelPublished
-from planarfriction.models.map_sizes import MapSizes, maps_of
-from planarfriction.models.published_shapes import PublishedShape, axes_of
-from planarfriction.models.reduced_map import ReducedShape
+from planarfriction.models.reduced_map import MapSizes, ReducedShape, maps_of
+from planarfriction.models.reduced_published import PublishedShape, axes_of
 
 PARAMETERS = (
     "sigma_0",

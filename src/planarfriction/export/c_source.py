@@ -1,11 +1,16 @@
-"""C source of traced functions: C99 that is C++ too, of single or double precision."""
+"""C source of traced functions, C99 that is C++ too, of single or double precision; and of cells in passes.
+
+The step of a cell is a chain of hundreds of operations of which each waits for the one before. In passes over many
+cells, of which each does a share of the operations, the processor has several cells in hand at a time.
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from itertools import compress
-from typing import Any
+from typing import Any, NamedTuple
 
 from planarfriction.export.trace import Block, Branch, Number, Operation, traced
 from planarfriction.export.twins import twin
@@ -113,3 +118,107 @@ def used_by(block: Block) -> set[str]:
         elif each.name in used:
             used.update(name for name in each.arguments if isinstance(name, str))
     return used
+
+
+CELLS = 56
+"""Largest number of cells of a block, those of the default model: 2 kB of stack, with their new states."""
+
+PASSES = 4
+"""Passes over a block: from three on they take the same time, half of that of one."""
+
+SHORT = 2
+"""Sums and products that each pass does itself instead of keeping their result, which would take stack."""
+
+
+class Passes(NamedTuple):
+    """Source of the step of a block of cells."""
+
+    cells: int
+    blocks: int
+    rows: int
+    """Numbers of each cell that one pass leaves to the next."""
+    shared: str
+    """Lines of what all cells have in common."""
+    each: list[str]
+    """Lines of each pass, of cell `k` in row `i` of the block; the last leaves the wrench in `row[0]` to `row[2]`.
+
+    The place of a new state holds what passes hand on, until the last one writes the state there.
+    """
+
+
+def passes_of(writer: Writer, block: Block, count: int, places: Sequence[str], share: str) -> Passes | None:
+    """Split the step of a cell, whose new state goes to `places`; None for one that has branches.
+
+    `share` is its share of the load.
+    """
+    if any(isinstance(each, Branch) for each in block.operations):
+        return None
+    used = used_by(block)
+    operations = [each for each in block.operations if each.name in used]
+    common: set[str] = set()
+    for each in operations:
+        if all(name in common or not re.search(r"^t\d|\bk\b", name) for name in _names(each)):
+            common.add(each.name)
+    own = [each for each in operations if each.name not in common]
+    again = _again(own)
+    own = [each for each in own if each not in again]
+    ends = [0, *_cuts(own, block), len(own)]
+    kept = [_handed(own, block, end) for end in ends]
+    shared = [writer.line(each) for each in operations if each.name in common]
+    room = [f"row[{row}][i]" for row in range(len(own))]
+    room, texts, places_of = [*room[:3], *places, *room[3:]], [], {}
+    for first, last, after in zip(ends, ends[1:], kept[1:], strict=False):
+        before, places_of = places_of, {name: each for name, each in places_of.items() if name in after}
+        for name in after:
+            places_of.setdefault(name, next(each for each in room if each not in places_of.values()))
+        read = {name for each in own[first:last] for name in _names(each)}
+        read |= set(block.results) if last == len(own) else set()
+        for each in reversed(again):
+            read |= set(_names(each)) if each.name in read else set()
+        lines = [f"    const real {name} = {place};" for name, place in before.items() if name in read]
+        lines += [writer.line(each) for each in again if each.name in read]
+        lines += [writer.line(each) for each in own[first:last]]
+        lines += [f"    {place} = {name};" for name, place in places_of.items() if name not in before]
+        if last == len(own):
+            results = [writer.atom(each) for each in block.results]
+            lines += [f"    {place} = {result};" for place, result in zip(places, results, strict=False)]
+            lines += [f"    row[{j}][i] = {share} * {result};" for j, result in enumerate(results[len(places) :])]
+        texts.append("\n".join(f"        {line}" for line in lines))
+    rows = 1 + max(int(row) for row in re.findall(r"row\[(\d+)\]", "".join(texts)))
+    blocks = -(-count // CELLS)
+    return Passes(-(-count // blocks), blocks, rows, "\n".join(shared), texts)
+
+
+def _names(operation: Operation) -> Iterator[str]:
+    return (each for each in operation.arguments if isinstance(each, str))
+
+
+def _again(own: list[Operation]) -> list[Operation]:
+    """Return operations of so few steps that each pass does them itself."""
+    steps: dict[str, int] = {}
+    for each in own:
+        steps[each.name] = 1 + sum(steps.get(name, 0) for name in _names(each)) if _is_short(each) else SHORT + 1
+    return [each for each in own if steps[each.name] <= SHORT]
+
+
+def _is_short(operation: Operation) -> bool:
+    return operation.kind == "real" and bool(re.fullmatch(r"\{0\} [-+*] \{1\}", operation.text))
+
+
+def _handed(own: list[Operation], block: Block, end: int) -> list[str]:
+    """Return the names that operations before a place leave to those after it, in order; none behind the last."""
+    later = {name for each in own[end:] for name in _names(each)} | set(block.results)
+    return [each.name for each in own[:end] if each.name in later] if end < len(own) else []
+
+
+def _cuts(own: list[Operation], block: Block) -> list[int]:
+    """Return places where few numbers are handed on, and nothing but real ones, about evenly spread."""
+    kinds = {each.name: each.kind for each in own}
+    spread = len(own) // (3 * PASSES)
+
+    def cost(end: int) -> float:
+        names = _handed(own, block, end)
+        return len(names) if all(TYPES[kinds[name]] == "real" for name in names) else float("inf")
+
+    middles = (share * len(own) // PASSES for share in range(1, PASSES))
+    return [min(range(middle - spread, middle + spread + 1), key=cost) for middle in middles]

@@ -13,17 +13,67 @@ import numpy as np
 from planarfriction import validation, writing
 from planarfriction.compiler import compiled_math
 from planarfriction.errors import InvalidValueError
-from planarfriction.export.c_source import Writer, of_compiled
+from planarfriction.export.c_source import Writer, of_compiled, passes_of
 from planarfriction.export.c_values import Array, Fixed, Scalar
-from planarfriction.export.grip import grip_of
 from planarfriction.export.loops import Loops
-from planarfriction.export.passes import passes_of
 from planarfriction.export.pieces import Pieces, pieces_of
-from planarfriction.export.samples import samples_of
-from planarfriction.export.slip import Slip, slip_of
+from planarfriction.export.slip import Slip, samples_of, slip_of
 from planarfriction.formulas import LARGEST
-from planarfriction.kernels import tilt
+from planarfriction.kernels import friction_filter, grips, tilt
+from planarfriction.kernels.surfaces import CELLS
 from planarfriction.limit_surface.loops.twists import MOST_TRIALS
+
+CONTROLLERS = (grips.hold,)
+"""Loops of controllers that have source."""
+
+
+def grip_of(controller: Any, name: str) -> dict[str, Any]:
+    """Return the lines and tables of `planarfriction.online.Hold` of one part, in double precision.
+
+    Raises InvalidValueError for anything else, and for an observer of many parts or with a sum of cells as its surface.
+    """
+    if getattr(controller, "_grip", None) not in CONTROLLERS or controller.state.shape:
+        raise InvalidValueError("controller", "be a Hold of one part (without batch)", type(controller).__name__)
+    observer, writer = controller.observer, Writer()
+    own, state = observer._filter, observer.state
+    if own.kind == CELLS:
+        raise InvalidValueError(
+            "controller", "know an ellipsoid or a table as its surface", type(observer.surface).__name__
+        )
+    arrays = {each: value for each, value in own._asdict().items() if isinstance(value, np.ndarray)}
+    known = [Array(f"own_{n}", v.shape, fixed=True) if n in arrays else Fixed(v) for n, v in own._asdict().items()]
+    estimate, control = friction_filter.ESTIMATE, grips.STATE
+    loops = Loops(writer, {estimate: f"{name}_estimate", control: f"{name}_control"})
+    found = Array("found", (1,), estimate)
+    loops.add(
+        friction_filter.update, (own._make(known), Array("states", (1, len(state))), Array("samples", (1, 8)), found)
+    )
+    loops.add(controller._grip, (Array("states", (1,), control), found, *map(Fixed, controller._settings)))
+    functions = "\n\n".join(loops.functions)
+    return {
+        "tables": {
+            f"own_{each}": [writer.constant(float(x)) for x in value.ravel()]
+            for each, value in arrays.items()
+            if f"own_{each}[" in functions
+        },
+        "functions": functions,
+        "state": [writer.constant(float(x)) for x in state],
+        "control": ", ".join(_fresh(controller.state, writer)),
+        "structs": {"estimate": _fields(estimate), "control": _fields(control)},
+    }
+
+
+def _fields(record: np.dtype) -> list[str]:
+    """Return the fields of a struct."""
+    kinds = {field: ("double" if kind.base.kind == "f" else "int", kind) for field, (kind, *_) in record.fields.items()}  # pyright: ignore
+    return [f"{own} {field}{f'[{np.prod(kind.shape)}]' if kind.shape else ''};" for field, (own, kind) in kinds.items()]
+
+
+def _fresh(state: Any, writer: Writer) -> list[str]:
+    """Return the constants of a struct."""
+    rows = ([writer.constant(float(x)) for x in np.ravel(state[field])] for field in state.dtype.names)
+    return [row[0] if len(row) == 1 else f"{{ {', '.join(row)} }}" for row in rows]
+
 
 PRECISIONS = {"double": LARGEST, "float": 1e9}
 """Largest number that a step takes, by precision."""
@@ -31,28 +81,19 @@ PRECISIONS = {"double": LARGEST, "float": 1e9}
 LONGEST_NAME = 40
 """Characters of the name of a library: compilers of C99 tell apart names of 63, and files have such names too."""
 
-MEANINGS = {
-    "sigma_0": "bristle stiffness per unit normal load [1/m]",
-    "sigma_1": "bristle damping per unit normal load [s/m]",
-    "sigma_2": "viscous friction per unit normal load [s/m]",
-    "mu_c": "Coulomb coefficient",
-    "mu_s": "static coefficient, at least mu_c",
-    "v_s": "Stribeck speed [m/s]",
-    "breakaway_ratio": "share of the largest deflection below which bristles are elastic, below 1",
+PARAMETERS = {
+    "sigma_0": ("bristle stiffness per unit normal load [1/m]", "p->sigma_0 > 0"),
+    "sigma_1": ("bristle damping per unit normal load [s/m]", "p->sigma_1 >= 0"),
+    "sigma_2": ("viscous friction per unit normal load [s/m]", "p->sigma_2 >= 0"),
+    "mu_c": ("Coulomb coefficient", "p->mu_c > 0"),
+    "mu_s": ("static coefficient, at least mu_c", "p->mu_s >= p->mu_c"),
+    "v_s": ("Stribeck speed [m/s]", "p->v_s > 0"),
+    "breakaway_ratio": (
+        "share of the largest deflection below which bristles are elastic, below 1",
+        "p->breakaway_ratio >= 0 && p->breakaway_ratio < 1",
+    ),
 }
-"""Parameters in the words of the header."""
-
-RANGES = {
-    "sigma_0": "p->sigma_0 > 0",
-    "sigma_1": "p->sigma_1 >= 0",
-    "sigma_2": "p->sigma_2 >= 0",
-    "mu_c": "p->mu_c > 0",
-    "mu_s": "p->mu_s >= p->mu_c",
-    "v_s": "p->v_s > 0",
-    "breakaway_ratio": "p->breakaway_ratio >= 0 && p->breakaway_ratio < 1",
-}
-"""Conditions on parameters."""
-
+"""Parameters: their words in the header, and their conditions."""
 
 FILES = {"h": ".h", "c": ".c", "test.c": "_test.c", "cmake": ".cmake"}
 """Ends of the names of files by their templates."""
@@ -133,8 +174,10 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, grip: dict, ki
             "pieces": pieces,
             "states": pieces.count * pieces.states,
             "precision": precision,
-            "parameters": {each: (writer.constant(value), MEANINGS[each]) for each, value in pieces.parameters.items()},
-            "ranges": " && ".join(RANGES[each] for each in pieces.parameters),
+            "parameters": {
+                each: (writer.constant(value), PARAMETERS[each][0]) for each, value in pieces.parameters.items()
+            },
+            "ranges": " && ".join(PARAMETERS[each][1] for each in pieces.parameters),
             "tables": tables,
             "columns": _columns(pieces),
             "stride": pieces.stride,

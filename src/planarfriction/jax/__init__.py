@@ -13,12 +13,18 @@ except ImportError as error:
     raise MissingExtraError("jax", "jax") from error
 
 from planarfriction.derivatives import Rollout
-from planarfriction.jax.distributed import DistributedModel, LawParameters
-from planarfriction.jax.moments import MomentModel, ReducedParameters
-from planarfriction.jax.published import PublishedParameters, ReducedModelPublished, Surface
-from planarfriction.jax.reduced import ReducedModel
+from planarfriction.jax.models import (
+    DistributedModel,
+    LawParameters,
+    MomentModel,
+    PublishedParameters,
+    ReducedModel,
+    ReducedModelPublished,
+    ReducedParameters,
+    Surface,
+)
 from planarfriction.jax.rollouts import rate, rest, rollout, simulate_scene, step, wrench
-from planarfriction.tensors.scenes import SceneMotion
+from planarfriction.tensors.operations import SceneMotion
 
 __all__ = [
     "DistributedModel",

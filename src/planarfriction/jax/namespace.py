@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -11,8 +11,85 @@ from jax.core import Tracer
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.jax.pressure import pressing
+from planarfriction.kernels.tilt import OVERSHOT, SHORTENINGS, SOFTNESS, STEPS
 from planarfriction.tensors.namespace import Namespace
+
+
+class _Tilt(NamedTuple):
+    """Cells in scaled coordinates about their centre of pressure, as `kernels.tilt.Scaled`."""
+
+    corners: jax.Array
+    """`(1, u, v)` of each cell `[N, 3]`."""
+    share: jax.Array
+    """Shares of the cells `[N]`, whose sum is 1."""
+    asked: jax.Array
+    """`(1, u, v)` of the centre that is asked for."""
+
+    def fitted(self, pressing: jax.Array, soft: Any) -> jax.Array:
+        """Return the plane `[3]` with total and centre by the cells that press."""
+        share = jnp.where(pressing, self.share, 0.0)
+        own = share.sum()
+        mean = share @ self.corners[:, 1:] / own
+        away = self.corners[:, 1:] - mean
+        spread = (share[:, None] * away).T @ away + soft * jnp.eye(2)
+        right, one = self.asked[1:] - mean, spread[0, 0] * spread[1, 1] - spread[0, 1] ** 2
+        a = (spread[1, 1] * right[0] - spread[0, 1] * right[1]) / one
+        b = (spread[0, 0] * right[1] - spread[0, 1] * right[0]) / one
+        return jnp.stack([1.0 / own - a * mean[0] - b * mean[1], a, b])
+
+    def slopes(self, plane: jax.Array, step: jax.Array) -> tuple[jax.Array, jax.Array]:
+        """Return the slope of the dual along a step, and how it rises."""
+        here, along = self.corners @ plane, self.corners @ step
+        share = jnp.where(here > 0.0, self.share * along, 0.0)
+        slope = SOFTNESS * (plane[1:] @ step[1:]) - step @ self.asked + share @ here
+        return slope, SOFTNESS * (step[1:] @ step[1:]) + share @ along
+
+    def share_of(self, plane: jax.Array, step: jax.Array) -> jax.Array:
+        """Return the share of a step to go."""
+        first, _ = self.slopes(plane, step)
+
+        def ends(far: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
+            here, rise = self.slopes(plane + far * step, step)
+            return here, rise, ~(abs(here) > OVERSHOT * abs(first)) | ((far == 1.0) & (here < 0.0))
+
+        def body(last):
+            far, low, high, here, rise, _, count = last
+            low, high = jnp.where(here > 0.0, low, far), jnp.where(here > 0.0, far, high)
+            ahead = far - here / rise
+            far = jnp.where((low < ahead) & (ahead < high), ahead, 0.5 * (low + high))
+            return far, low, high, *ends(far), count + 1
+
+        whole = jnp.ones_like(first)
+        start = whole, jnp.zeros_like(first), whole, *ends(whole), jnp.asarray(1)
+        return jax.lax.while_loop(lambda last: ~last[5] & (last[6] < SHORTENINGS), body, start)[0]
+
+    def pressing(self, narrow: jax.Array) -> jax.Array:
+        """Return the cells that press in the end, bool `[N]`."""
+
+        def body(last):
+            plane, _, count = last
+            soft = jnp.where((count > 0) | narrow, SOFTNESS, 0.0)
+            before = self.corners @ plane > 0.0
+            whole = self.fitted(before, soft)
+            done = ((self.corners @ whole > 0.0) == before).all()
+            far = jax.lax.cond(done, lambda step: jnp.ones(()), lambda step: self.share_of(plane, step), whole - plane)
+            return plane + far * (whole - plane), done, count + 1
+
+        first = jnp.array([1.0, 0.0, 0.0]), jnp.asarray(False), jnp.asarray(0)
+        plane, _, _ = jax.lax.while_loop(lambda last: ~last[1] & (last[2] < STEPS), body, first)
+        return self.corners @ plane > 0.0
+
+
+def pressing(u, v, share, x, y, narrow) -> jax.Array:
+    """Return the cells that press, bool `[..., N]` (see `Namespace.pressing`)."""
+    one = jnp.ones_like(u)
+    corners, asked = jnp.stack([one, u, v], -1), jnp.concatenate([one[..., :1], x, y], -1)
+
+    def found(corners, share, asked, narrow):
+        return _Tilt(corners, share, asked).pressing(narrow)
+
+    cells, shares, places = (each.reshape(-1, *each.shape[asked.ndim - 1 :]) for each in (corners, share, asked))
+    return jax.vmap(found)(cells, shares, places, narrow.reshape(-1)).reshape(u.shape)
 
 
 def _real(name: str, value: Any, like: Any = None) -> jax.Array:

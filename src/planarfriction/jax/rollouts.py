@@ -10,11 +10,11 @@ import jax.numpy as jnp
 
 from planarfriction.derivatives import Rollout
 from planarfriction.jax import adjoint
+from planarfriction.jax.adjoint import HostScene
 from planarfriction.jax.base import FrictionPytree
-from planarfriction.jax.callbacks import HostScene
 from planarfriction.jax.namespace import xp
-from planarfriction.tensors.inputs import rollout_inputs
-from planarfriction.tensors.scenes import simulator
+from planarfriction.tensors.namespace import rollout_inputs
+from planarfriction.tensors.operations import simulator
 
 
 def rest(model: FrictionPytree, batch: int | Sequence[int] = ()) -> jax.Array:

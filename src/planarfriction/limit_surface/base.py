@@ -16,9 +16,8 @@ from planarfriction.equality import ByValue, by_parts, unusual
 from planarfriction.errors import FrictionError, InvalidValueError, SolverError
 from planarfriction.geometry import transformed
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.limit_surface.cell_metrics import scaled_levers
-from planarfriction.limit_surface.least_dissipation import across, descend, table_of
 from planarfriction.limit_surface.loops.twists import StoredPotential, table_twists
+from planarfriction.limit_surface.stored import across, descend, scaled_levers, table_of
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy, refuse_cell_metrics, symmetric_root
 from planarfriction.pictures import picture

@@ -4,20 +4,129 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.errors import InvalidValueError
+from planarfriction.errors import FrictionError, InvalidValueError, MissingExtraError
 from planarfriction.geometry import transformed
-from planarfriction.limit_surface import quartic_fit
 from planarfriction.limit_surface.base import MOST_SEGMENTS, LimitSurface, _rows, scaling
-from planarfriction.limit_surface.cells import LimitSurfaceCells
 from planarfriction.limit_surface.comparison import directions
+from planarfriction.limit_surface.compiled import LimitSurfaceCells
 from planarfriction.limit_surface.loops.twists import BAD_WRENCH
 from planarfriction.patch import ContactPatch
+
+POWERS = np.array([powers for powers in itertools.product(range(4, -1, -1), repeat=3) if sum(powers) == 4])
+"""Powers of `fx, fy, tau/r` in the 15 monomials, `[15, 3]`: x^4, x^3 y, x^3 z, x^2 y^2, ..."""
+
+MARGIN = 1e-4
+"""Least eigenvalue of the certificate, `H'' >= 1e-4 |x|^2`: no facets, no corners (the unit sphere's is 4)."""
+
+ELLIPSOID = np.zeros(15)
+"""Coefficients of `(x^2 + y^2 + z^2)^2`."""
+for _row, _powers in enumerate(POWERS):
+    ELLIPSOID[_row] = {4: 1.0, 2: 2.0}.get(_powers.max(), 0.0) if (_powers % 2 == 0).all() else 0.0
+
+
+_TENSORS = np.zeros((15, 3, 3, 3, 3))
+"""Symmetric tensors T of the monomials: `T x x x x`, gradients `4 T x x x`, second derivatives `12 T x x`."""
+for _index in itertools.product(range(3), repeat=4):
+    _TENSORS[(np.bincount(_index, minlength=3) == POWERS).all(axis=1), *_index] = 1.0
+_TENSORS /= _TENSORS.sum(axis=(1, 2, 3, 4), keepdims=True)
+
+
+def monomials(points: np.ndarray) -> np.ndarray:
+    """Return the 15 monomials at points `[M, 3]`, shape `[M, 15]`."""
+    return np.einsum("mci,mi->mc", 0.25 * gradients(points), points)
+
+
+def gradients(points: np.ndarray) -> np.ndarray:
+    """Return the gradients of the monomials, shape `[M, 15, 3]`."""
+    return np.einsum("mcij,mj->mci", hessians(points) / 3.0, points)
+
+
+def hessians(points: np.ndarray) -> np.ndarray:
+    """Return the second derivatives of the monomials, shape `[M, 15, 3, 3]`."""
+    return 12.0 * np.einsum("cijkl,mk,ml->mcij", _TENSORS, points, points)
+
+
+@functools.cache
+def _certificate_equations() -> tuple[np.ndarray, np.ndarray]:
+    """Return `C [36, 15]` and `Y [36, 81]` of `z' H(x) z = y' Q y` as `C c = Y vec(Q)`, `y = (x_i z_j)`.
+
+    One row for each monomial `x_i x_j z_k z_l`, i <= j, k <= l.
+    """
+    pairs = list(itertools.combinations_with_replacement(range(3), 2))
+    row = {pair: number for number, pair in enumerate(itertools.product(pairs, pairs))}
+    of_coefficients, of_matrix = np.zeros((36, 15)), np.zeros((36, 9, 9))
+    for i, j, k, n in itertools.product(range(3), repeat=4):  # (x_i z_k) (x_j z_n)
+        here = row[(min(i, j), max(i, j)), (min(k, n), max(k, n))]
+        of_coefficients[here] += 12.0 * _TENSORS[:, i, j, k, n]
+        of_matrix[here, 3 * i + k, 3 * j + n] += 1.0
+    return of_coefficients, of_matrix.reshape(36, 81)
+
+
+def certificate(coefficients: np.ndarray) -> np.ndarray:
+    """Return the matrix `Q [9, 9]` of the quartic with the largest smallest eigenvalue, exact in its equations.
+
+    Positive semidefinite: the quartic is convex, as `z' H(x) z = y' Q y >= 0` for all x, z.
+    """
+    cp = _cvxpy()
+    matrix, least = cp.Variable((9, 9), symmetric=True), cp.Variable()
+    of_coefficients, of_matrix = _certificate_equations()
+    scale = np.abs(coefficients).max()
+    wanted = of_coefficients @ (coefficients / scale)
+    rules = [of_matrix @ cp.vec(matrix, order="C") == wanted, matrix - least * np.eye(9) >> 0]
+    problem = cp.Problem(cp.Maximize(least), rules)
+    _solve(problem)
+    found = 0.5 * (matrix.value + matrix.value.T)  # pyright: ignore[reportOptionalMemberAccess, reportOptionalOperand]
+    missing = wanted - of_matrix @ found.reshape(81)
+    return scale * (found + np.linalg.lstsq(of_matrix, missing, rcond=None)[0].reshape(9, 9))
+
+
+def least_squares(rows: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the coefficients `[15]` of the convex quartic of least `|rows c - values|`, `[M, 15]` and `[M]`.
+
+    Without the constraint where that is convex anyway: then to rounding, otherwise to the solver's tolerance.
+    """
+    free = np.linalg.lstsq(rows, values, rcond=None)[0]
+    if np.linalg.matrix_rank(rows) == 15 and np.linalg.eigvalsh(certificate(free))[0] >= MARGIN:
+        return free
+    cp = _cvxpy()
+    coefficients, matrix = cp.Variable(15), cp.Variable((9, 9), symmetric=True)
+    of_coefficients, of_matrix = _certificate_equations()
+    # the same least squares in 15 rows, whatever the number of samples
+    triangle = np.asarray(np.linalg.qr(np.column_stack([rows, values]), mode="r"))
+    scale = np.abs(triangle).max()
+    problem = cp.Problem(
+        cp.Minimize(cp.sum_squares((triangle[:, :15] @ coefficients - triangle[:, 15]) / scale)),
+        [of_coefficients @ coefficients == of_matrix @ cp.vec(matrix, order="C"), matrix >> MARGIN * np.eye(9)],
+    )
+    _solve(problem)
+    return coefficients.value
+
+
+def _solve(problem: Any) -> None:
+    cp = _cvxpy()
+    try:
+        problem.solve(solver=cp.CLARABEL)
+    except cp.error.SolverError as error:
+        raise FrictionError(f"the fit of the quartic failed: {error}") from None
+    if problem.status not in ("optimal", "optimal_inaccurate"):
+        raise FrictionError(f"the fit of the quartic failed: {problem.status}")
+
+
+def _cvxpy() -> Any:
+    try:
+        import cvxpy
+    except ImportError:
+        raise MissingExtraError("cvxpy", "quartic") from None
+    return cvxpy
+
 
 _SLOPE_LEFT = 1e-14
 """Slope at which the wrench of a unit twist is found, relative to the twist [-]."""
@@ -46,7 +155,7 @@ class LimitSurfaceQuartic(LimitSurface):
     """Surface to which it is fitted; by default `LimitSurfaceCells(patch)`."""
 
     coefficients: np.ndarray | None = dataclasses.field(default=None, kw_only=True)
-    """Coefficients of the 15 monomials `quartic_fit.POWERS`, `[15]`; by default fitted to `surface`, for each load."""
+    """Coefficients of the 15 monomials `POWERS`, `[15]`; by default fitted to `surface`, for each load."""
 
     segments: int = dataclasses.field(default=20, kw_only=True)
     """Segments per quadrant of the table for compiled code [-]."""
@@ -58,7 +167,7 @@ class LimitSurfaceQuartic(LimitSurface):
         super().__post_init__()
         if self.coefficients is not None:
             given = validation.array("coefficients", self.coefficients, (15,))
-            if not np.linalg.eigvalsh(quartic_fit.certificate(given))[0] > 0.0:
+            if not np.linalg.eigvalsh(certificate(given))[0] > 0.0:
                 raise InvalidValueError("coefficients", "be those of a convex quartic", given.tolist())
             given.setflags(write=False)
             self._set(coefficients=given)
@@ -120,18 +229,18 @@ class LimitSurfaceQuartic(LimitSurface):
 
         Raises MissingExtraError without cvxpy, FrictionError where the fit fails.
         """
-        return float(np.linalg.eigvalsh(quartic_fit.certificate(self.quartic))[0])
+        return float(np.linalg.eigvalsh(certificate(self.quartic))[0])
 
     # ------------------------------------------------------------------ the protocol
 
     def _value(self, points: np.ndarray) -> np.ndarray:
-        return quartic_fit.monomials(points) @ self.quartic
+        return monomials(points) @ self.quartic
 
     def _gradient(self, points: np.ndarray) -> np.ndarray:
-        return np.einsum("mci,c->mi", quartic_fit.gradients(points), self.quartic)
+        return np.einsum("mci,c->mi", gradients(points), self.quartic)
 
     def _hessian(self, points: np.ndarray) -> np.ndarray:
-        return np.einsum("mcij,c->mij", quartic_fit.hessians(points), self.quartic)
+        return np.einsum("mcij,c->mij", hessians(points), self.quartic)
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
         scaling, size = self._scaling, np.abs(wrenches).max(axis=1)
@@ -191,6 +300,6 @@ def _fitted(points: np.ndarray, twists: np.ndarray, velocity_weight: float) -> n
     """Return the coefficients with `H = 1` at `points` `[M, 3]` and gradients of length 4 along `twists` `[M, 3]`."""
     units = twists / np.linalg.norm(twists, axis=1)[:, None]
     across = np.eye(3) - np.einsum("mi,mj->mij", units, units)
-    parts = 0.25 * np.sqrt(velocity_weight) * np.einsum("mij,mcj->mic", across, quartic_fit.gradients(points))
-    rows = np.concatenate([quartic_fit.monomials(points), parts.reshape(-1, 15)])
-    return quartic_fit.least_squares(rows, np.append(np.ones(len(points)), np.zeros(3 * len(points))))
+    parts = 0.25 * np.sqrt(velocity_weight) * np.einsum("mij,mcj->mic", across, gradients(points))
+    rows = np.concatenate([monomials(points), parts.reshape(-1, 15)])
+    return least_squares(rows, np.append(np.ones(len(points)), np.zeros(3 * len(points))))

@@ -63,6 +63,9 @@ class LoadFamily:
         self._lock = threading.Lock()
         """Held by who builds; shapes that are there are read without it."""
 
+    def __reduce__(self) -> tuple[type, tuple]:
+        return LoadFamily, (self._patch, *self._map, self._error, self._families)  # a copy builds its own
+
     @property
     def rungs(self) -> list[float]:
         """Loads [N] whose maps have been built and not been forgotten, ascending."""

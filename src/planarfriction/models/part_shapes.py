@@ -53,12 +53,9 @@ class OnePart:
     """
 
     def __init__(self, patch: ContactPatch, maps: tuple[float, int, int], error: float, parts: int) -> None:
-        self.patch, self._maps, self._error, self._parts = patch, maps, error, parts
+        self.patch, self._maps, self._error = patch, maps, error
         self._fixed = None if patch.depends_on_load else fixed_shape(patch, maps)
-        self._forget()
-
-    def _forget(self) -> None:
-        self.family = LoadFamily(self.patch, *self._maps, self._parts * self._error, self._parts)
+        self.family = LoadFamily(patch, *maps, parts * error, parts)
         self._recent: Remembered[ReducedShape] = Remembered(REMEMBERED)
 
     def at(self, loads: Sequence[float | None]) -> list[ReducedShape]:
@@ -69,14 +66,6 @@ class OnePart:
 
     def _built(self, load: float) -> ReducedShape:
         return self._recent.get(load, lambda: reduced_shape(self.patch, load, *self._maps))
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy gets: memories are shared by threads, not by models."""
-        return {name: value for name, value in self.__dict__.items() if name not in ("family", "_recent")}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._forget()
 
 
 class ReducedShapes:

@@ -3,12 +3,11 @@
 from planarfriction.families import PUBLISHED_PATCHES, SHAPES
 from planarfriction.patch.compressed import surface_error
 from planarfriction.patch.contact_patch import ContactPatch
-from planarfriction.patch.files import read_pressure_map
 from planarfriction.patch.grid import Grid
 from planarfriction.patch.grid_error import GridError
 from planarfriction.patch.metric import friction_metric
 from planarfriction.patch.pressure import LinearGradient, PerCell, Pressure, SoftFinger, Uniform
-from planarfriction.patch.pressure_maps import PressureMaps
+from planarfriction.patch.pressure_maps import PressureMaps, read_pressure_map
 
 __all__ = [
     "PUBLISHED_PATCHES",

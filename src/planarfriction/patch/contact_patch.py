@@ -13,11 +13,9 @@ from numpy.typing import ArrayLike
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import outline as outlines
-from planarfriction.patch import shapes
-from planarfriction.patch.grid import MOST_CELLS, Grid, check_cells, warn_of_the_unit
+from planarfriction.patch.grid import MOST_CELLS, Grid, cell_extents, check_cells, point_shares, warn_of_the_unit
 from planarfriction.patch.grid_error import GridError, grid_error
 from planarfriction.patch.moments import Moments
-from planarfriction.patch.point_shares import cell_extents, point_shares
 from planarfriction.patch.pressure import (
     Pressure,
     Uniform,
@@ -164,7 +162,7 @@ class ContactPatch(Moments):
         """
         width = validation.length("width", width)
         height = width if height is None else validation.length("height", height)
-        grid = Grid.around_origin(width, height, *shapes.columns_and_rows(cells, width, height))
+        grid = Grid.around_origin(width, height, *outlines.columns_and_rows(cells, width, height))
         positions, corners = grid.centres(), _UNIT_BOX * (width, height)
         areas = np.full(len(positions), grid.cell_area)
         shares = point_shares(positions, areas, (grid.cell_width, grid.cell_height))
@@ -226,7 +224,7 @@ class ContactPatch(Moments):
         width, height = vertices.max(axis=0) - low
         if not (width > 0.0 and height > 0.0):
             raise InvalidValueError("vertices", "enclose an area", f"a box of {width} x {height} m")
-        columns, rows = shapes.columns_and_rows(cells, width, height)
+        columns, rows = outlines.columns_and_rows(cells, width, height)
         grid = Grid(low[0], low[1], width / columns, height / rows, columns, rows)
         return outlines.clipped(cls, outline, grid, pressure, name)
 
@@ -268,9 +266,9 @@ class ContactPatch(Moments):
         Pressure laws are evaluated at the new cells; numbers per cell are repeated. Cells cut by a rim are replaced by
         cells of the same area and centroid. Points remain points. Raises InvalidValueError for too many cells.
         """
-        from planarfriction.patch.refined import refined
+        from planarfriction.patch.grid_error import finer
 
-        return refined(self, parts)
+        return finer(self, parts)
 
     def compressed(
         self, degree: int = 5, *, cells: int | None = None, error: float | None = None, loads: Any = None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planarfriction.equality import ByValue
-from planarfriction.patch.point_shares import point_shares
+from planarfriction.patch.grid import point_shares
 from planarfriction.patch.pressure import Pressure
 
 if TYPE_CHECKING:

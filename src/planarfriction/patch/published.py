@@ -1,4 +1,4 @@
-"""The seven patches of the published experiments: 21 x 21 cells on a square 0.02 m wide.
+"""The seven patches of the published experiments: 21 x 21 cells on a square 0.02 m wide; shapes of scene files.
 
 Source: Waltersson and Karayiannidis 2024. Another number of cells gives the same shape on another grid (the disc mask
 and the lines follow their own rules, which depend on the number of cells).
@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
+from typing import Any
 
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.families import PUBLISHED_PATCHES
 from planarfriction.patch.contact_patch import ContactPatch
 from planarfriction.patch.grid import MOST_CELLS, check_cells
 from planarfriction.patch.outline import with_outline
@@ -76,3 +79,41 @@ def _masked(blocks: list[tuple[slice, slice]], cells: int, width: float, name: s
         mask[block] = 1.0
     nearest = ((2 * np.arange(cells) + 1) * PUBLISHED_CELLS) // (2 * cells)
     return ContactPatch.from_pressure(mask[np.ix_(nearest, nearest)], width / cells, name=name)
+
+
+def pressure_map(
+    cell_size: Any, file: Any = None, files: Any = None, values: Any = None, loads: Any = None, name: str | None = None
+) -> ContactPatch:
+    """Return the patch of one map (a file or its values, rows from the top), or of several with their loads [N].
+
+    Raises `InvalidValueError` unless exactly one of `file`, `files` and `values` is given.
+    """
+    given = {key: value for key, value in (("file", file), ("files", files), ("values", values)) if value is not None}
+    if len(given) != 1:
+        rule = "have either file or values (or files, one for each load)"
+        raise InvalidValueError("pressure map", rule, " and ".join(given) or "none of them")
+    if files is not None and loads is None:
+        raise InvalidValueError("loads", "be given: the normal force of each of the files", "none")
+    return ContactPatch.from_pressure(next(iter(given.values())), cell_size, loads=loads, name=name)
+
+
+def published(name: str, cells: Any = None, width: Any = None) -> ContactPatch:
+    """Return the published patch `name` of so many `cells` along a side, `width` [m] wide."""
+    size = {key: value for key, value in (("cells", cells), ("width", width)) if value is not None}
+    return PUBLISHED_PATCHES.choose(name)(**size)
+
+
+def cells(
+    positions: Any,
+    areas: Any,
+    pressure: Any = None,
+    grid: Any = None,
+    cell_size: Any = None,
+    outline: Any = None,
+    name: Any = None,
+    point_shares: Any = None,
+) -> ContactPatch:
+    """Return the patch that `ContactPatch.to_dict` described."""
+    given = {"positions": positions, "areas": areas, "pressure": pressure, "grid": grid}
+    given |= {"cell_size": cell_size, "outline": outline, "name": name, "point_shares": point_shares}
+    return ContactPatch.from_dict({key: value for key, value in given.items() if value is not None})

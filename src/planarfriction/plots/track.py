@@ -114,7 +114,7 @@ def contact_poses(contact: pf.Contact, times: np.ndarray, poses: np.ndarray) -> 
 
 def _carried(contact: pf.Contact, times: np.ndarray) -> np.ndarray:
     """Return the prescribed displacement of the world's side of a contact `[T, 3]` [m, m, rad]."""
-    from planarfriction.scenes.movers import displacement
+    from planarfriction.scenes.signal import displacement
 
     moves = contact.support_velocity
     return np.zeros((len(times), 3)) if moves is None else displacement(moves, times)

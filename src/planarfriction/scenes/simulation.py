@@ -11,9 +11,8 @@ from planarfriction import validation
 from planarfriction.compiler.notice import said_when_compiling
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
 from planarfriction.kernels.integration import Method, Output
-from planarfriction.scenes.following import centres_of_pressure
 from planarfriction.scenes.options import MAX_STEPS, SolverOptions
-from planarfriction.scenes.packing import SegmentBatches
+from planarfriction.scenes.packing import SegmentBatches, centres_of_pressure
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.solution import History, Solution
 from planarfriction.solvers import RODAS4, integrate

@@ -23,8 +23,8 @@ from planarfriction.errors import FileError, FrictionError, InvalidValueError
 from planarfriction.geometry import rotate, twist_at
 from planarfriction.pictures import picture
 from planarfriction.reading import read_bytes
-from planarfriction.scenes.movers import displacement
 from planarfriction.scenes.scene import Scene
+from planarfriction.scenes.signal import displacement
 from planarfriction.solvers.statistics import Statistics
 from planarfriction.writing import replacing
 

@@ -13,7 +13,7 @@ from planarfriction import formulas, models
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws import FrictionLaw
 from planarfriction.limit_surface import LimitSurface
-from planarfriction.models.published_shapes import PublishedShape
+from planarfriction.models.reduced_published import PublishedShape
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import bristles, surfaces
 from planarfriction.tensors.bristles import Drive

@@ -14,7 +14,7 @@ from planarfriction import formulas, models
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.steady import HEADER, QUARTIC
 from planarfriction.laws import FrictionLaw
-from planarfriction.models.map_sizes import MapSizes, maps_of, sizes_of
+from planarfriction.models.reduced_map import MapSizes, maps_of, sizes_of
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors.bristles import back_onto
 from planarfriction.tensors.steps import LAW

@@ -13,8 +13,7 @@ from planarfriction.formulas import LawNumbers
 from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import refuse_creep, refuse_rate_law
 from planarfriction.patch import ContactPatch
-from planarfriction.tensors.inputs import broadcast, finite, non_negative, shaped
-from planarfriction.tensors.namespace import Namespace
+from planarfriction.tensors.namespace import Namespace, broadcast, finite, non_negative, shaped
 from planarfriction.tensors.pressure import Pressed, centre_of, follow
 
 LAW = PARAMETERS[:8]

@@ -11,11 +11,8 @@ except ImportError:
     raise MissingExtraError("torch", "torch") from None
 
 from planarfriction.derivatives import Rollout
-from planarfriction.tensors.scenes import SceneMotion
-from planarfriction.torch.distributed import DistributedModel
-from planarfriction.torch.moments import MomentModel
-from planarfriction.torch.published import ReducedModelPublished
-from planarfriction.torch.reduced import ReducedModel
+from planarfriction.tensors.operations import SceneMotion
+from planarfriction.torch.models import DistributedModel, MomentModel, ReducedModel, ReducedModelPublished
 from planarfriction.torch.reduced_planar import ReducedPlanarLuGre
 from planarfriction.torch.rollout import rollout, simulate_scene, tracking_loss
 

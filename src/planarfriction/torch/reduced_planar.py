@@ -19,9 +19,9 @@ from planarfriction.limit_surface import LimitSurface, LimitSurfaceEllipsoid
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import published
 from planarfriction.torch.base import TRAINABLE
+from planarfriction.torch.models import ReducedModelPublished
 from planarfriction.torch.namespace import xp
 from planarfriction.torch.parameters import PhysicalParameters
-from planarfriction.torch.published import ReducedModelPublished
 from planarfriction.torch.rollout import rollout
 from planarfriction.torch.rollout import tracking_loss as weighted_loss
 

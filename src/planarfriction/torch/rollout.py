@@ -7,9 +7,8 @@ from torch import Tensor
 
 from planarfriction.derivatives import Rollout
 from planarfriction.errors import InvalidValueError
-from planarfriction.tensors.inputs import rollout_inputs
-from planarfriction.tensors.operations import RolloutOperation, SceneOperation
-from planarfriction.tensors.scenes import simulator
+from planarfriction.tensors.namespace import rollout_inputs
+from planarfriction.tensors.operations import RolloutOperation, SceneOperation, simulator
 from planarfriction.torch import adjoint
 from planarfriction.torch.base import Compiled, FrictionModule
 from planarfriction.torch.namespace import xp

@@ -14,7 +14,7 @@ from planarfriction.coupling import CoupledStep, HostStep
 from planarfriction.errors import InvalidValueError
 from planarfriction.models import FrictionModel
 from planarfriction.warp import arrays
-from planarfriction.warp.kernels import Problems, coupled_kernel_of
+from planarfriction.warp.kernels import Problems, kernel_of
 from planarfriction.warp.source import coupled_source_of, described
 
 WRONG = {1: "parameters", 2: "state and host"}
@@ -82,7 +82,7 @@ class CoupledPatches:
         """Bits of what was wrong since the last `check` [worlds]: 1 in parameters, 2 in what a step was given."""
         self._numbers = wp.array(source.numbers, dtype=dtype, device=self.device)
         self._places = wp.array(source.places, dtype=wp.int32, device=self.device)
-        self.kernel = coupled_kernel_of(source.text)
+        self.kernel = kernel_of(source.text, Problems)
         """Kernel of `step`."""
         wp.load_module(self.kernel.module, device=self.device)
 

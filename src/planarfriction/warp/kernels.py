@@ -1,4 +1,4 @@
-"""Kernels that step contacts: one thread a contact."""
+"""Kernels that step contacts: one thread a contact, or a world."""
 
 # No `from __future__ import annotations` here: Warp reads the types themselves.
 
@@ -68,28 +68,14 @@ class Problems:
 
 
 @functools.lru_cache
-def kernel_of(source: str) -> Any:
-    """Return the kernel of native source (see `source_of`)."""
+def kernel_of(source: str, struct: Any) -> Any:
+    """Return the kernel of native source with one thread for each contact of a `Batch`, or world of `Problems`."""
 
     @wp.func_native(source)
-    def advance(contact: wp.int32, batch: Batch): ...  # pyright: ignore[reportGeneralTypeIssues]
+    def advance(thread: wp.int32, batch: struct): ...  # pyright: ignore[reportGeneralTypeIssues]
 
     @wp.kernel(enable_backward=False, module="unique")
-    def friction_step(batch: Batch):  # pyright: ignore[reportGeneralTypeIssues]
+    def friction_step(batch: struct):  # pyright: ignore[reportGeneralTypeIssues]
         advance(wp.tid(), batch)
 
     return friction_step
-
-
-@functools.lru_cache
-def coupled_kernel_of(source: str) -> Any:
-    """Return the kernel of native source that steps worlds (see `coupled_source_of`)."""
-
-    @wp.func_native(source)
-    def advance(world: wp.int32, batch: Problems): ...  # pyright: ignore[reportGeneralTypeIssues]
-
-    @wp.kernel(enable_backward=False, module="unique")
-    def coupled_step(batch: Problems):  # pyright: ignore[reportGeneralTypeIssues]
-        advance(wp.tid(), batch)
-
-    return coupled_step

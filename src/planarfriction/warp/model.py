@@ -82,7 +82,7 @@ class Model:
         """Bits of what was wrong since the last `check` [contacts]: 1 in parameters, 2 in state, twist or load."""
         self._numbers = wp.array(np.stack([each.numbers for each in sources]), dtype=dtype, device=self.device)
         self._places = wp.array(np.stack([each.places for each in sources]), dtype=wp.int32, device=self.device)
-        self.kernel = kernel_of(sources[0].text)
+        self.kernel = kernel_of(sources[0].text, Batch)
         """Kernel of `step` and `rollout`."""
         wp.load_module(self.kernel.module, device=self.device)
 

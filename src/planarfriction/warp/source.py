@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction.export.c_source import Writer
-from planarfriction.export.library import PRECISIONS, RANGES, tilt_of
+from planarfriction.export.library import PARAMETERS, PRECISIONS, tilt_of
 from planarfriction.export.pieces import Pieces, pieces_of
 from planarfriction.export.trace import Block, Number, Trace, traced
 from planarfriction.export.twins import twin
@@ -114,7 +114,7 @@ def _described(
                 "slopes": slopes,
                 "moves": moves,
                 "tilt": tilt_of(pieces.count).replace("static ", "CUDA_CALLABLE ").replace(")\n{", ") const\n{"),
-                "ranges": [RANGES[each] for each in pieces.parameters],
+                "ranges": [PARAMETERS[each][1] for each in pieces.parameters],
                 "largest": writer.constant(PRECISIONS[precision]),
                 "numbers": _placed(real, all_real),
                 "places": _placed(whole, all_whole),

@@ -21,7 +21,7 @@ from planarfriction.limit_surface import LimitSurface, LimitSurfaceExact, LimitS
 from planarfriction.limit_surface.base import scaling
 from planarfriction.limit_surface.comparison import directions
 from planarfriction.patch import ContactPatch
-from planarfriction_studies.measured.onset_simulation import breaking, peaks, pushed_end
+from planarfriction_studies.measured.onsets import breaking, peaks, pushed_end
 from planarfriction_studies.measured.questions import BatchModel, Case, OnsetQuestion, SlideQuestion
 from planarfriction_studies.measured.slide_integrator import MU, TURNS, fit_slides, parabolas, slides
 

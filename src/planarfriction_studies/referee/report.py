@@ -17,8 +17,7 @@ from planarfriction.plots.style import PlotFigure, new_figure, tidy
 from planarfriction.writing import write_text
 from planarfriction_studies.referee.case import Case
 from planarfriction_studies.referee.engines import Engine
-from planarfriction_studies.referee.film import film
-from planarfriction_studies.referee.pictures import scene
+from planarfriction_studies.referee.pictures import film, scene
 from planarfriction_studies.referee.run import MARKS, Verdict, to_rows
 
 COLOURS = {"ok": "#2a7f3f", "off": "#b8860b", "fails": "#b22222", "-": "#888888"}

@@ -253,16 +253,11 @@ class Friction:
 
     def _numbers(self) -> Any:
         """Return the numbers of the patches for kernels."""
-        columns = {
-            "site": [each.site for each in self.placed],
-            "own": [each.own for each in self.placed],
-            "other": [each.other for each in self.placed],
-            "support": [each.bodies[0] for each in self.placed],
-            "owner": [each.bodies[1] for each in self.placed],
-            "at_contact": [int(each.at_contact) for each in self.placed],
-        }
+        names = "site", "own", "other", "owner", "support", "at_contact"
+        rows = [(p.site, p.own, p.other, p.bodies[1], p.bodies[0], int(p.at_contact)) for p in self.placed]
         device, positions = self.coupled.device, [each.model.patch.positions for each in self.patches]
-        found = {name: wp.array(each, dtype=int, device=device) for name, each in columns.items()}
+        columns = zip(names, zip(*rows, strict=True), strict=True)
+        found = {name: wp.array(each, dtype=int, device=device) for name, each in columns}
         radius = np.array([np.sqrt((each**2).sum(1).mean()) for each in positions])
         return _filled(
             geometry.Patches(),

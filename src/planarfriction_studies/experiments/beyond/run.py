@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction_studies.experiments import looks
-from planarfriction_studies.experiments.beyond import contacts, figures, ladder, surfaces, tables
+from planarfriction_studies.experiments.beyond import contacts, ladder, surfaces, tables
 from planarfriction_studies.experiments.beyond import shapes as new_shapes
 from planarfriction_studies.experiments.experiment import Numbers, Result, Work, median_and_quartiles
 from planarfriction_studies.experiments.in_hand.figures import end_shifts
@@ -66,12 +66,12 @@ def run(work: Work) -> Result:
     return report(
         "beyond",
         {
-            "surface_errors": figures.surface_errors(errors),
-            "surface_staircase": figures.staircase(stairs),
-            "driven_models": figures.driven_boxes(numbers["driven"]),
+            "surface_errors": tables.surface_errors(errors),
+            "surface_staircase": tables.staircase(stairs),
+            "driven_models": tables.driven_boxes(numbers["driven"]),
             "in_hand_ends": _ends_figure(numbers["in hand"]),
-            "ladder": figures.draw_ladder(rows),
-            "grooves": figures.grooves(numbers["grooves"]),
+            "ladder": tables.draw_ladder(rows),
+            "grooves": tables.grooves(numbers["grooves"]),
         },
         numbers,
         _template_values(numbers),

@@ -1,16 +1,22 @@
-"""Tables beyond the paper."""
+"""Tables and figures beyond the paper."""
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from planarfriction.plots.style import PlotFigure
+from planarfriction_studies.experiments import looks
+from planarfriction_studies.experiments.beyond import contacts
 from planarfriction_studies.experiments.beyond.ladder import AUTO, ENDS, MOVED, SHIFT, STATISTICS, Row, shape_of
 from planarfriction_studies.experiments.beyond.surfaces import KINDS
-from planarfriction_studies.experiments.experiment import Numbers, Table, entry, table
+from planarfriction_studies.experiments.experiment import Arrays, Numbers, Table, entry, table
 from planarfriction_studies.experiments.runs import IN_WORDS, SIX_SHAPES
-from planarfriction_studies.experiments.wording import fmt, short
+from planarfriction_studies.experiments.velocity_driven import boxes
+from planarfriction_studies.experiments.wording import fmt, short, span
 
 MODEL_WORDS = {
     "full": "distributed, 21 x 21 cells",
@@ -143,3 +149,164 @@ def _span(values: list[Any], words: Callable[[Any], str]) -> str:
 def _spread(values: Iterable[float]) -> str:
     middle, first, third = map(shown, values)
     return f"{middle} ({first} to {third})"
+
+
+COLOURS = dict(
+    zip(KINDS, (looks.REDUCED, looks.MOMENTS, looks.DISTRIBUTED, looks.QUARTIC, looks.ELLIPSOID), strict=True)
+)
+
+MODEL_COLOURS = dict(zip(MOVED, (looks.REDUCED, looks.FEW, looks.MOMENTS, looks.PARTS, looks.DISTRIBUTED), strict=True))
+
+
+def surface_errors(errors: dict[str, Arrays]) -> PlotFigure:
+    """Draw errors of force [N] and torque [N mm] of each kind of surface from the exact one."""
+    figure, panels = looks.box_panels([IN_WORDS[shape].replace(", ", ",\n") for shape in errors], 6.8)
+    rows = (("force", 1.0, "error of the force [N]"), ("torque", 1e3, "error of the torque [N mm]"))
+    for axes, (quantity, factor, label) in zip(panels, rows, strict=True):
+        for place, each in enumerate(errors.values()):
+            kinds = [kind for kind in KINDS if f"{kind}/{quantity}" in each]
+            for i, kind in enumerate(kinds):
+                at = place + 0.15 * (i - 0.5 * (len(kinds) - 1))
+                numbers = np.percentile(factor * each[f"{kind}/{quantity}"], [5, 25, 50, 75, 95, 100])
+                looks.box(axes, at, numbers, COLOURS[kind], 0.12)
+        axes.set(yscale="log", ylabel=label)
+    shown = {kind: COLOURS[kind] for kind in KINDS if any(f"{kind}/force" in each for each in errors.values())}
+    looks.box_legend(figure, shown, 6)
+    return figure
+
+
+def staircase(stairs: Arrays) -> PlotFigure:
+    """Draw the torque [N mm] and force [N] of a spin over its centre [mm], summed and exact, for line and disc."""
+    figure, panels = looks.panels(9.6, 6.0, 2, 2, sharex=True)
+    place = 1e3 * stairs["place"]
+    for row, shape in zip(panels, ("Line", "Circle"), strict=True):
+        for axes, ending, factor, label, from_exact in (
+            (row[0], "", 1e3, "torque [N mm]", "torque, from the exact one [N µm]"),
+            (row[1], ", force", 1.0, "force [N]", "force, from the exact one [mN]"),
+        ):
+            cells, exact = factor * stairs[f"{shape}/sum{ending}"], factor * stairs[f"{shape}/exact{ending}"]
+            if shape == "Circle":  # steps of a few thousandths do not show beside the curve itself
+                cells, exact, label = 1e3 * (cells - exact), 0.0 * exact, from_exact
+            axes.plot(place, cells, color=looks.DISTRIBUTED, lw=1.1, label="sum over the 21 x 21 grid's cells")
+            axes.plot(place, exact, color=looks.EXACT, lw=1.3, label="exact")
+            axes.set(ylabel=label, xlim=(0.0, place[-1]))
+            axes.set_title(IN_WORDS[shape], fontsize="medium", loc="left")
+    for axes in panels[1]:
+        axes.set_xlabel("centre of rotation from the middle [mm]")
+    figure.align_ylabels(panels)
+    looks.legend(figure, panels[0, 0], 2)
+    return figure
+
+
+def driven_boxes(errors: dict[str, dict[str, dict[str, float]]]) -> PlotFigure:
+    """Draw errors of force [mN] and torque [N mm] of the models, from the finer grid."""
+    figure, panels = looks.box_panels([IN_WORDS[shape] for shape in errors], 7.0)
+    rows = (("", "error of the force [mN]", 1e-2), ("torque ", "error of the torque [N mm]", 1e-4))
+    for axes, (before, label, linear) in zip(panels, rows, strict=True):
+        axes.set_yscale("symlog", linthresh=linear, linscale=0.4)
+        for place, each in enumerate(errors.values()):
+            for offset, (model, colour) in zip((-0.32, -0.16, 0.0, 0.16, 0.32), MODEL_COLOURS.items(), strict=True):
+                values = [1e3 * each[model][before + name] for name in boxes.COLUMNS]
+                looks.box(axes, place + offset, values, colour, 0.13)
+        axes.set(ylabel=label, ylim=(0.0, None))
+    looks.box_legend(figure, {MOVED[model]: colour for model, colour in MODEL_COLOURS.items()}, 3)
+    return figure
+
+
+def grooves(numbers: dict[str, Any]) -> PlotFigure:
+    """Draw the drift of the grooved block [deg] over the slope [deg], simulated and in closed form."""
+    figure, axes = looks.panels(5.4, 3.6)
+    slopes = np.array(numbers["slope"])
+    fine = np.linspace(slopes[0], slopes[-1], 100)
+    closed = np.degrees([contacts.closed_drift(slope) for slope in fine])
+    axes.plot(np.degrees(fine), closed, color=looks.EXACT, label="closed form")
+    colours = (looks.DISTRIBUTED, looks.FEW, looks.REDUCED)
+    for kind, marker, colour in zip(contacts.GROOVED_MODELS, "ox+", colours, strict=True):
+        look = {"color": colour, "label": kind, "fillstyle": "none", "ms": 7}
+        axes.plot(np.degrees(slopes), np.degrees(numbers[kind]), marker, **look)
+    axes.set(xlabel="slope [deg]", ylabel="drift from the fall line [deg]", ylim=(0.0, None))
+    axes.legend(frameon=False)
+    return figure
+
+
+class Family(NamedTuple):
+    """Models of the ladder that are one line."""
+
+    words: str
+    rungs: dict[str, tuple[str, tuple[int, int]]]
+    """Model -> what stands beside its marker, and where: its offset from the marker [points]."""
+    colour: str
+    marker: str
+
+
+_RIGHT, _LEFT, _ABOVE, _CORNER = (6, -12), (-12, -13), (5, 5), (-16, 4)
+
+FAMILIES = (
+    Family("published reduced model", {"published": ("", _RIGHT)}, looks.REDUCED, "^"),
+    Family("ReducedModel, by default", {"reduced": ("", _RIGHT)}, looks.FEW, "s"),
+    Family("ReducedModel in 1, 4, 6 and 16 parts",
+           {"one part": ("1", _RIGHT), "4 parts": ("4", _LEFT), "6 parts": ("6", _RIGHT), "16 parts": ("16", _RIGHT)},
+           looks.MOMENTS, "o"),
+    Family("distributed, 28, 45 or all cells",
+           {"degree 3": ("28", _CORNER), "degree 5": ("45", _ABOVE), "full": ("all", _ABOVE)}, looks.DISTRIBUTED, "D"),
+)  # fmt: skip
+
+ROWS = (
+    ("driven, ", "third quartile", "moved with a given velocity", "force error, third quartile [mN]"),
+    ("load 2", "end", "in hand, load 2 (slips at once)", "distance of the end [mm]"),
+    ("load 1", "end", "in hand, load 1 (barely slips)", "distance of the end [mm]"),
+)
+"""Rows: part of the name of their cases, the error that is shown, their title, and their axis [thousandths]."""
+
+FLOOR = 1e-4
+"""Smallest error that is drawn [mN, mm]."""
+
+TICKS = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10)
+
+
+def draw_ladder(rows: list[Row]) -> PlotFigure:
+    """Draw the error over the time of a run: patches of many cells on the left, of few on the right; a row a run."""
+    from matplotlib.ticker import FixedLocator, NullLocator
+
+    many = {shape_of(row.case) for row in rows if row.model == "degree 5"}
+    groups = [group for few in (False, True) if (group := [row for row in rows if (shape_of(row.case) in many) ^ few])]
+    figure, panels = looks.panels(8.3, 9.6, len(ROWS), len(groups), sharex="col", sharey="row", squeeze=False)
+    for column, group in zip(panels.T, groups, strict=True):
+        cells = [row.states // 2 for row in group if row.model == "full"]
+        for axes, (case, quantity, title, label) in zip(column, ROWS, strict=True):
+            for family in FAMILIES:
+                _draw_family(axes, family, [row for row in group if case in row.case], quantity)
+            axes.set(xscale="log", yscale="log", ylabel=label)
+            axes.label_outer()
+            axes.set_title(title, fontsize="medium", loc="left")
+            axes.set_title("better \N{SOUTH WEST ARROW}", fontsize="medium", loc="right", color="0.35")
+            axes.margins(x=0.12, y=0.1)
+            axes.xaxis.set_major_locator(FixedLocator(TICKS))
+            axes.xaxis.set_major_formatter("{x:g}")
+            axes.xaxis.set_minor_locator(NullLocator())
+        column[-1].set_xlabel(f"time of a run / distributed model's [-],\npatches of {span(cells, 'd')} cells")
+    figure.align_ylabels(panels[:, 0])
+    look = {"ls": "-", "lw": 1.4, "ms": 6.5, "mec": "white"}
+    key = [looks.line_key(each.words, marker=each.marker, color=each.colour, **look) for each in FAMILIES]
+    looks.legend(figure, key, 2)
+    return figure
+
+
+def _draw_family(axes: Any, family: Family, rows: list[Row], quantity: str) -> None:
+    """Draw medians joined by a line, bars from the smallest to the largest, the reference, without errors, dotted."""
+    medians = []
+    for model, (words, place) in family.rungs.items():
+        found = [row for row in rows if row.model == model]
+        if not found:
+            continue
+        cost = float(np.median([row.time for row in found]))
+        errors = np.maximum([1e3 * row.errors[quantity] for row in found], FLOOR)
+        if model == "full" and quantity == "end":
+            axes.axvline(cost, color=family.colour, lw=1.0, ls=":")
+            continue
+        middle = float(np.median(errors))
+        axes.vlines(cost, errors.min(), errors.max(), color=family.colour, lw=1.6, alpha=0.35)
+        axes.annotate(words, (cost, middle), place, textcoords="offset points", fontsize=9, color=family.colour)
+        medians.append((cost, middle))
+    if medians:
+        axes.plot(*np.transpose(medians), "-", marker=family.marker, ms=6.5, mec="white", lw=1.4, color=family.colour)

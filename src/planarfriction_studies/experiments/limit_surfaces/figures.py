@@ -11,7 +11,7 @@ from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceEllipsoi
 from planarfriction.plots.limit_surface import draw_surface, scaled_samples
 from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure
 from planarfriction_studies.experiments import looks
-from planarfriction_studies.experiments.limit_surfaces.gradient import spin_about
+from planarfriction_studies.experiments.limit_surfaces.patches import spin_about
 from planarfriction_studies.experiments.runs import IN_WORDS
 
 SUM, BESIDE, LINK = looks.DISTRIBUTED, looks.ELLIPSOID, "0.45"

@@ -20,7 +20,7 @@ from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction.plots.limit_surface import sample_limit_surface, scaled_samples
 from planarfriction_studies.experiments import facts
 from planarfriction_studies.experiments.experiment import WRENCH, Numbers, Result, Table, Work, entry, table
-from planarfriction_studies.experiments.limit_surfaces import figures, gradient
+from planarfriction_studies.experiments.limit_surfaces import figures
 from planarfriction_studies.experiments.limit_surfaces import patches as shapes
 from planarfriction_studies.experiments.runs import IN_WORDS, SIX_SHAPES
 from planarfriction_studies.experiments.wording import report, span
@@ -53,7 +53,7 @@ def run(work: Work) -> Result:
         "disc": shapes.disc_numbers(patches["Circle"]),
         "ellipsoid": {name: each["ellipsoid"] for name, each in errors.items()},
         "tables": {name: {key: each[key] for key in STORED} for name, each in errors.items()},
-        "gradient": gradient.gradient_numbers(),
+        "gradient": shapes.gradient_numbers(),
     }
     return report(
         "limit_surfaces",
@@ -67,7 +67,7 @@ def run(work: Work) -> Result:
         comparisons=[
             *shapes.patch_comparisons(numbers["patches"]),
             *shapes.shape_comparisons(numbers),
-            *gradient.gradient_comparisons(numbers["gradient"]),
+            *shapes.gradient_comparisons(numbers["gradient"]),
         ],
         tables=(_patches(numbers["patches"]), _ellipsoid(numbers["ellipsoid"]), _stored(numbers["tables"])),
         data={"surfaces": _dataset(surfaces)},

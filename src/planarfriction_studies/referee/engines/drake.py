@@ -12,7 +12,7 @@ import numpy as np
 
 from planarfriction_studies.referee.case import Body, Case, Shape
 from planarfriction_studies.referee.engines import lacks, patches, uniform
-from planarfriction_studies.referee.engines.corners import RADIUS, ROUND, SHRUNK, feet
+from planarfriction_studies.referee.engines.patches import RADIUS, ROUND, SHRUNK, feet
 
 FLOOR = 18.0
 """Side of the box that is the floor of point contact: with a half space, which has no bounds, Drake's search for pairs

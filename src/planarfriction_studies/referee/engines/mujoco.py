@@ -11,7 +11,7 @@ import numpy as np
 
 from planarfriction_studies.referee.case import Case
 from planarfriction_studies.referee.engines import lacks, patches
-from planarfriction_studies.referee.mjcf import mjcf
+from planarfriction_studies.referee.export import mjcf
 
 
 @dataclass(frozen=True)

@@ -196,12 +196,10 @@ def place(
     for p in range(patches.count):
         normal, middle, count = touch(patches, contacts, frames, w, p, nefc)
         frames.touching[w, p] = count
-        for i in range(3):
-            if count == 0:
-                guess[w, p, i] = 0.0
         if count == 0:
-            for i in range(nv):
-                for j in range(3):
+            for j in range(3):
+                guess[w, p, j] = 0.0
+                for i in range(nv):
                     frames.jacobian[w, 3 * p + j, i] = 0.0
             continue
         normal = wp.normalize(normal)

@@ -171,9 +171,7 @@ def solve(h: wp.array3d(dtype=wp.float64), w: int, x: wp.array3d(dtype=wp.float6
 
 
 @wp.func
-def accelerate(
-    own: Dynamics, contacts: Contacts, frames: Frames, s: Scratch, w: int, nefc: int, smooth: wp.array2d(dtype=float)
-):
+def accelerate(own: Dynamics, frames: Frames, s: Scratch, w: int, nefc: int, smooth: wp.array2d(dtype=float)):
     """Write the answers of accelerations to wrenches, and the acceleration under the guess."""
     nv = s.stiff.shape[1]
     last = s.answers.shape[2] - 1
@@ -304,7 +302,7 @@ def respond(
     if s.done[w] != 0:
         return
     dt = wp.float64(timestep[w % timestep.shape[0]])
-    accelerate(own, contacts, frames, s, w, nefc, smooth)
+    accelerate(own, frames, s, w, nefc, smooth)
     gain(own, s, w, dt)
     n = 3 * patches.count
     for i in range(s.stiff.shape[1]):
@@ -369,32 +367,24 @@ def remember(
 ):
     """Write the result of the step into the memory, the passive forces and the start of the solver."""
     w = wp.tid()
-    touches = float(0.0)
-    if s.passes[w] > 0:
-        touches = 1.0
+    touches = s.passes[w] > 0
     for i in range(patches.states):
-        memory[w, at.after + i] = 0.0
-        if touches > 0.0:
-            memory[w, at.after + i] = state[w, i]
+        memory[w, at.after + i] = wp.where(touches, state[w, i], 0.0)
     for p in range(patches.count):
-        memory[w, at.load + p] = 0.0
-        if touches > 0.0:
-            memory[w, at.load + p] = load[w, p]
+        memory[w, at.load + p] = wp.where(touches, load[w, p], 0.0)
         for i in range(3):
             place = 3 * p + i
             memory[w, at.centre + place] = frames.centre[w, p][i]
-            memory[w, at.wrench + place] = 0.0
-            memory[w, at.twist + place] = 0.0
-            if touches > 0.0:
-                memory[w, at.wrench + place] = wrench[w, p, i]
-                memory[w, at.twist + place] = twist[w, p, i]
+            memory[w, at.wrench + place] = wp.where(touches, wrench[w, p, i], 0.0)
+            memory[w, at.twist + place] = wp.where(touches, twist[w, p, i], 0.0)
+            if touches:
                 change = wrench[w, p, i] - problem.guess[w, p, i]
                 for j in range(passive.shape[1]):
                     passive[w, j] = passive[w, j] + frames.jacobian[w, place, j] * change
-    if touches > 0.0:
+    if touches:
         for j in range(passive.shape[1]):
             warmstart[w, j] = float(s.acceleration[w, j])
     memory[w, at.iterations] = float(s.rounds[w])
     memory[w, at.passes] = float(s.passes[w])
-    memory[w, at.residual] = wp.where(touches > 0.0, residual[w], 0.0)
-    memory[w, at.converged] = wp.where(touches > 0.0, float(converged[w]), 1.0)
+    memory[w, at.residual] = wp.where(touches, residual[w], 0.0)
+    memory[w, at.converged] = wp.where(touches, float(converged[w]), 1.0)
