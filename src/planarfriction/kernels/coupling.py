@@ -39,6 +39,9 @@ others loads follow behind: where both turn against each other, one of the two w
 SHORTER, STAGES = 4.0, 8
 """Ratio and number of the shorter steps that lead from damping alone to a step that is hard to solve."""
 
+NEAR = 10.0
+"""Misfit of the guess, over the tolerance, up to which a Newton step goes from there: rest need not be tried."""
+
 ROUNDING = 1e-13
 """Error of a twist, in the largest speed that goes into it, below which no step gets."""
 
@@ -238,7 +241,7 @@ def _start(own, p, tolerance):
     _host(own, p, False)
     step_all(own, p, own.steps)
     misfit = _misfit(own, p)
-    if misfit > tolerance:
+    if misfit > NEAR * tolerance:
         for i in range(3 * own.count):
             p.twist[i] = 0.0
         step_all(own, p, own.steps)
