@@ -330,18 +330,19 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
     counts = [model.compiled.parts for model in models]
     ends = np.cumsum([0, *counts]).tolist()
     pieces = [slice(*each) for each in itertools.pairwise(ends)]
-    functions, owners, firsts, sizes = np.zeros((4, ends[-1]), np.int64)
+    steps, slopes, owners, firsts, sizes = np.zeros((5, ends[-1]), np.int64)
     records, shares, known, following = np.zeros(ends[-1], np.int64), np.zeros(ends[-1]), {}, []
     for p, (model, own) in enumerate(zip(models, pieces, strict=True)):
-        functions[own], owners[own] = address_of(model.compiled.functions.slopes, WORDS), p
+        functions, owners[own] = model.compiled.functions, p
+        steps[own], slopes[own] = address_of(functions.step, WORDS), address_of(functions.slopes, WORDS)
         firsts[own] = np.linspace(bounds[p], bounds[p + 1], counts[p], endpoint=False)
         if model.depends_on_load:
             following.append((p, own))
             continue
-        steps = known.setdefault(id(model), None) or model.compiled.packed_parts([None])
-        known[id(model)] = steps
-        records[own], shares[own] = steps.addresses[0], steps.shares[0]
-        sizes[own] = [part.records.shape[1] for part in steps.parts]
+        packed = known.setdefault(id(model), None) or model.compiled.packed_parts([None])
+        known[id(model)] = packed
+        records[own], shares[own] = packed.addresses[0], packed.shares[0]
+        sizes[own] = [part.records.shape[1] for part in packed.parts]
     # all cells, whatever load they carry: a lever arm that does not follow the load
     radius = np.array([np.sqrt((model.patch.positions**2).sum(1).mean()) for model in models])
     followers = _followers(models, np.array(ends[:-1]))
@@ -351,14 +352,15 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
         pieces=ends[-1],
         states=int(bounds[-1]),
         solve=kernels.solve_address(),
-        functions=functions,
+        steps=steps,
+        slopes=slopes,
         owners=owners,
         firsts=firsts,
         radius=radius,
         followers=followers,
         row=rows.offsets,
     )
-    kept, counts = [functions, owners, firsts, radius, *followers, *known.values()], np.diff(followers.firsts)
+    kept, counts = [steps, slopes, owners, firsts, radius, *followers, *known.values()], np.diff(followers.firsts)
     return _PackedPatches(row_of(patches), rows.slices, rows.size, records, shares, following, counts, sizes, kept)
 
 

@@ -39,6 +39,9 @@ others loads follow behind: where both turn against each other, one of the two w
 SHORTER, STAGES = 4.0, 8
 """Ratio and number of the shorter steps that lead from damping alone to a step that is hard to solve."""
 
+NEAR = 10.0
+"""Misfit of the guess, over the tolerance, up to which a Newton step goes from there: rest need not be tried."""
+
 ROUNDING = 1e-13
 """Error of a twist, in the largest speed that goes into it, below which no step gets."""
 
@@ -63,8 +66,11 @@ def _bring_back(step, dx, dy):
 
 
 @kernel
-def step_all(own, p):
-    """Step all pieces at the twists of a problem: write the new state, and wrenches with their slopes per unit load."""
+def step_all(own, p, functions):
+    """Step all pieces at the twists of a problem: write the new state and wrenches per unit load.
+
+    `functions` are those of `Patches`: its `steps`, or its `slopes`, which write the slopes of the wrenches as well.
+    """
     for i in range(3 * own.count):
         p.unit[i] = 0.0
     for i in range(9 * own.count):
@@ -76,7 +82,7 @@ def step_all(own, p):
         seen, dx, dy = p.seen, p.moved[2 * k], p.moved[2 * k + 1]
         spin = p.twist[3 * k + 2]
         seen[0], seen[1], seen[2] = p.twist[3 * k] - spin * dy, p.twist[3 * k + 1] + spin * dx, spin
-        call(own.functions[c], (record, at(p.state, first), seen, p.dt[0], at(p.new, first), p.step))
+        call(functions[c], (record, at(p.state, first), seen, p.dt[0], at(p.new, first), p.step))
         if dx != 0.0 or dy != 0.0:
             _bring_back(p.step, dx, dy)
         for i in range(3):
@@ -192,7 +198,7 @@ def _go(own, p, held, whole):
         for i in range(n):
             w[i] = p.start[i] + far * p.change[i]
         _host(own, p, held)
-        step_all(own, p)
+        step_all(own, p, own.steps)
         here = _slope(own, p)
         if whole or not too_far(first, here) or shortening == SHORTENINGS:
             break
@@ -233,17 +239,17 @@ def _prepare(own, p):
 def _start(own, p, tolerance):
     """Step at the better of the twists that the wrenches cause and of rest; return the misfit, and True for rest."""
     _host(own, p, False)
-    step_all(own, p)
+    step_all(own, p, own.steps)
     misfit = _misfit(own, p)
-    if misfit > tolerance:
+    if misfit > NEAR * tolerance:
         for i in range(3 * own.count):
             p.twist[i] = 0.0
-        step_all(own, p)
+        step_all(own, p, own.steps)
         at_rest = _misfit(own, p)
         if at_rest <= misfit:
             return at_rest, True
         _host(own, p, False)
-        step_all(own, p)
+        step_all(own, p, own.steps)
     return misfit, False
 
 
@@ -320,6 +326,7 @@ def solve(patches, problem):
         if misfit <= tolerance or iterations >= p.most[0] or misfit == math.inf:
             break
         held = iterations % ROUND >= JOINT
+        step_all(own, p, own.slopes)  # dear: not before they are needed, which at rest they are not
         if not _newton(own, p, held, False):
             _newton(own, p, held, True)
         _go(own, p, held, rest)
@@ -332,7 +339,7 @@ def solve(patches, problem):
     if lost and p.most[0] > 0.0:
         best = _again(own, p, patches, problem, best)
     if lost or not misfit <= best:
-        step_all(own, p)
+        step_all(own, p, own.steps)
     for i in range(3 * own.count):
         p.wrench[i] = p.load[i // 3] * p.unit[i]
     _forget_unloaded(own, p)

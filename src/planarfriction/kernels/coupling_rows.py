@@ -136,8 +136,10 @@ class Patches(NamedTuple):
     """Number of states."""
     solve: int
     """Address of `coupling.solve`."""
-    functions: Integers
-    """Addresses of the pieces' functions (see `steps.StepFunctions`), [pieces]."""
+    steps: Integers
+    """Addresses of the pieces' steps (see `steps.StepFunctions`), [pieces]."""
+    slopes: Integers
+    """Addresses of those that write slopes, [pieces]."""
     owners: Integers
     """Patches of the pieces, [pieces]."""
     firsts: Integers

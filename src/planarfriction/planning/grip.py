@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,7 +16,7 @@ from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.pictures import picture
 from planarfriction.planning.holding import dynamic_holding_load, holding_load
-from planarfriction.planning.motions import ROUGH, Aim, Grips, grip_position, load_on
+from planarfriction.planning.motions import LOOSE, ROUGH, Aim, Grips, grip_position, load_on
 from planarfriction.planning.report import GripReport, report_of
 from planarfriction.scenes import Scene, Signal
 
@@ -31,6 +32,9 @@ SPANS = (0.75, 0.2)
 ROUNDS, TRIES = 2, 16
 """Rounds in which the worst friction gets more weight, and profiles that are tried for one friction; for several half
 as many in each round."""
+
+NEAR, GAIN = 1e-3, 1e-3
+"""Share of the goal by which a profile to start from may miss it, and of the cost that a further step must save."""
 
 MOST_KNOTS = 200
 
@@ -188,9 +192,11 @@ class _ProfileSearch:
             """Return the values of a profile that stays low until some time, and then holds."""
             return self._inside(low + (hold - low) * np.interp(times, [until, until + rise], [0.0, 1.0]))
 
+        @functools.cache
         def missing(until: float) -> float:
-            (end,) = self._grips.ends(self._signal(released(until)), [1.0])
-            return self._aim.progress(end) - 1.0
+            (end,) = self._grips.ends(self._signal(released(until)), [1.0], rtol=LOOSE)
+            off = self._aim.progress(end) - 1.0
+            return off if abs(off) > NEAR else 0.0
 
         earliest, latest = float(times[0]) - rise, float(times[-1]) - rise
         most = missing(latest)
@@ -216,6 +222,7 @@ class _ProfileSearch:
                 bounds=(self._low, self._highest),
                 x_scale=self._holding,
                 max_nfev=tries,
+                ftol=GAIN,
             )
             values = found.x
             misses = np.linalg.norm(self._misses(values), axis=1)
@@ -232,7 +239,7 @@ class _ProfileSearch:
         return self._aim.misses(np.array(self._grips.ends(self._signal(values), self._factors)))
 
     def _inside(self, values: np.ndarray) -> np.ndarray:
-        inside = 1e-2 * np.minimum(self._highest - self._low, 1e-4 * self._high)
+        inside = 1e-2 * np.minimum(self._highest - self._low, self._holding)
         return np.clip(values, self._low + inside, self._highest - inside)
 
     def _residuals(self, values: np.ndarray) -> np.ndarray:

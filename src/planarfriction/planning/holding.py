@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -79,10 +80,16 @@ def holding_load(wrench: ArrayLike, patch: ContactPatch, mu: float, margin: floa
 
 def _needed(load: np.ndarray, patch: ContactPatch, mu: float, normal_force: float | None) -> float:
     """Return the normal force that holds the load on the shape at `normal_force`."""
-    kind: type[LimitSurface] = LimitSurfaceExact if patch.root is None or patch.root.ndim == 2 else LimitSurfaceCells
-    surface = kind(patch, normal_force=normal_force)
+    surface = _surface(patch, normal_force)
     twist = surface.twist(-load)
     return float(load @ twist / (mu * surface.dissipation(twist)))
+
+
+@functools.lru_cache(maxsize=8)
+def _surface(patch: ContactPatch, normal_force: float | None) -> LimitSurface:
+    """Return the limit surface of a patch, whose table for twists is dear: a plan asks several times."""
+    kind: type[LimitSurface] = LimitSurfaceExact if patch.root is None or patch.root.ndim == 2 else LimitSurfaceCells
+    return kind(patch, normal_force=normal_force)
 
 
 def _strongest(patch: ContactPatch) -> float:

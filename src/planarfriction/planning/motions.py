@@ -17,8 +17,8 @@ from planarfriction.scenes import Scene, Signal, SolverOptions, simulate
 from planarfriction.scenes.scene import with_friction
 from planarfriction.scenes.start import contact_map
 
-TIGHT = 1e-6
-"""Relative tolerance of the motions that are planned with [-]."""
+TIGHT, LOOSE = 1e-5, 1e-4
+"""Relative tolerances of the motions that are planned with; of those of derivatives, and to start from [-]."""
 
 ANGLE, SHIFT, SPEED, TURN = 3e-4, 3e-3, 1e-3, 1e-3
 """Units of the residuals in the sum of squares: of the goal 0.03 % of an angle and 0.1 % of a slide; of the contact
@@ -112,7 +112,7 @@ class Grips:
 
         def one(factor: float) -> np.ndarray:
             scene, knots = self.scene_of(profile, factor), {self.name: profile.times}
-            options = SolverOptions(rtol=TIGHT, save_every=scene.t_end)
+            options = SolverOptions(rtol=LOOSE, save_every=scene.t_end)
             found = scene_sensitivities(scene, (), signals=knots, options=options)
             slopes, pose = found.d_motion[-1].copy(), found.motion[-1, 3:]
             x, y = slide_of(scene, self.index, pose) + grip_position(scene, self.index) - pose[:2]

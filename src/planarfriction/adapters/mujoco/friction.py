@@ -200,15 +200,16 @@ class Friction:
         Raises `InvalidValueError` for data of another model, for options of the model that have been changed to what
         does not fit, before the step, and for a state that is not finite.
         """
-        if d.model is not self.m and not loops.is_served(self._row, d.model._address):
+        m = d.model
+        if m is not self.m and not loops.is_served(self._row, m._address):
             raise InvalidValueError("d", "be data of the model of the patches, or of a copy", "data of another model")
-        mujoco.mj_step1(d.model, d)
-        loops.plan_step(self._row, d.model._address, d._address)
-        iterations = d.userdata[self._memory.iterations]
+        mujoco.mj_step1(m, d)
+        silent = loops.plan_step(self._row, m._address, d._address)
+        iterations = 0.0 if silent else d.userdata[self._memory.iterations]
         if iterations == loops.UNFIT:
-            self._check(d.model)
-        mujoco.mj_step2(d.model, d)
-        line = self.misplaced(d) if d.userdata[self._memory.misplaced] != 0.0 else None
+            self._check(m)
+        mujoco.mj_step2(m, d)
+        line = None if silent else self.misplaced(d)
         if line is not None and line not in self._said:
             self._said.add(line)
             warnings.warn(line, stacklevel=2)

@@ -130,7 +130,7 @@ def _slope(own, patches):
     problem, n = own.problem, 3 * own.host.count
     _copy(problem.free_twist, problem.twist, n)
     _copy(problem.free_load, problem.load, own.host.count)
-    step_all(patches, problem)
+    step_all(patches, problem, patches.steps)
     total = 0.0
     for i in range(n):
         total += own.scratch.move[i] * (problem.load[i // 3] * problem.unit[i] - problem.guess[i])
@@ -281,8 +281,14 @@ def control(m, d):
 
 @jit
 def plan_step(host, m, d):
-    """Call `plan` from Python with the row of a `Host` and the addresses of model and data."""
-    call(read(host).plan, (pointer(host), m, d))
+    """Call `plan` from Python with the row of a `Host` and the addresses of model and data.
+
+    Return False if the step has something to say: it has no friction, or a patch is misplaced.
+    """
+    own = read(host)
+    call(own.plan, (pointer(host), m, d))
+    kept = arrays_at(own.memory, integers(d + own.data.userdata)[0])
+    return kept.iterations[0] >= 0.0 and kept.misplaced[0] == 0.0
 
 
 @jit
