@@ -415,6 +415,42 @@ def test_processes_give_the_same_bits_and_take_no_lambda():
     assert data.identical(reference())
 
 
+class Handed(concurrent.futures.ThreadPoolExecutor):
+    """Records how many scenes it is handed at a time, and refuses to hand on one of them."""
+
+    def __init__(self, refused: float = 0.0) -> None:
+        super().__init__(1)
+        self.batches: list[int] = []
+        self._refused = refused
+
+    def submit(self, function, scenes, *more):
+        self.batches.append(len(scenes))
+        if any(scene.contacts[0].normal_force(0.0) == self._refused for scene in scenes):
+            future = concurrent.futures.Future()
+            future.set_exception(TypeError("cannot pickle it"))
+            return future
+        return super().submit(function, scenes, *more)
+
+
+def test_short_runs_are_handed_out_together_and_long_ones_alone(monkeypatch):
+    values = {"grip": np.linspace(1.0, 2.0, 40)}
+    alone = pf.sweep(grip, values)
+    for turn, most in ((1e3, range(5, 41)), (-1.0, range(1, 3))):
+        monkeypatch.setattr(records, "TURN", turn)
+        with Handed() as pool:
+            assert pf.sweep(grip, values, executor=pool).identical(alone)
+        assert max(pool.batches) in most
+
+
+def test_what_cannot_be_sent_fails_alone():
+    values = {"grip": [*np.linspace(1.0, 2.0, 40).tolist(), 3.0, *np.linspace(4.0, 5.0, 9).tolist()]}
+    with Handed(refused=3.0) as pool:
+        data = pf.sweep(grip, values, executor=pool, measure=end)
+    assert max(pool.batches) > 1
+    assert data.grip[data.status == "failed"].values.tolist() == [3.0]
+    assert data.failure.sel(grip=3.0) == "TypeError: cannot pickle it"
+
+
 def leave(solution: pf.Solution) -> float:
     os._exit(1)
 

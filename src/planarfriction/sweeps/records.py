@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import re
+import time
 import zipfile
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
 
 FAILED = "failed"
 """Status of a run that ended with an error; the others are those of a `Solution`."""
+
+TURN = 0.1
+"""Time after which a worker hands back what it has [s]: short to whoever waits, long beside handing over."""
 
 _META = "planarfriction"
 """Entry of a file that describes the others; no variable may have this name."""
@@ -53,6 +58,19 @@ def run(scene: Scene, measure: Callable[[Solution], Any] | None, stopped: Callab
         return Record(solution.status, "", variables(found, measure), scene.t_end)
     except Exception as error:
         return Record(FAILED, f"{where}{reason_of(error)}", {}, scene.t_end)
+
+
+def run_all(
+    scenes: list[Scene], measure: Callable[[Solution], Any] | None, stopped: Callable[[], bool] | None = None
+) -> list[Record]:
+    """Run scenes until `TURN` is over, at least the first one; returns the records of those that were run."""
+    begin, found = time.monotonic(), []
+    with contextlib.suppress(Stopped):
+        for scene in scenes:
+            found.append(run(scene, measure, stopped))
+            if time.monotonic() - begin > TURN:
+                break
+    return found
 
 
 class Stopped(BaseException):
