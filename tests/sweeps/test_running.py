@@ -423,13 +423,13 @@ class Handed(concurrent.futures.ThreadPoolExecutor):
         self.batches: list[int] = []
         self._refused = refused
 
-    def submit(self, function, scenes, *more):
-        self.batches.append(len(scenes))
-        if any(scene.contacts[0].normal_force(0.0) == self._refused for scene in scenes):
+    def submit(self, function, batch):
+        self.batches.append(len(batch.scenes))
+        if any(scene.contacts[0].normal_force(0.0) == self._refused for scene in batch.scenes):
             future = concurrent.futures.Future()
             future.set_exception(TypeError("cannot pickle it"))
             return future
-        return super().submit(function, scenes, *more)
+        return super().submit(function, batch)
 
 
 def test_short_runs_are_handed_out_together_and_long_ones_alone(monkeypatch):

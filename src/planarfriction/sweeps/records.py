@@ -6,9 +6,11 @@ import contextlib
 import io
 import json
 import re
+import secrets
 import time
 import zipfile
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -60,17 +62,29 @@ def run(scene: Scene, measure: Callable[[Solution], Any] | None, stopped: Callab
         return Record(FAILED, f"{where}{reason_of(error)}", {}, scene.t_end)
 
 
-def run_all(
-    scenes: list[Scene], measure: Callable[[Solution], Any] | None, stopped: Callable[[], bool] | None = None
-) -> list[Record]:
-    """Run scenes until `TURN` is over, at least the first one; returns the records of those that were run."""
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Scenes that a worker is handed together."""
+
+    scenes: list[Scene]
+    measure: Callable[[Solution], Any] | None
+    stopped: Callable[[], bool] | None = None
+    """Return True if nobody waits for the results any longer."""
+
+    def __dask_tokenize__(self) -> str:
+        """Return a name of its own, for which dask would go through all numbers of the scenes."""
+        return secrets.token_hex(16)
+
+
+def run_all(batch: Batch) -> tuple[list[Record], float]:
+    """Run scenes until `TURN` is over, at least the first one; returns the records of those that were run, and time."""
     begin, found = time.monotonic(), []
     with contextlib.suppress(Stopped):
-        for scene in scenes:
-            found.append(run(scene, measure, stopped))
+        for scene in batch.scenes:
+            found.append(run(scene, batch.measure, batch.stopped))
             if time.monotonic() - begin > TURN:
                 break
-    return found
+    return found, time.monotonic() - begin
 
 
 class Stopped(BaseException):

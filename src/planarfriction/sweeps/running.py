@@ -28,7 +28,7 @@ from planarfriction.scenes import Scene
 from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, FolderBookkeeper, Index, instants
 from planarfriction.sweeps.keys import Keys
 from planarfriction.sweeps.quantities import Grid, check_takes, grid_of
-from planarfriction.sweeps.records import FAILED, Record, reason_of, run_all
+from planarfriction.sweeps.records import FAILED, TURN, Batch, Record, reason_of, run_all
 from planarfriction.sweeps.settings import Settable
 
 if TYPE_CHECKING:
@@ -39,11 +39,11 @@ if TYPE_CHECKING:
 _BETWEEN = 0.5
 """Time between two reports of progress [s]."""
 
-_AHEAD, _WORKERS = 4, 64
+_AHEAD, _WORKERS = 2, 64
 """Number of batches of runs that wait for each worker of an executor, so that none is idle and little memory is used,
 and number of workers of an executor that does not tell it."""
 
-_BATCH = 256
+_BATCH = 64
 """Largest number of runs that are handed out together."""
 
 _ENDED = "the executor ended ({}): finished runs are kept, sweep again to continue"
@@ -251,14 +251,15 @@ class Sweeping:
                 batch = again.pop() if again else list(itertools.islice(jobs, self._size))
                 if batch:
                     try:
-                        future = executor.submit(run_all, [scene for *_, scene in batch], self._measure, stopped)
+                        scenes = [scene for *_, scene in batch]
+                        future = executor.submit(run_all, Batch(scenes, self._measure, stopped))
                     except RuntimeError as error:  # broken, or shut down
                         raise SweepError(_ENDED.format(reason_of(error))) from None
                     pending[future] = batch
                     future.add_done_callback(done.put)
                 elif not pending:
                     break
-                if not batch or len(pending) >= most:
+                if not batch or len(pending) >= most or not done.empty():
                     again += self._collect(done, pending)
         except BaseException:
             self._stopped.set()
@@ -313,12 +314,15 @@ class Sweeping:
             if isinstance(error, KeyboardInterrupt):  # in a process that heard Ctrl-C too: these runs are not done
                 continue
             # any other error means that the executor lost the runs, or could not send one of them
-            failed = [Record(FAILED, reason_of(error), {})] if error is not None and len(jobs) == 1 else []
-            records = failed if error is not None else future.result()
+            if error is not None:
+                records = [Record(FAILED, reason_of(error), {})] if len(jobs) == 1 else []
+                size = 1
+            else:
+                records, spent = future.result()
+                self._size = size = max(1, min(int(len(records) * TURN / (spent + 1e-9)), _BATCH))
             for (index, key, scene), record in zip(jobs, records, strict=False):
                 self._book.add(index, key, record, scene)
-            left, size = jobs[len(records) :], max(len(records), 1)
-            self._size = size if left else min(max(self._size, 2 * size), _BATCH)
+            left = jobs[len(records) :]
             again += [left[first : first + size] for first in range(0, len(left), size)]
         self._book.flush()
         if self._ended:
