@@ -326,6 +326,10 @@ def test_what_does_not_fit_the_first_run_is_a_failure():
     assert data.a[2].isnull().all()
 
 
+MEASURED: list[pf.Solution] = []
+"""Solutions that were measured: a measurement of kept runs uses no values from around it."""
+
+
 def test_ctrl_c_keeps_what_is_done(tmp_path):
     """In this process, in its main thread, while threads work."""
     main = threading.main_thread().ident
@@ -337,14 +341,16 @@ def test_ctrl_c_keeps_what_is_done(tmp_path):
 
     def slow(solution: pf.Solution) -> dict[str, float]:
         time.sleep(0.3)  # so that progress is asked for in between
+        MEASURED.append(solution)
         return end(solution)
 
     pressed: list[int] = []
+    MEASURED.clear()
     values = {"grip": np.linspace(1.0, 2.0, 40)}
     with pytest.raises(SweepInterrupted) as stop:
         pf.sweep(grip, values, out=tmp_path, measure=slow, progress=press)
     done = int((stop.value.data.status == "success").sum())
-    assert 2 <= done < 40 and done == len(list(tmp_path.glob("*.npz")))
+    assert 2 <= done < 40 and done == len(list(tmp_path.glob("*.npz"))) == len(MEASURED)
     assert int((stop.value.data.status == "missing").sum()) == 40 - done
     assert int(stop.value.data.y.notnull().sum()) == done
 
