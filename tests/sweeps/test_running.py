@@ -326,6 +326,10 @@ def test_what_does_not_fit_the_first_run_is_a_failure():
     assert data.a[2].isnull().all()
 
 
+MEASURED: list[pf.Solution] = []
+"""Solutions that were measured: a measurement of kept runs uses no values from around it."""
+
+
 def test_ctrl_c_keeps_what_is_done(tmp_path):
     """In this process, in its main thread, while threads work."""
     main = threading.main_thread().ident
@@ -337,14 +341,16 @@ def test_ctrl_c_keeps_what_is_done(tmp_path):
 
     def slow(solution: pf.Solution) -> dict[str, float]:
         time.sleep(0.3)  # so that progress is asked for in between
+        MEASURED.append(solution)
         return end(solution)
 
     pressed: list[int] = []
+    MEASURED.clear()
     values = {"grip": np.linspace(1.0, 2.0, 40)}
     with pytest.raises(SweepInterrupted) as stop:
         pf.sweep(grip, values, out=tmp_path, measure=slow, progress=press)
     done = int((stop.value.data.status == "success").sum())
-    assert 2 <= done < 40 and done == len(list(tmp_path.glob("*.npz")))
+    assert 2 <= done < 40 and done == len(list(tmp_path.glob("*.npz"))) == len(MEASURED)
     assert int((stop.value.data.status == "missing").sum()) == 40 - done
     assert int(stop.value.data.y.notnull().sum()) == done
 
@@ -413,6 +419,49 @@ def test_processes_give_the_same_bits_and_take_no_lambda():
             pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=lambda solution: 1.0)
         data = pf.sweep(grip, {"grip": GRIPS, "mass": MASSES}, executor=pool)
     assert data.identical(reference())
+
+
+class Handed(concurrent.futures.ThreadPoolExecutor):
+    """Records how many scenes it is handed at a time, and refuses to hand on one of them."""
+
+    def __init__(self, refused: float = 0.0) -> None:
+        super().__init__(1)
+        self.batches: list[int] = []
+        self._refused = refused
+
+    def submit(self, function, batch):
+        self.batches.append(len(batch.scenes))
+        if any(scene.contacts[0].normal_force(0.0) == self._refused for scene in batch.scenes):
+            future = concurrent.futures.Future()
+            future.set_exception(TypeError("cannot pickle it"))
+            return future
+        return super().submit(function, batch)
+
+
+def late(solution: pf.Solution) -> dict[str, float]:
+    """Take longer for the last runs than a worker keeps results to itself."""
+    if solution.histories["normal_force"].values[-1, 0] > 2.0:
+        time.sleep(1.1 * records.TURN)
+    return end(solution)
+
+
+def test_short_runs_are_handed_out_together_and_long_ones_alone():
+    short, long = np.linspace(1.0, 2.0, 40).tolist(), [3.0, 4.0, 5.0, 6.0]
+    for grips, most, again in ((short, range(2, 41), 0), (short + long, range(2, 45), 1), (long, [1], 0)):
+        with Handed() as pool:
+            data = pf.sweep(grip, {"grip": grips}, executor=pool, measure=late)
+        assert max(pool.batches) in most
+        assert sum(pool.batches) >= len(grips) + again
+        np.testing.assert_array_equal(data.y, pf.sweep(grip, {"grip": grips}, measure=end).y)
+
+
+def test_what_cannot_be_sent_fails_alone():
+    values = {"grip": [*np.linspace(1.0, 2.0, 40).tolist(), 3.0, *np.linspace(4.0, 5.0, 9).tolist()]}
+    with Handed(refused=3.0) as pool:
+        data = pf.sweep(grip, values, executor=pool, measure=end)
+    assert max(pool.batches) > 1
+    assert data.grip[data.status == "failed"].values.tolist() == [3.0]
+    assert data.failure.sel(grip=3.0) == "TypeError: cannot pickle it"
 
 
 def leave(solution: pf.Solution) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import shutil
 import signal
@@ -17,6 +18,7 @@ import pytest
 import planarfriction as pf
 from planarfriction import sweeps
 from planarfriction.errors import FileError, SweepInterrupted
+from planarfriction.sweeps import zarr_chunks
 from planarfriction.sweeps.zarr_store import ZarrBookkeeper
 from planarfriction.writing import making_folder
 from tests.sweeps.test_running import GRIPS, MASSES, MODEL, end, grip, reference
@@ -40,12 +42,20 @@ def same(stored, data) -> None:
         np.testing.assert_array_equal(there.values.astype(each.dtype), each.values, err_msg=name)
 
 
-def test_a_store_holds_the_same_dataset_a_chunk_a_run(zarr, tmp_path):
+A_RUN = 4 * 8
+"""Bytes of a history of a run."""
+
+
+@pytest.mark.parametrize(
+    ("room", "runs"), [(2**16, (3, 2)), (5 * A_RUN, (2, 2)), (3 * A_RUN, (1, 2)), (A_RUN, (1, 1)), (1, (1, 1))]
+)
+def test_a_store_holds_the_same_dataset(zarr, tmp_path, monkeypatch, room, runs):
+    monkeypatch.setattr(zarr_chunks, "CHUNK", room)
     path = tmp_path / "all.zarr"
     stored = pf.sweep(grip, VALUES, out=path)
     same(stored, reference())
     arrays = zarr.open_group(path, mode="r")
-    assert arrays["fx"].chunks == (1, 1, 4, 1) and arrays["fx"].shape == (3, 2, 4, 1)
+    assert arrays["fx"].chunks == (*runs, 4, 1) and arrays["fx"].shape == (3, 2, 4, 1)
     told: list[sweeps.Progress] = []
     same(pf.sweep(grip, VALUES, out=path, progress=told.append), reference())
     assert told[-1].found == 6
@@ -75,7 +85,9 @@ def test_a_run_counts_once_the_journal_says_so(zarr, tmp_path):
     whole = pf.sweep(grip, VALUES, out=path, measure=end).load()
     journal = path / "run" / "runs.jsonl"
     lines = journal.read_bytes().splitlines(keepends=True)
-    journal.write_bytes(b"".join(lines[:4]) + lines[4][:20])  # killed while it wrote the fifth
+    places = [0, 7], [0], [0, 0.5], 0
+    elsewhere = b"".join(json.dumps([place, *json.loads(lines[0])[1:]]).encode() + b"\n" for place in places)
+    journal.write_bytes(elsewhere + b"".join(lines[:4]) + lines[4][:20])  # killed while it wrote the fifth
     told: list[sweeps.Progress] = []
     again = pf.sweep(grip, VALUES, out=path, measure=end, progress=told.append)
     assert told[-1].found == 4 and again.load().identical(whole)
@@ -98,7 +110,8 @@ def test_a_store_without_a_measurement_continues(zarr, tmp_path):
 
 
 @pytest.mark.parametrize("lines", [0, 6])
-def test_a_lost_chunk_or_a_kill_before_all_arrays_were_made_is_mended(zarr, tmp_path, lines):
+def test_a_lost_chunk_or_a_kill_before_all_arrays_were_made_is_mended(zarr, tmp_path, monkeypatch, lines):
+    monkeypatch.setattr(zarr_chunks, "CHUNK", 2 * A_RUN)
     path = tmp_path / "all.zarr"
     pf.sweep(grip, VALUES, out=path)
     journal = path / "run" / "runs.jsonl"
@@ -109,7 +122,51 @@ def test_a_lost_chunk_or_a_kill_before_all_arrays_were_made_is_mended(zarr, tmp_
         shutil.rmtree(path / "x")
     told: list[sweeps.Progress] = []
     same(pf.sweep(grip, VALUES, out=path, progress=told.append), reference())
-    assert (told[-1].found, told[-1].damaged) == ((5, 1) if lines else (0, 0))
+    assert (told[-1].found, told[-1].damaged) == ((4, 2) if lines else (0, 0))
+
+
+def test_runs_of_a_lost_chunk_stay_lost_if_only_some_are_done_again(zarr, tmp_path, monkeypatch):
+    """A kill may come when the chunk is there again, with one of its runs."""
+    monkeypatch.setattr(zarr_chunks, "CHUNK", 2 * A_RUN)
+    path, told = tmp_path / "all.zarr", []
+    pf.sweep(grip, VALUES, out=path)
+    (path / "x" / "c" / "1" / "0" / "0").unlink()
+
+    def killed(*run):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(ZarrBookkeeper, "look_up", killed)
+    with pytest.raises(SweepInterrupted):
+        pf.sweep(grip, VALUES, out=path)
+    monkeypatch.undo()
+    shutil.copy(path / "x" / "c" / "0" / "0" / "0", path / "x" / "c" / "1" / "0" / "0")
+    same(pf.sweep(grip, VALUES, out=path, progress=told.append), reference())
+    assert told[-1].found == 4
+
+
+def test_a_damaged_chunk_that_is_to_be_filled_is_one_line(zarr, tmp_path):
+    path = tmp_path / "ends.zarr"
+    pf.sweep(grip, VALUES, out=path, measure=end)
+    chunk, journal = path / "y" / "c" / "0" / "0", path / "run" / "runs.jsonl"
+    chunk.write_bytes(chunk.read_bytes()[:-1] + b"?")
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:2]))
+    with pytest.raises(FileError, match=r"y.c.0.0: is damaged: remove it, and its runs are done again \(") as caught:
+        pf.sweep(grip, VALUES, out=path, measure=end)
+    assert "\n" not in str(caught.value)
+    chunk.unlink()
+    np.testing.assert_array_equal(pf.sweep(grip, VALUES, out=path, measure=end).y, reference().y[:, :, -1])
+
+
+def test_a_store_whose_chunks_are_of_one_run_goes_on(zarr, tmp_path, monkeypatch):
+    """An earlier version made them."""
+    path, told = tmp_path / "all.zarr", []
+    with monkeypatch.context() as patch:
+        patch.setattr(zarr_chunks, "CHUNK", 1)
+        pf.sweep(grip, VALUES, out=path)
+    journal = path / "run" / "runs.jsonl"
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:2]))
+    same(pf.sweep(grip, VALUES, out=path, progress=told.append), reference())
+    assert told[-1].found == 2
 
 
 def test_a_store_whose_chunks_have_other_codecs_goes_on(zarr, tmp_path):
@@ -157,7 +214,7 @@ def test_a_store_is_made_whole_or_not_at_all(zarr, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
     path.mkdir()  # an empty folder may become a store
     with monkeypatch.context() as patch:
-        patch.setattr(ZarrBookkeeper, "_fill", full)
+        patch.setattr(zarr_chunks.ChunkedArray, "write", full)
         with pytest.raises(pf.errors.FileError, match=r"a\.zarr: cannot be written: No space left on device$"):
             pf.sweep(grip, VALUES, out=path, measure=end)
     whole = pf.sweep(grip, VALUES, measure=end)
@@ -186,7 +243,7 @@ def test_of_two_that_make_a_store_the_first_one_stays(tmp_path):
 
 def test_a_damaged_chunk_is_found_by_who_reads_it(zarr, tmp_path):
     stored = pf.sweep(grip, VALUES, out=tmp_path / "all.zarr")
-    chunk = tmp_path / "all.zarr" / "x" / "c" / "1" / "0" / "0"
+    chunk = tmp_path / "all.zarr" / "x" / "c" / "0" / "0" / "0"
     content = bytearray(chunk.read_bytes())
     content[len(content) // 2] ^= 1
     chunk.write_bytes(bytes(content))
@@ -197,10 +254,10 @@ def test_a_damaged_chunk_is_found_by_who_reads_it(zarr, tmp_path):
 def test_a_folder_in_the_place_of_a_chunk_is_no_chunk(zarr, tmp_path):
     path = tmp_path / "all.zarr"
     pf.sweep(grip, VALUES, out=path)
-    chunk = path / "x" / "c" / "1" / "0" / "0"
+    chunk = path / "x" / "c" / "0" / "0" / "0"
     chunk.unlink()
     chunk.mkdir()
-    with pytest.raises(pf.FrictionError, match=r"all\.zarr.x.c.1.0.0: cannot be written: Is a directory"):
+    with pytest.raises(pf.FrictionError, match=r"all\.zarr.x.c.0.0.0: cannot be written: Is a directory"):
         pf.sweep(grip, VALUES, out=path)
 
 

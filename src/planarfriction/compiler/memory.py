@@ -76,7 +76,8 @@ def size_of(record: Any) -> int:
 def row_of(record: Any) -> np.ndarray:
     """Return the words of a record as a row of doubles; integers and addresses lie in them bit by bit.
 
-    An array without numbers has the address 0. The caller keeps arrays alive.
+    An array without numbers has the address 0. Words may stand for a record in the record. The caller keeps arrays
+    alive.
     """
     row = np.empty(size_of(type(record)))
     _write(row, record)
@@ -101,7 +102,10 @@ def _write(row: np.ndarray, record: Any) -> None:
     at, integers = 0, row.view(np.int64)
     for (name, words, integer, dtype), value in zip(_plan(type(record)), record, strict=True):
         if words:
-            _write(row[at : at + words], value)
+            if isinstance(value, np.ndarray):
+                row[at : at + words] = value
+            else:
+                _write(row[at : at + words], value)
             at += words
             continue
         if isinstance(value, np.ndarray):
@@ -315,6 +319,8 @@ class Layout:
         """Words at which the arrays begin (see `arrays_at`)."""
         self.slices = {name: slice(*each) for name, *each in zip(self._shapes, ends[:-1], ends[1:], strict=True)}
         """The numbers of each array in a block."""
+        self._places = np.where(sizes, np.multiply(_WORD, ends[:-1]), -1)
+        """Bytes at which the arrays begin, -1 for those without numbers."""
         self._integers = {name for name, kind in _fields(record) if _number_of(kind) == types.int64}
 
     def made(self, **given: np.ndarray) -> Any:
@@ -324,6 +330,10 @@ class Layout:
             flat = block[self.slices[name]]
             arrays[name] = (flat.view(np.int64) if name in self._integers else flat).reshape(shape)
         return self._record(**{**arrays, **given})
+
+    def placed(self, block: np.ndarray) -> Any:
+        """Return the words of the record whose arrays lie in a block, which the caller keeps alive."""
+        return np.where(self._places < 0, 0, self._places + place_of(block)).view(float)
 
 
 layout = functools.lru_cache(64)(Layout)

@@ -132,10 +132,10 @@ class System(Packed):
             Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=3, stiffness=square,
             matrix=square, inverse=square, to_pose=square, body=3, rows=(4, 3), moved=(n, 8),
         )  # fmt: skip
-        addresses = [address_of(*each) for each in BODY_FUNCTIONS]
+        self._block, addresses = np.zeros(work.size), [address_of(*each) for each in BODY_FUNCTIONS]
         sizes = n, int(contacts.state[n]), pressures, len(motion.breaks) - 1
-        super().__init__(SystemRecord(contacts, motion, work.made(), *sizes, *addresses))
-        self.contacts, self.motion, self.work, self.keepalive = contacts, motion, self.record.work, keepalive
+        super().__init__(SystemRecord(contacts, motion, work.placed(self._block), *sizes, *addresses))
+        self.contacts, self.motion, self.keepalive = contacts, motion, keepalive
 
 
 @kernel

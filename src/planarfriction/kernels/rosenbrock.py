@@ -331,10 +331,11 @@ class Run(Packed):
     ) -> None:
         n, s = len(progress.y), len(method.m)
         shapes = dict.fromkeys(Stages._fields, n) | {"k": (s, n), "time_slope": 3, "coupling": s, "verdict": 2}
-        stages, sizes = layout(Stages, **shapes).made(), (n, s, len(method.dense), len(output.time))
+        stages, sizes = layout(Stages, **shapes), (n, s, len(method.dense), len(output.time))
+        self._block = np.zeros(stages.size)
         atol = np.ascontiguousarray(atol, dtype=float)
         addresses = [address_of(*each) for each in (COMBINE, ATTEMPT)]
         addresses.append(address_of(at_rest, "ppf") if system.motion.stop_speed > 0.0 else 0)
-        parts = system.address, method, output, progress, stages, atol, float(rtol)
+        parts = system.address, method, output, progress, stages.placed(self._block), atol, float(rtol)
         super().__init__(RunRecord(*parts, *sizes, *addresses))
         self.system = system

@@ -87,7 +87,9 @@ class Segments:
         self._load = [contact.normal_force.pieces(self._breaks) for contact in scene.contacts]
         self._force = None if scene.force is None else scene.force.pieces(self._breaks)
         self._velocity = None if scene.velocity is None else scene.velocity.pieces(self._breaks)
-        self._mover = np.stack([_mover(contact.support_velocity, self._breaks) for contact in scene.contacts], axis=1)
+        moves = any(contact.support_velocity is not None for contact in scene.contacts)
+        movers = [_mover(contact.support_velocity, self._breaks) for contact in scene.contacts if moves]
+        self._mover = np.stack(movers, axis=1) if moves else np.empty((0, len(scene.contacts), 9))
         lengths, parts = np.diff(self._breaks), np.ones(len(self._breaks) - 1)
         for contact, (_, slope) in zip(scene.contacts, self._load, strict=True):
             if contact.model.patch.depends_on_load:
@@ -102,7 +104,7 @@ class Segments:
         self.count = int(self._first[-1])
         """Number of pieces."""
         moving = self._force is not None and (self._force[1][-1] != 0.0).any()
-        moving |= (self._mover[-1, :, 3:] != 0.0).any()
+        moving |= moves and (self._mover[-1, :, 3:] != 0.0).any()
         changing = moving or any(slope[-1] != 0.0 for _, slope in self._load)
         self.settled = float(own[-1 if changing else -2])
         """Time of the last change of an input [s]."""
@@ -200,8 +202,8 @@ class SegmentBatches:
             linear=_starts([model.workspace for model in self.models]),
         )
         self._length = min(contact.model.law.largest_deflection for contact in contacts)
-        laws = [contact.model.law.numbers for contact in contacts]
-        speed = min(model.velocity_scale * law.v_s for model, law in zip(self.models, laws, strict=True))
+        self._laws = [contact.model.law.numbers for contact in contacts]
+        speed = min(model.velocity_scale * law.v_s for model, law in zip(self.models, self._laws, strict=True))
         # a single point has no lever arm: its spin is measured in rad/s
         self._radius = max(model.radius for model in self.models) or 1.0
         arm, body = np.array([1.0, 1.0, 1.0 / self._radius]), scene.body
@@ -289,7 +291,6 @@ class SegmentBatches:
         if driven is None:
             driven = np.empty((0, 3)), np.full((len(pieces), 3), [*body.gravity, 0.0])
         free = scene.velocity is None
-        laws = [contact.model.law.numbers for contact in scene.contacts]
         motion = Motion(
             inverse_mass=np.array([1.0 / body.mass, 1.0 / body.mass, 1.0 / body.inertia]) if free else np.zeros(3),
             body_axes=not free,
@@ -302,7 +303,7 @@ class SegmentBatches:
             mover=inputs.mover(pieces),
             stop_speed=float(scene.stop_speed or 0.0),
             stop_radius=self._radius,
-            stop_time=max(law.sigma_1 / law.sigma_0 for law in laws),
+            stop_time=max(law.sigma_1 / law.sigma_0 for law in self._laws),
             stop_length=self._length,
             settled=inputs.settled,
         )
@@ -333,7 +334,7 @@ def _meet(times: np.ndarray, breaks: np.ndarray) -> None:
     """Put ascending times that equal a break up to rounding onto it."""
     first, last = np.searchsorted(times, [breaks[0] - SAME_TIME, breaks[-1] + SAME_TIME])
     some = times[first : last + 1]
-    near = breaks[np.clip(np.searchsorted(breaks, some - SAME_TIME), 0, len(breaks) - 1)]
+    near = breaks[np.minimum(np.searchsorted(breaks, some - SAME_TIME), len(breaks) - 1)]
     some[:] = np.where(np.abs(near - some) <= SAME_TIME, near, some)
 
 

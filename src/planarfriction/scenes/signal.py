@@ -29,6 +29,8 @@ MOST_SAMPLES = 10_000_000
 
 def breaks_between(times: np.ndarray, t_end: float) -> np.ndarray:
     """Return 0, the different `times` [s] in between, and `t_end`; those within rounding of each other count as one."""
+    if not len(times):
+        return np.array([0.0, t_end])
     inner = np.unique(times)
     inner = inner[(inner > SAME_TIME) & (inner < t_end - SAME_TIME)]
     inner = inner[np.diff(inner, prepend=0.0) > SAME_TIME]
@@ -169,6 +171,8 @@ class Signal(ByValue):
     @functools.cached_property
     def breaks(self) -> np.ndarray:
         """Increasing times [s] at which the value jumps or the slope changes; samples that change nothing are none."""
+        if len(self.times) == 1:
+            return self.times[1:]
         if self.hold == "previous":
             change = np.diff(self.values, axis=0, prepend=self.values[:1])
         else:
@@ -187,6 +191,9 @@ class Signal(ByValue):
         breaks = validation.array("breaks", breaks, (None,))
         if len(breaks) < 2 or (np.diff(breaks) <= 0.0).any():
             raise InvalidValueError("breaks", "be at least two increasing times", f"{breaks}")
+        if len(self.times) == 1:
+            start = np.repeat(self.values, len(breaks) - 1, axis=0)
+            return start, np.zeros_like(start)
         own = self.breaks
         piece = np.searchsorted(breaks, own, side="right") - 1
         inside = (piece >= 0) & (piece < len(breaks) - 1)

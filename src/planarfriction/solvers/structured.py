@@ -54,7 +54,10 @@ _MOST_PROCESSES = 3
 @contextlib.contextmanager
 def compiled_together() -> Iterator[None]:
     """Let other processes compile functions of the solver in this block, if they are not on disk yet."""
-    functions = {} if kernels.advance in _loaded else dict(enumerate(kernels.FUNCTIONS))
+    if kernels.advance in _loaded:
+        yield
+        return
+    functions = dict(enumerate(kernels.FUNCTIONS))
     jobs = {function: job for job, (function, words) in functions.items() if missing(function, signature_of(words))}
     processes = min(threads.processors() - 1, _MOST_PROCESSES, len(jobs) - 1)
     if processes < 1 or not together.possible():

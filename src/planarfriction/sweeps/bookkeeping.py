@@ -71,6 +71,9 @@ class Bookkeeper:
             self.first_failure = self.first_failure or f"{self.grid.words(index)}: {record.reason}"
         self.runs[index] = key, record
 
+    def flush(self, at_once: bool = False) -> None:
+        """Write what is in memory, if it is time or `at_once`."""
+
     def close(self) -> None:
         """Close what is open on disk."""
 

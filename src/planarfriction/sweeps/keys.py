@@ -17,12 +17,15 @@ from planarfriction import __version__
 from planarfriction.errors import InvalidValueError
 from planarfriction.scenes.files import scene_to_dict
 from planarfriction.scenes.model_files import model_to_dict
+from planarfriction.scenes.signal import Signal
 
 if TYPE_CHECKING:
     from planarfriction.scenes import Scene
 
 LAYOUT = 2
 """Number of the layout of stored runs: files of another layout do not count."""
+
+_JSON = json.JSONEncoder(sort_keys=True)
 
 KEPT = 32
 """Number of models, with the maps they have built, and of plain forms that are kept for later scenes."""
@@ -79,8 +82,10 @@ class Keys:
         """Return the key of the run of a scene, the same in every process."""
         return _digest([*self._common, scene_to_dict(scene, self._table)])
 
-    def _table(self, part: Any) -> dict[str, str]:
+    def _table(self, part: Any) -> dict[str, Any]:
         """Return the digest of a part as the table that stands for it in the plain form of a scene."""
+        if isinstance(part, Signal) and len(part.times) == 1:  # it is shorter than its digest
+            return part.to_dict()
         return {"digest": self._of_part(part)}
 
     def _of_part(self, part: Any) -> str:
@@ -98,7 +103,7 @@ class Keys:
 
 
 def _digest(value: Any) -> str:
-    return hashlib.sha256(json.dumps(value, sort_keys=True).encode(errors="surrogatepass")).hexdigest()[:32]
+    return hashlib.sha256(_JSON.encode(value).encode(errors="surrogatepass")).hexdigest()[:32]
 
 
 def _kept(held: dict[Any, Any], key: Any, make: Callable[[], Any]) -> Any:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import re
+import secrets
+import time
 import zipfile
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,6 +23,9 @@ if TYPE_CHECKING:
 
 FAILED = "failed"
 """Status of a run that ended with an error; the others are those of a `Solution`."""
+
+TURN = 0.1
+"""Time after which a worker hands back what it has [s]: short to whoever waits, long beside handing over."""
 
 _META = "planarfriction"
 """Entry of a file that describes the others; no variable may have this name."""
@@ -53,6 +60,31 @@ def run(scene: Scene, measure: Callable[[Solution], Any] | None, stopped: Callab
         return Record(solution.status, "", variables(found, measure), scene.t_end)
     except Exception as error:
         return Record(FAILED, f"{where}{reason_of(error)}", {}, scene.t_end)
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Scenes that a worker is handed together."""
+
+    scenes: list[Scene]
+    measure: Callable[[Solution], Any] | None
+    stopped: Callable[[], bool] | None = None
+    """Return True if nobody waits for the results any longer."""
+
+    def __dask_tokenize__(self) -> str:
+        """Return a name of its own, for which dask would go through all numbers of the scenes."""
+        return secrets.token_hex(16)
+
+
+def run_all(batch: Batch) -> tuple[list[Record], float]:
+    """Run scenes until `TURN` is over, at least the first one; returns the records of those that were run, and time."""
+    begin, found = time.monotonic(), []
+    with contextlib.suppress(Stopped):
+        for scene in batch.scenes:
+            found.append(run(scene, batch.measure, batch.stopped))
+            if time.monotonic() - begin > TURN:
+                break
+    return found, time.monotonic() - begin
 
 
 class Stopped(BaseException):

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 import pickle
 import queue
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import (
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,7 +28,7 @@ from planarfriction.scenes import Scene
 from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, FolderBookkeeper, Index, instants
 from planarfriction.sweeps.keys import Keys
 from planarfriction.sweeps.quantities import Grid, check_takes, grid_of
-from planarfriction.sweeps.records import FAILED, Record, reason_of, run
+from planarfriction.sweeps.records import FAILED, TURN, Batch, Record, reason_of, run_all
 from planarfriction.sweeps.settings import Settable
 
 if TYPE_CHECKING:
@@ -30,9 +39,12 @@ if TYPE_CHECKING:
 _BETWEEN = 0.5
 """Time between two reports of progress [s]."""
 
-_AHEAD, _WORKERS = 4, 64
-"""Number of runs that wait for each worker of an executor, so that none is idle and little memory is used, and number
-of workers of an executor that does not tell it."""
+_AHEAD, _WORKERS = 2, 64
+"""Number of batches of runs that wait for each worker of an executor, so that none is idle and little memory is used,
+and number of workers of an executor that does not tell it."""
+
+_BATCH = 64
+"""Largest number of runs that are handed out together."""
 
 _ENDED = "the executor ended ({}): finished runs are kept, sweep again to continue"
 
@@ -84,8 +96,9 @@ def sweep(
     """Simulate a scene for every combination of some quantities; returns a dataset with a dimension for each of them.
 
     Runs that are already in `out` are not repeated: a run is identified by its scene, the name and source of its
-    measurement, and the library, whatever code makes the scene. If the process is killed, only the runs in progress are
-    lost. Equal scenes give equal bits, in any order and with any executor on the same kind of processor.
+    measurement, and the library, whatever code makes the scene. If the process is killed, only the runs in progress and
+    those of the last half second are lost. Equal scenes give equal bits, in any order and with any executor on the same
+    kind of processor.
 
     A failed run does not end the sweep: `status` says how each run ended ("success", "at rest", "failed"), `failure`
     why it failed, and `out` has its scene in `<run>.failed.json`. The next call tries it again. `run` names each run.
@@ -205,7 +218,7 @@ class Sweeping:
     ) -> None:
         self._make_scene, self._grid, self._keys, self._measure = make_scene, grid, keys, measure
         self._book, self._report = book, report
-        self._ended = ""
+        self._ended, self._size = "", 1
         self._begin = self._reported = time.monotonic()
         self._stopped = threading.Event()
 
@@ -219,35 +232,41 @@ class Sweeping:
 
     def go(self, executor: Executor | None) -> None:
         """Do all runs that are not done, so few at a time that the use of memory does not grow."""
-        if executor is not None:
-            self._go(executor, _AHEAD * (getattr(executor, "_max_workers", None) or _WORKERS), None)
-            return
-        workers = threads.processors()
-        with ThreadPoolExecutor(workers, "sweep") as own:
-            try:
+        try:
+            if executor is not None:
+                self._go(executor, _AHEAD * (getattr(executor, "_max_workers", None) or _WORKERS), None)
+                return
+            workers = threads.processors()
+            with ThreadPoolExecutor(workers, "sweep") as own:
                 self._go(own, _AHEAD * workers, self._stopped.is_set)
-            except BaseException:
-                self._stopped.set()
-                raise
+        finally:
+            self._book.flush(at_once=True)
 
     def _go(self, executor: Executor, most: int, stopped: Callable[[], bool] | None) -> None:
-        pending: dict[Future, _Job] = {}
+        pending: dict[Future, list[_Job]] = {}
         done: queue.SimpleQueue[Future] = queue.SimpleQueue()
+        jobs, again = self._jobs(), []
         try:
-            for job in self._jobs():
-                try:
-                    future = executor.submit(run, job[2], self._measure, stopped)
-                except RuntimeError as error:  # broken, or shut down
-                    raise SweepError(_ENDED.format(reason_of(error))) from None
-                pending[future] = job
-                future.add_done_callback(done.put)
-                if len(pending) >= most:
-                    self._collect(done, pending)
-            while pending:
-                self._collect(done, pending)
+            while True:
+                batch = again.pop() if again else list(itertools.islice(jobs, self._size))
+                if batch:
+                    try:
+                        scenes = [scene for *_, scene in batch]
+                        future = executor.submit(run_all, Batch(scenes, self._measure, stopped))
+                    except RuntimeError as error:  # broken, or shut down
+                        raise SweepError(_ENDED.format(reason_of(error))) from None
+                    pending[future] = batch
+                    future.add_done_callback(done.put)
+                elif not pending:
+                    break
+                if not batch or len(pending) >= most or not done.empty():
+                    again += self._collect(done, pending)
         except BaseException:
+            self._stopped.set()
             for future in pending:
                 future.cancel()
+            if stopped is not None:  # threads of its own, which hand over what they have
+                wait(pending)
             self._take([future for future in pending if future.done() and not future.cancelled()], pending)
             raise
         finally:
@@ -270,32 +289,45 @@ class Sweeping:
             else:
                 yield index, key, scene
 
-    def _collect(self, done: queue.SimpleQueue[Future], pending: dict[Future, _Job]) -> None:
-        """Take the runs that are done, at least one, or report after a while that none is."""
+    def _collect(self, done: queue.SimpleQueue[Future], pending: dict[Future, list[_Job]]) -> list[list[_Job]]:
+        """Take the runs that are done, or report after a while that none is; returns batches to be handed out again."""
         try:
             found = [done.get(timeout=_BETWEEN)]
             while not done.empty():
                 found.append(done.get())
         except queue.Empty:
             found = []
-        self._take(found, pending)
+        again = self._take(found, pending)
         self._tell()
+        return again
 
-    def _take(self, done: list[Future], pending: dict[Future, _Job]) -> None:
+    def _take(self, done: list[Future], pending: dict[Future, list[_Job]]) -> list[list[_Job]]:
+        """Note the runs of batches that have ended; returns those that were not reached, in batches."""
+        again = []
         for future in done:
             # `exception` returns the worker's error, so that a KeyboardInterrupt raised here is this process's own.
             error = CancelledError() if future.cancelled() else future.exception()
-            index, key, scene = pending.pop(future)
+            jobs = pending.pop(future)
             if isinstance(error, (BrokenExecutor, CancelledError)):
                 self._ended = _ENDED.format(reason_of(error))
                 continue
-            if isinstance(error, KeyboardInterrupt):  # in a process that heard Ctrl-C too: this run is not done
+            if isinstance(error, KeyboardInterrupt):  # in a process that heard Ctrl-C too: these runs are not done
                 continue
-            # any other error means that the executor lost the run, or could not send it
-            record = future.result() if error is None else Record(FAILED, reason_of(error), {})
-            self._book.add(index, key, record, scene)
+            # any other error means that the executor lost the runs, or could not send one of them
+            if error is not None:
+                records = [Record(FAILED, reason_of(error), {})] if len(jobs) == 1 else []
+                size = 1
+            else:
+                records, spent = future.result()
+                self._size = size = max(1, min(int(len(records) * TURN / (spent + 1e-9)), _BATCH))
+            for (index, key, scene), record in zip(jobs, records, strict=False):
+                self._book.add(index, key, record, scene)
+            left = jobs[len(records) :]
+            again += [left[first : first + size] for first in range(0, len(left), size)]
+        self._book.flush()
         if self._ended:
             raise SweepError(self._ended)
+        return again
 
     def _tell(self, at_once: bool = False) -> None:
         now = time.monotonic()

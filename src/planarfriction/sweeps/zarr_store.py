@@ -1,4 +1,4 @@
-"""A sweep in a zarr store, one chunk per run: for more runs than fit into memory, and for readers on other machines."""
+"""A sweep in a zarr store: for more runs than fit into memory, and for readers on other machines."""
 
 from __future__ import annotations
 
@@ -7,17 +7,19 @@ import io
 import json
 import os
 import weakref
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from planarfriction.errors import FileError, MissingExtraError
 from planarfriction.scenes.solution import History
-from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, Index, check_names, difference, on_instants
+from planarfriction.sweeps.bookkeeping import MISSING, OWN, Bookkeeper, Index, check_names, difference, on_instants
 from planarfriction.sweeps.quantities import Grid
 from planarfriction.sweeps.records import FAILED, Record, failure, reason_of
+from planarfriction.sweeps.zarr_chunks import ChunkedArray, chunk_of
 from planarfriction.writing import make_folder, making_folder, put, reporting, write_all
 
 if TYPE_CHECKING:
@@ -35,8 +37,8 @@ _ARRAYS = "arrays"
 _ALL_CHUNKS = {"array.write_empty_chunks": True}
 """Setting of zarr under which a chunk that is not there has been lost: by default one without values is not written."""
 
-_CODECS = [{"name": "zstd", "configuration": {"level": 0, "checksum": True}}]
-"""Codecs of the chunks of numbers; a store of an earlier version may have others."""
+_BETWEEN = 0.5
+"""Time between two times that results are written [s]."""
 
 _LOCKED_BYTE = 2**30
 """Place in the journal that is locked where only parts of a file can be."""
@@ -86,9 +88,12 @@ class ZarrBookkeeper(Bookkeeper):
         self.path, self._time = path, time
         make_folder(path.parent)
         self._layout: dict[str, History] | None = None
-        self._arrays: dict[str, Any] = {}
+        self._arrays: dict[str, ChunkedArray] = {}
         self._listed: dict[Index, tuple[str, Record]] = {}
         """Keys and records, without variables, in the journal."""
+        self._lines: list[bytes] = []
+        """Lines of the journal of runs whose results are in memory."""
+        self._written = monotonic()
         self._journal: Any = None
         if not path.exists() or (path.is_dir() and not any(path.iterdir())):
             self._create()
@@ -96,6 +101,8 @@ class ZarrBookkeeper(Bookkeeper):
             self._group: Any = zarr.open_group(path, mode="r+", zarr_format=3)
             self._journal = (path / "run" / _JOURNAL).open("a+b", buffering=0)
             _lock(self._journal, path)
+            if self._journal.tell():  # a kill may have cut the last line
+                write_all(self._journal, b"\n")
             with zarr.config.set(_ALL_CHUNKS):
                 self._begin()
         except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:  # the last from decompression
@@ -103,8 +110,6 @@ class ZarrBookkeeper(Bookkeeper):
             if isinstance(error, FileError):
                 raise
             raise FileError(f"{path}: no zarr store of a sweep, and none can be made: {reason_of(error)}") from None
-        if self._journal.tell() and not self._ends_a_line():
-            write_all(self._journal, b"\n")
 
     def close(self) -> None:
         """Close the journal, and so let other sweeps write."""
@@ -152,11 +157,24 @@ class ZarrBookkeeper(Bookkeeper):
             dims = tuple(array.metadata.dimension_names)
             axis = dims == (name,)
             if not axis:
-                self._arrays[name] = array
+                self._arrays[name] = self._chunked(name, array)
             values = array[...] if axis else np.empty(array.shape[swept:], array.dtype)
             if self._time is not None and name == "time" and axis and not np.array_equal(values, self._time):
                 raise FileError(f"{self.path}: holds a sweep with other instants: name another path")
             self._layout = {**(self._layout or {}), name: History(dims if axis else dims[swept:], values, {})}
+        self._forget_lost()
+
+    def _forget_lost(self) -> None:
+        """Take runs off the journal of which a chunk is not there."""
+        done = [index for index, (_, record) in self._listed.items() if record.status != FAILED]
+        lost = set().union(*(array.lost(done) for array in self._arrays.values()))
+        self.damaged += len(lost)
+        for index in lost:
+            del self._listed[index]
+        write_all(self._journal, b"".join(_line(index, "", Record(MISSING, "", {})) for index in sorted(lost)))
+
+    def _chunked(self, name: str, array: Any) -> ChunkedArray:
+        return ChunkedArray(array, f"{self.path}/{name}", len(self.grid.shape))
 
     def _write(self, name: str, dims: tuple[str, ...], values: np.ndarray, attrs: Mapping[str, str]) -> None:
         """Make an array in one chunk, or fill an existing one."""
@@ -177,24 +195,24 @@ class ZarrBookkeeper(Bookkeeper):
         """Make the empty arrays of all runs from the variables of the first one."""
         from zarr.codecs import ZstdCodec
 
-        ones = (1,) * len(self.grid.shape)
         for name, each in variables.items():
             values = np.asarray(each.values)
             if each.dims == (name,):
                 self._write(name, each.dims, values, each.attrs)
                 continue
             text = values.dtype.kind == "U"
-            self._arrays[name] = self._group.create_array(
+            array = self._group.create_array(
                 name,
                 shape=(*self.grid.shape, *values.shape),
                 dtype="string" if text else np.result_type(values.dtype, float),
-                chunks=(*ones, *(max(length, 1) for length in values.shape)),
+                chunks=(*chunk_of(self.grid.shape, values.nbytes), *(max(length, 1) for length in values.shape)),
                 fill_value="" if text else np.nan,
                 compressors=(ZstdCodec(checksum=True),),
                 dimension_names=(*self.grid.labels, *each.dims),
                 attributes=dict(each.attrs),
                 config={"write_empty_chunks": True},
             )
+            self._arrays[name] = self._chunked(name, array)
         self._group.attrs[_ARRAYS] = list(variables)
         self._layout = dict(variables)
 
@@ -205,23 +223,10 @@ class ZarrBookkeeper(Bookkeeper):
         run, record = self._listed.get(index, ("", None))
         if run != key or record is None or record.status == FAILED:
             return None
-        if not all(map(os.path.isfile, self._chunks(index))):
-            self.damaged += 1
-            return None
         return record
 
-    def _chunks(self, index: Index) -> Iterator[str]:
-        """Yield the files of the chunks of a run."""
-        return (self._chunk(name, index) for name, array in self._arrays.items() if array.size)
-
-    def _chunk(self, name: str, index: Index) -> str:
-        """Return the file of the chunk of a run in an array."""
-        metadata = self._arrays[name].metadata
-        place = (*index, *(0 for _ in metadata.shape[len(index) :]))
-        return f"{self.path}/{name}/{metadata.encode_chunk_key(place)}"
-
     def _store(self, index: Index, key: str, record: Record, scene: Scene | None) -> Record:
-        """Write the chunks of a run, then the line that makes them count; returns the record as it counts."""
+        """Keep the results of a run for the next time that results are written; returns the record as it counts."""
         if not key:  # no scene was made
             return record
         if record.status != FAILED:
@@ -234,28 +239,24 @@ class ZarrBookkeeper(Bookkeeper):
             if reason:
                 record = Record(FAILED, reason, {})
             else:
-                with reporting(self.path):
-                    self._fill(index, found)
+                for name, array in self._arrays.items():
+                    array.fill(index, np.asarray(found[name].values))
         if record.status == FAILED:
             folder = make_folder(self.path.with_suffix(".failed"))
             put(str(folder / f"{key}.json"), failure(record.reason, scene).encode())
-        line = json.dumps([index, key, record.status, record.reason])
-        with reporting(self.path):
-            write_all(self._journal, f"{line}\n".encode())
+        self._lines.append(_line(index, key, record))
         return record._replace(variables={})
 
-    def _fill(self, index: Index, found: Mapping[str, History]) -> None:
-        """Write the chunks of a run: zarr takes milliseconds for each, as it hands them from thread to thread."""
-        from numcodecs.zstd import Zstd
-
-        for name, array in self._arrays.items():
-            values = np.asarray(found[name].values)
-            if values.dtype.kind == "U" or [each.to_dict() for each in array.compressors] != _CODECS:
-                array[index] = values.astype(object) if values.dtype.kind == "U" else values
-            elif array.size:
-                chunk = self._chunk(name, index)
-                os.makedirs(os.path.dirname(chunk), exist_ok=True)
-                put(chunk, Zstd(checksum=True).encode(values.astype(array.dtype).tobytes()))
+    def flush(self, at_once: bool = False) -> None:
+        """Write the results in memory from time to time, then the lines that make them count."""
+        if not self._lines or (monotonic() - self._written < _BETWEEN and not at_once):
+            return
+        with reporting(self.path):
+            for array in self._arrays.values():
+                array.write()
+            write_all(self._journal, b"".join(self._lines))
+        self._lines.clear()
+        self._written = monotonic()
 
     def _read_journal(self) -> None:
         """Read the last outcome of each run; a line that a kill has cut counts as no line."""
@@ -266,14 +267,12 @@ class ZarrBookkeeper(Bookkeeper):
         for line in lines:
             try:
                 index, key, *outcome = json.loads(line)
+                np.ravel_multi_index(index, self.grid.shape)  # raises for what is no place in the grid
                 self._listed[tuple(index)] = key, Record(*outcome, variables={})
+                if outcome[0] == MISSING:
+                    del self._listed[tuple(index)]
             except (ValueError, TypeError):
                 continue
-
-    def _ends_a_line(self) -> bool:
-        """Return True if the journal ends with a whole line: a kill may have cut the last one."""
-        self._journal.seek(-1, os.SEEK_END)
-        return self._journal.read() == b"\n"
 
     def dataset(self) -> xr.Dataset:
         """Write the outcomes of all runs, and open the store: variables are read on demand."""
@@ -284,3 +283,8 @@ class ZarrBookkeeper(Bookkeeper):
             for name, values in self._outcome_arrays().items():
                 self._write(name, tuple(self.grid.labels), values, {})
         return xr.open_zarr(self.path, chunks=None, consolidated=False)
+
+
+def _line(index: Index, key: str, record: Record) -> bytes:
+    """Return the line of a run in the journal."""
+    return f"{json.dumps([index, key, record.status, record.reason])}\n".encode()
