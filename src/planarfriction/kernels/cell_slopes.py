@@ -52,7 +52,7 @@ class StepBars(NamedTuple):
 
 
 _SEEN, _AHEAD, _END = (LANES * n for n in (0, 6, 12))
-"""What is seen of a bristle at the start of the step, at its predicted end and at its end: six fields each."""
+"""Views of a bristle at the start of the step, at its predicted end and at its end: six fields each."""
 
 _DEFLECTION, _ALONG, _SIZE, _ALPHA, _SLOPE, _DECAY = (LANES * n for n in range(6))
 """These fields; `_SLOPE` is that of alpha by the deflection."""
