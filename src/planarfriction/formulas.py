@@ -55,7 +55,17 @@ PARAMETERS = (
 
 def stribeck(xp, speed, law):
     """Friction coefficient in steady sliding, `g = mu_c + (mu_s - mu_c) exp(-|v/v_s|^gamma)` [-] ("Bristles")."""
-    return law.mu_c + (law.mu_s - law.mu_c) * xp.exp(-xp.power(speed * (1.0 / law.v_s), law.gamma))
+    return stribeck_at(xp.exp(-stribeck_power(xp, speed, law)), law)
+
+
+def stribeck_power(xp, speed, law):
+    """`|v/v_s|^gamma` [-]."""
+    return xp.power(speed * (1.0 / law.v_s), law.gamma)
+
+
+def stribeck_at(effect, law):
+    """`stribeck` at a known effect `exp(-|v/v_s|^gamma)`."""
+    return law.mu_c + (law.mu_s - law.mu_c) * effect
 
 
 def stribeck_slope(xp, speed, law):
@@ -91,7 +101,11 @@ def bristle_decay(xp, deflection, along, speed, grip, law):
     `beta |v| = alpha (|v| + z.v/|z|) / 2` for elasto-plastic bristles, `|v| + v_c` for plain ones (LuGre: v_c = 0);
     `deflection = |z|/z_max`, `grip = sigma_0 / g` [1/m]. ("Bristles")
     """
-    alpha = slip_fraction(xp, deflection, law.breakaway_ratio)
+    return decay_at(xp, slip_fraction(xp, deflection, law.breakaway_ratio), along, speed, grip, law)
+
+
+def decay_at(xp, alpha, along, speed, grip, law):
+    """`bristle_decay` at a known `alpha`."""
     return xp.where(law.elasto_plastic > 0.0, 0.5 * alpha * (speed + along), speed + law.creep_speed) * grip
 
 

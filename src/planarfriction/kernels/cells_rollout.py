@@ -21,7 +21,6 @@ from planarfriction.kernels.cell_blocks import (
     BLOCK,
     BY_LOAD,
     LANES,
-    LAW_BAR,
     OUT,
     WEIGHT,
     Z,
@@ -30,14 +29,14 @@ from planarfriction.kernels.cell_blocks import (
     lever_at,
     pair,
     put_pair,
-    total,
     totals,
 )
+from planarfriction.kernels.cell_slopes import retreat
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.forward import forward
 from planarfriction.kernels.law import law_of, squared
 from planarfriction.kernels.rollouts import row_of
-from planarfriction.kernels.vectors import accumulate, add, dot, plus, scatter, three, times
+from planarfriction.kernels.vectors import add, plus, scatter, three, times
 
 PARAMETERS = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
 """Numbers of the law that derivatives are taken by."""
@@ -45,10 +44,8 @@ PARAMETERS = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "b
 COLUMNS = tuple(LawNumbers._fields.index(name) for name in PARAMETERS)
 """Their places in a row."""
 
-_COUNT = len(PARAMETERS)
 _BY = ("z", "u", *(f"law.{name}" for name in PARAMETERS))
 _WRITTEN = derive(distributed_step.cell, _BY, ("z", "u"))
-_forth, _back = _WRITTEN.forth, _WRITTEN.back
 _pushed = forward(distributed_step.cell, _BY, ("z", "u"))
 
 
@@ -152,58 +149,41 @@ def rollout(lever, inputs, span, z, wrench, states):
 
 
 @kernel
-def _retreat_one(lever, law, block, i, twist, dt, pull, load, loaded):
-    """Carry the cotangent of a cell's bristle back; `pull` is that of the wrench."""
-    one, weight = lever_at(lever, block, i), block[WEIGHT + i]
-    pulled = lever.seen(one, pull)
-    (_, traction), tape = _forth(law, pair(block, Z, i), lever.seen(one, twist), dt)
-    bars = _back(tape, (times(loaded, pair(block, BAR, i)), times(load * weight, pulled)))
-    put_pair(block, BAR, i, bars[0])
-    heavier = weight + load * block[BY_LOAD + i]
-    scatter(block, OUT + i, LANES, (lever.wrench(one, bars[1]), heavier * dot(pulled, traction)))
-    accumulate(block, LAW_BAR + i, LANES, bars[2:])
-
-
-@kernel
-def _retreat(lever, law, block, twist, dt, pull, load, loaded, lanes):
-    for i in range(lanes):
-        _retreat_one(lever, law, block, i, twist, dt, pull, load, loaded)
-
-
-@kernel
 def _pull(lever, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
+    """Carry the cotangents of a roll-out back, and return that of the law."""
     twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
     which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shapes[0], -1
-    blocks, lanes = divided(weights.shape[1])
+    (blocks, lanes), by_law = divided(weights.shape[1]), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for t in range(inputs.dt.shape[0] - 1, -1, -1):
         if which[t] != last:
             last = which[t]
             _weigh(w, blocks, lanes, weights[last], inputs.by_load[0, last])
         _write(w, Z, states[t], n)
-        load, pull, twist, dt = loads[t], three(pulls[t]), three(twists[t]), inputs.dt[t]
-        loaded = 0.0 if load == 0.0 else 1.0
+        load, pull, held = loads[t], three(pulls[t]), (three(twists[t]), inputs.dt[t])
         for k in range(blocks):
-            _retreat(lever, law, at(w, k * BLOCK), twist, dt, pull, load, loaded, lanes)
-        add(twist_bar[t], totals(w, blocks, OUT, lanes))
-        load_bar[t] += total(w, blocks, OUT + 3 * LANES, lanes)
+            bars = retreat(lever, law, at(w, k * BLOCK), lanes, held, pull, load)
+            add(twist_bar[t], bars.twist)
+            load_bar[t] += bars.load
+            by_law = plus(by_law, 1.0, bars.law)
+    return by_law
 
 
 @kernel
 def _gradient(lever, inputs, states, wrench_bar, span, bars, scratch):
     w, n, rows = pointer(scratch), bars.state.shape[2] // 2, inputs.rows[0]
-    blocks, lanes = divided(inputs.shapes.shape[2])
+    blocks, _ = divided(inputs.shapes.shape[2])
     for b in range(span[0], span[1]):
         law, before, pulls = law_of(rows[row_of(rows, b)]), states[0], wrench_bar[row_of(wrench_bar, b)]
         before, row_bar = before[row_of(before, b)], bars.rows[0, b]
         _lay(w, blocks, inputs.data)
         _write(w, BAR, bars.state[0, b], n)
         if law.gamma == 2.0:
-            _pull(lever, squared(law), inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b])
+            by_law = _pull(lever, squared(law), inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b])
         else:
-            _pull(lever, law, inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b])
+            by_law = _pull(lever, law, inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b])
         _read(w, BAR, bars.state[0, b], n)
-        for m in range(_COUNT):
-            row_bar[COLUMNS[m]] += total(w, blocks, LAW_BAR + m * LANES, lanes)
+        for m in range(len(by_law)):
+            row_bar[COLUMNS[m]] += by_law[m]
 
 
 def gradient(lever, inputs, states, wrench_bar, span, bars):

@@ -64,7 +64,7 @@ def _log(x):
 
 
 @kernel
-def _slip_slope(deflection, breakaway):
+def slip_slope(deflection, breakaway):
     """Return the derivative of `slip_fraction` by the deflection, zero before breakaway and at full deflection.
 
     It is multiplied by how far a long step would have gone, 1e9, or by one over hardly any deflection.
@@ -76,7 +76,7 @@ def _slip_slope(deflection, breakaway):
 @kernel
 def _slip_by_breakaway(deflection, breakaway):
     """Return the derivative of `formulas.slip_fraction` by the breakaway ratio."""
-    return formulas.bristle_decay_by_breakaway(xp, _slip_slope(deflection, breakaway), deflection, breakaway)
+    return formulas.bristle_decay_by_breakaway(xp, slip_slope(deflection, breakaway), deflection, breakaway)
 
 
 def _vectors(results: str, pulls: dict, pushes: dict) -> Rule:
@@ -86,7 +86,7 @@ def _vectors(results: str, pulls: dict, pushes: dict) -> Rule:
 
 NAMES: dict[str, Any] = {
     "dot": dot, "formulas": formulas, "log_or_0": _log, "per": per, "placed": placed, "plus": plus,
-    "power_slope": _power_slope, "ratio": ratio, "slip_by_breakaway": _slip_by_breakaway, "slip_slope": _slip_slope,
+    "power_slope": _power_slope, "ratio": ratio, "slip_by_breakaway": _slip_by_breakaway, "slip_slope": slip_slope,
     "times": times, "xp": xp, "zeros": zeros,
 }  # fmt: skip
 """Functions that generated code and the texts of rules name."""

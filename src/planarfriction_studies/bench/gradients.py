@@ -103,7 +103,7 @@ def published_batch(full: bool) -> Measurement:
 def reduced_batch(full: bool, parts: int | None = None) -> Measurement:
     """Measure 1000 roll-outs with their gradient, as `gradient.published.batch`; of cells fewer steps are kept."""
     models = ReducedModel(disc(), law(), parts=parts), ReducedModelPublished(disc(), law())
-    (both, once), (theirs, alone) = (_batch(model, 300 if parts is None else 1000) for model in models)
+    (both, once), (theirs, alone) = (_batch(model, 250 if parts is None else 1000) for model in models)
     words = f"{AGAINST_PUBLISHED} (the roll-outs alone: {once:.3g} and {alone:.3g})"
     return line(both, "million contact-steps/s", words, theirs, both / theirs)
 
