@@ -57,36 +57,37 @@ rule(reachable, "s", {0: "beyond_full({0})"}, beyond_full=_beyond_full)
 
 
 @kernel
-def seen(z, u, per_h, q):
+def seen(z, size, u, per_h, q):
     """Return the deflection of a bristle, and the speed at which it is being stretched; 0 and 0 for none."""
-    size = norm(z)
     return size * (q * per_h), per_h * ratio(dot(z, u), size)
 
 
 @kernel
-def ahead(z, u, per_h, q, dt, deflection, start):
-    """Return `seen` of the predicted end of a step, at the start of which the bristle has this deflection and k."""
-    far, along = seen(plus(z, dt, u), u, per_h, q)
-    # the bound of the prediction is full deflection or more, where k no longer depends on the deflection
-    return xp.minimum(far / (1.0 + start * dt), xp.maximum(deflection, 1.0)), along
+def bounded(far, start, dt, deflection):
+    """Return the deflection at the predicted end of a step, from that without friction and from its start.
+
+    The bound is full deflection or more, where k no longer depends on the deflection.
+    """
+    return xp.minimum(far / (1.0 + start * dt), xp.maximum(deflection, 1.0))
 
 
 @kernel
-def settle(law, free, u, per_h, q, deflection):
-    """Return the bristle within its cap, and `seen` of it; `deflection`: that at the start of the step."""
-    reached, along = seen(free, u, per_h, q)
-    back = cap(reached, reachable(deflection, law))
-    return times(back, free), reached * back, along
+def capped(law, free, far, deflection):
+    """Return a bristle within its cap, and its deflection; `deflection`: that at the start of the step."""
+    back = cap(far, reachable(deflection, law))
+    return times(back, free), far * back
 
 
 @kernel
 def step(law, z, u, v, per_h, q, dt):
     """Return the bristle after dt, and its k."""
-    deflection, along = seen(z, u, per_h, q)
+    deflection, along = seen(z, norm(z), u, per_h, q)
     start = formulas.bristle_decay(xp, deflection, along, v, q, law)
-    predicted, along_end = ahead(z, u, per_h, q, dt, deflection, start)
-    end = formulas.bristle_decay(xp, predicted, along_end, v, q, law)
+    ahead = plus(z, dt, u)
+    far, along_ahead = seen(ahead, norm(ahead), u, per_h, q)
+    end = formulas.bristle_decay(xp, bounded(far, start, dt, deflection), along_ahead, v, q, law)
     left, mean = formulas.relaxation(xp, formulas.mean_decay(start, end, dt) * dt)
-    free = plus(times(left, z), dt * mean, u)  # perhaps beyond its cap
-    new, reached, along_new = settle(law, free, u, per_h, q, deflection)
-    return new, formulas.bristle_decay(xp, reached, along_new, v, q, law)
+    free = plus(times(left, z), dt * mean, u)
+    beyond, along_free = seen(free, norm(free), u, per_h, q)
+    new, reached = capped(law, free, beyond, deflection)
+    return new, formulas.bristle_decay(xp, reached, along_free, v, q, law)

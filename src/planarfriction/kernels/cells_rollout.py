@@ -24,13 +24,13 @@ from planarfriction.kernels.cell_blocks import (
     OUT,
     WEIGHT,
     Z,
-    advance,
     divided,
     lever_at,
     pair,
     put_pair,
     totals,
 )
+from planarfriction.kernels.cell_passes import advance
 from planarfriction.kernels.cell_slopes import retreat
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.forward import forward

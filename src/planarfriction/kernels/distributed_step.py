@@ -14,12 +14,11 @@ from planarfriction.kernels.cell_blocks import (
     LANES,
     WEIGHT,
     Z,
-    advance,
     clear,
     divided,
-    end_traction,
     room,
 )
+from planarfriction.kernels.cell_passes import advance, end_traction
 from planarfriction.kernels.general_cells import Bristle, slopes, slopes_of
 from planarfriction.kernels.law import grip, squared
 from planarfriction.kernels.steps import step_functions
