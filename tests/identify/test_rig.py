@@ -282,11 +282,11 @@ def test_a_model_begins_where_the_lead_ended_if_that_is_near_the_data(monkeypatc
     """Else at the guess that misfits least, and at both where neither comes near; the lower cost is taken."""
     seen = []
 
-    def multistart(problem, starts, *, noise, report):
+    def multistart(problem, starts, *, noise):
         seen.append(float(starts[0][0]))
         return SimpleNamespace(cost=starts[0][0], near=starts[0][0] in near)
 
     monkeypatch.setattr(search, "multistart", multistart)
     monkeypatch.setattr(search, "misfit", lambda problem, values, noise: values[0])
-    found = search.warm_start(None, lead, [np.array([3.0]), np.array([2.0])], noise=None, report=None)
+    found = search.warm_start(None, lead, [np.array([3.0]), np.array([2.0])], noise=None)
     assert seen == tried and found.cost == best

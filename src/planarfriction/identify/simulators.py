@@ -10,7 +10,7 @@ import numpy as np
 from planarfriction.compiler import threads
 from planarfriction.derivatives import PARAMETERS, rollout, rollout_jacobian
 from planarfriction.identify.logs import EVEN, Log
-from planarfriction.identify.parameters import RADIUS
+from planarfriction.identify.parameters import RADIUS, SHAPE
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
@@ -158,8 +158,8 @@ class DistributedSimulator(ScaledSimulator):
         return rollout(self._model, None, twists, loads, dt, parameters=vector[: len(LAW_NAMES)]).wrenches
 
     def sensitivities(self, twists, loads, dt, vector, names):
-        of_law, rest = [n for n in names if n in LAW_NAMES], [n for n in names if n not in LAW_NAMES]
-        own, slopes = vector[: len(LAW_NAMES)], np.empty((len(twists), 3, len(names)))
+        of_law, rest = [n for n in names if n in LAW_NAMES], [n for n in names if n in SHAPE]
+        own, slopes = vector[: len(LAW_NAMES)], np.zeros((len(twists), 3, len(names)))
         if not of_law:
             base = self.wrenches(twists, loads, dt, vector)
         else:
@@ -174,13 +174,16 @@ class DistributedSimulator(ScaledSimulator):
         return base, slopes
 
     def work(self, parameters):
-        return 0.03 * self._model.state_shape[1] * (parameters + 1)
+        return 0.1 * self.patch.cells
 
 
 class ReducedSimulator(DistributedSimulator):
     """Simulator of `ReducedModel`."""
 
     model_class = ReducedModel
+
+    def work(self, parameters):
+        return 0.1 * (parameters + 1)
 
 
 SIMULATORS: dict[str, type[Simulator]] = {
