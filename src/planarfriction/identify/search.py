@@ -129,28 +129,27 @@ class _SettledError(Exception):
 class _Descent:
     """Search from one start, and the best point that it has found.
 
-    It ends where the first try after a step changes the cost by less than `share` of it. `least_squares` alone goes on
-    where derivatives that are kept from nearby predict a change that is not there, until its steps vanish.
+    It ends where a try changes the cost by less than `share` of it, up or down. `least_squares` alone goes on where
+    derivatives that are kept from nearby promise a gain that is not there, until its steps vanish.
     """
 
     def __init__(self, residuals: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], x: np.ndarray, share: float):
         self.residuals, self.x, self.share = residuals, x, share
-        self.cost, self._refused, self._last = np.inf, False, (np.empty(0), np.empty(0))
+        self.cost, self._last = np.inf, (np.empty(0), np.empty(0))
 
     def run(self, bounds: tuple[np.ndarray, np.ndarray]) -> None:
         """Minimise the sum of squares."""
         from scipy.optimize import least_squares
 
-        settings: Any = {"x_scale": "jac", "xtol": 1e-9, "ftol": self.share, "gtol": 1e-12}
+        settings: Any = {"jac": self._jacobian, "x_scale": "jac", "xtol": 1e-9, "ftol": self.share, "gtol": 1e-12}
         with contextlib.suppress(_SettledError):
-            least_squares(self._residual, self.x, self._jacobian, bounds, max_nfev=MOST_EVALUATIONS, **settings)
+            least_squares(self._residual, self.x, bounds=bounds, max_nfev=MOST_EVALUATIONS, **settings)
 
     def _residual(self, x: np.ndarray) -> np.ndarray:
         self._last = condensed(*self.residuals(x))
         cost = 0.5 * float(self._last[0] @ self._last[0])
-        settled = not self._refused and abs(cost - self.cost) < self.share * cost
-        self._refused = not cost < self.cost
-        if not self._refused:
+        settled = abs(cost - self.cost) < self.share * cost
+        if cost < self.cost:
             self.x, self.cost = x.copy(), cost
         if settled:
             raise _SettledError
@@ -199,8 +198,8 @@ def condensed(residual: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, n
     """
     rows = np.column_stack([jacobian, residual])
     count, width = len(rows) // IN_CACHE, rows.shape[1]
-    blocks = np.linalg.qr(rows[: count * IN_CACHE].reshape(count, IN_CACHE, width), mode="r").reshape(-1, width)
-    triangle = np.asarray(np.linalg.qr(np.concatenate([blocks, rows[count * IN_CACHE :]]), mode="r"))
+    blocks = np.asarray(np.linalg.qr(rows[: count * IN_CACHE].reshape(count, IN_CACHE, width), mode="r"))
+    triangle = np.asarray(np.linalg.qr(np.concatenate([blocks.reshape(-1, width), rows[count * IN_CACHE :]]), mode="r"))
     return triangle[:, -1], triangle[:, :-1]
 
 

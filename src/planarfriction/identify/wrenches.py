@@ -94,10 +94,8 @@ def identify_lugre(
     noise = first_noise(logs) if options.noise is None else np.array(options.noise)
     # The quickest model leads: it finds where the others begin.
     guesses, candidates, skipped, lead = [], [], [], None
-    problems = [
-        LogProblem(logs, patch, names, law, options, each, progress)
-        for each in dict.fromkeys((next(iter(SIMULATORS)), *models))
-    ]
+    in_turn = dict.fromkeys((next(iter(SIMULATORS)), *models))
+    problems = [LogProblem(logs, patch, names, law, options, each, progress) for each in in_turn]
     with interruptible(problems):
         for problem in problems:
             if lead is None:
