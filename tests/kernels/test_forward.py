@@ -85,7 +85,7 @@ def test_what_is_no_straight_line_is_named():
         forward(loops, ("z",), ("z",))
 
 
-def test_several_directions_share_the_function_and_skip_what_does_not_change():
+def test_several_directions_skip_what_does_not_change():
     """`sigma_1` and `sigma_2` move no bristle; other changes are those along one direction."""
     names = "sigma_0", "sigma_1", "sigma_2", "v_s"
     directions = tuple((f"law.{name}", "z")[: 1 if name in ("sigma_1", "sigma_2") else 2] for name in names)

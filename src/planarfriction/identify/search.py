@@ -129,8 +129,8 @@ class _SettledError(Exception):
 class _Descent:
     """Search from one start, and the best point that it has found.
 
-    It ends where a try changes the cost by less than `share` of it, up or down. `least_squares` alone goes on where
-    derivatives that are kept from nearby promise a gain that is not there, until its steps vanish.
+    It ends where a try changes the cost by less than `share` of it, up or down. `least_squares` alone continues until
+    its steps vanish, if derivatives that are kept from nearby promise a gain that is not there.
     """
 
     def __init__(self, residuals: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], x: np.ndarray, share: float):
