@@ -5,6 +5,7 @@ from __future__ import annotations
 import copyreg
 import pickle
 import reprlib
+from collections.abc import Mapping
 from typing import Any
 
 WIDTH = 80
@@ -112,6 +113,15 @@ class SimulationInterrupted(_Travels, KeyboardInterrupt):
     def __init__(self, solution: Any):
         self.solution = solution
         super().__init__("simulation interrupted")
+
+
+class IdentificationInterrupted(_Travels, KeyboardInterrupt):
+    """Ctrl-C during an identification; `estimates` holds the best values so far by name [SI], which have no errors."""
+
+    def __init__(self, estimates: Mapping[str, float]):
+        self.estimates = dict(estimates)
+        found = ", ".join(f"{name} = {value:.4g}" for name, value in self.estimates.items())
+        super().__init__(f"identification interrupted, not finished; best so far, without intervals [SI]: {found}")
 
 
 class SweepError(FrictionError, RuntimeError):

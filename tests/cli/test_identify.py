@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import time
 
@@ -32,6 +33,22 @@ def test_estimates_json_and_picture(path, tmp_path, capsys):
     data = json.loads((out / "slow-run-identification.json").read_text())
     assert data["parameters"]["mu_c"]["estimate"] == pytest.approx(0.5, abs=0.01)
     assert (out / "slow-run-residuals.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_ctrl_c_prints_what_was_found_so_far(path, capsys, monkeypatch):
+    after = iter(range(4))
+
+    def shown(text):
+        if "evaluation" in text and next(after, None) is None:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("planarfriction.cli.identify.work_progress", lambda label: contextlib.nullcontext(shown))
+    assert main(["identify", str(path), "--patch", "disc", *FAST, *START]) == 130
+    (line,) = capsys.readouterr().out.splitlines()
+    words, _, found = line.partition("[SI]: ")
+    assert "not finished" in words and "without intervals" in words
+    assert float(found.split(", ")[0].removeprefix("mu_c = ")) == pytest.approx(0.5, abs=0.05)
+    assert "contact_radius = " in found
 
 
 def test_progress_is_a_line_now_and_then_without_a_terminal(monkeypatch, capsys):

@@ -14,6 +14,7 @@ import planarfriction as pf
 from planarfriction import errors, identify, solvers
 from planarfriction.errors import (
     FileError,
+    IdentificationInterrupted,
     InvalidValueError,
     MissingExtraError,
     SimulationInterrupted,
@@ -170,6 +171,7 @@ RAISED = {
     "extra": MissingExtraError("torch", "torch"),
     "solver": SolverError("at t = 1 s: step size fell below", None),
     "interrupted": SimulationInterrupted(None),
+    "identification interrupted": IdentificationInterrupted({"mu_c": 0.5}),
     "sweep": SweepError("the executor ended"),
     "sweep interrupted": SweepInterrupted("1 of 2 done", None),
     "base": errors.FrictionError("no"),

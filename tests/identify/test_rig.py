@@ -282,11 +282,28 @@ def test_a_model_begins_where_the_lead_ended_if_that_is_near_the_data(monkeypatc
     """Else at the guess that misfits least, and at both where neither comes near; the lower cost is taken."""
     seen = []
 
-    def multistart(problem, starts, *, noise, report):
+    def multistart(problem, starts, *, noise):
         seen.append(float(starts[0][0]))
         return SimpleNamespace(cost=starts[0][0], near=starts[0][0] in near)
 
     monkeypatch.setattr(search, "multistart", multistart)
     monkeypatch.setattr(search, "misfit", lambda problem, values, noise: values[0])
-    found = search.warm_start(None, lead, [np.array([3.0]), np.array([2.0])], noise=None, report=None)
+    found = search.warm_start(None, lead, [np.array([3.0]), np.array([2.0])], noise=None)
     assert seen == tried and found.cost == best
+
+
+def test_a_search_ends_where_kept_derivatives_promise_what_is_not_there():
+    """Steps from derivatives that are a little off miss the minimum by less than shows in the cost."""
+    random = np.random.default_rng(0)
+    slopes, noise = random.normal(size=(300, 3)), random.normal(size=300)
+    kept, seen = slopes + 0.03 * random.normal(size=slopes.shape), []
+
+    def residuals(x):
+        seen.append(x)
+        return noise + slopes @ x, kept
+
+    descent = search._Descent(residuals, np.ones(3), 1e-6)
+    descent.run((np.full(3, -np.inf), np.full(3, np.inf)))
+    left = np.linalg.lstsq(slopes, -noise, rcond=None)[1][0]
+    assert descent.cost == pytest.approx(0.5 * left, rel=1e-4)
+    assert len(seen) < 8

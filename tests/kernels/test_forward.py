@@ -11,7 +11,7 @@ from planarfriction.compiler import kernel
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.derive import NotStraightError, derive
 from planarfriction.kernels.distributed_step import cell
-from planarfriction.kernels.forward import forward
+from planarfriction.kernels.forward import forward, forwards
 from planarfriction.kernels.vectors import dot, norm, plus, square, times
 
 LAW = LawNumbers(1e5, 300.0, 0.4, 0.5, 0.8, 1e-3, 1.7, 1.0, 0.3, 0.0)
@@ -83,3 +83,21 @@ def test_what_is_no_straight_line_is_named():
 
     with pytest.raises(NotStraightError, match="is no assignment and no return"):
         forward(loops, ("z",), ("z",))
+
+
+def test_several_directions_skip_what_does_not_change():
+    """`sigma_1` and `sigma_2` move no bristle; other changes are those along one direction."""
+    names = "sigma_0", "sigma_1", "sigma_2", "v_s"
+    directions = tuple((f"law.{name}", "z")[: 1 if name in ("sigma_1", "sigma_2") else 2] for name in names)
+    many, moved = forwards(cell, directions, ("z", "u"))
+    assert moved == ((True, True), (False, True), (False, True), (True, True))
+    first, second, third, fourth = (forward(cell, by, ("z", "u")) for by in directions)
+
+    @njit
+    def both(law, z, u, dt, dz):
+        one, two = first(law, z, u, dt, 1.0, dz), fourth(law, z, u, dt, 1.0, dz)
+        three, four = second(law, z, u, dt, 1.0), third(law, z, u, dt, 1.0)
+        return many(law, z, u, dt, 1.0, dz, 1.0, 1.0, 1.0, dz), (*one, *three[2:], *four[2:], *two[2:])
+
+    found, expected = both(LAW, (2e-6, -1e-6), (4e-3, 1e-3), 1e-4, (1e-6, 2e-6))
+    np.testing.assert_allclose(found, expected, rtol=1e-12)

@@ -9,9 +9,9 @@ from typing import Any
 
 import planarfriction as pf
 from planarfriction import validation
-from planarfriction.cli import output
+from planarfriction.cli import INTERRUPTED, output
 from planarfriction.cli.console import note, work_progress
-from planarfriction.errors import InvalidValueError
+from planarfriction.errors import IdentificationInterrupted, InvalidValueError
 from planarfriction.writing import make_folder, write_text
 
 
@@ -50,7 +50,11 @@ def identify(
         for path in paths:
             progress(f"reading {path.name}")
             logs.append(Log.from_csv(path, normal_force=normal_force, contact=contact))
-        found = identify_lugre(logs, patch, **chosen, options=options, progress=progress)
+        try:
+            found = identify_lugre(logs, patch, **chosen, options=options, progress=progress)
+        except IdentificationInterrupted as stop:
+            print(stop)
+            return INTERRUPTED
     samples = sum(len(log.time) for log in logs)
     title = f"{', '.join(log.name for log in logs)}: {samples} samples, {patch.name}"
     print(title, "", found.table(), sep="\n")

@@ -15,14 +15,16 @@ from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
 from planarfriction.kernels import (
     cells_rollout,
+    cells_sensitivities,
     published_rollout,
     published_step,
     reduced_loads,
     reduced_rollout,
     reduced_step,
 )
+from planarfriction.kernels.cell_blocks import divided
 from planarfriction.kernels.law import LAW
-from planarfriction.kernels.rollouts import Bars, Inputs
+from planarfriction.kernels.rollouts import Inputs
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, MomentModel, ReducedModelPublished
 from planarfriction.models.reduced_map import MapSizes, ReducedShape, maps_of
@@ -83,30 +85,39 @@ REDUCED_BY_LOAD = _family_of(_OF_LAW, reduced_step.NAMES, reduced_loads, reduced
 """The same where the shape follows the load."""
 
 
-def _cells(entries: cells_rollout.CellRollouts) -> Family:
+def _cells(entries: cells_rollout.CellRollouts, forwards: Callable[..., None]) -> Family:
     def sensitivities(
-        inputs: Inputs, span: Any, z: np.ndarray, columns: np.ndarray, wrenches: Any, slopes: Any
+        inputs: Inputs, span: Any, z: np.ndarray, columns: np.ndarray, wrenches: np.ndarray, slopes: np.ndarray
     ) -> None:
-        """Change one number after the other, on several threads where one contact leaves them idle."""
-        none, start, at = np.zeros((1, len(inputs.dt), 3)), z.copy(), slice(*span)
+        """Step the contacts; the blocks of a single one on several threads."""
+        wanted = np.array([cells_sensitivities.PARAMETERS.index(LawNumbers._fields[i]) for i in columns], dtype=int)
+        blocks, lanes = divided.py_func(inputs.shapes.shape[2])
+        if blocks == 1 or len(wrenches) > 1:
+            forwards(inputs, span, z, wanted, wrenches, slopes)
+            return
+        state, data = z.reshape(1, 1, 2, -1), inputs.data.reshape(blocks, -1)
 
-        def some(first: int, last: int) -> None:
-            for d in range(first, last):
-                kept = d == len(columns) - 1  # the roll-out is the same for all
-                state, found = (z, wrenches) if kept else (start.copy(), np.zeros_like(wrenches))
-                numbers, change = np.zeros((1, inputs.rows.shape[-1])), np.zeros_like(wrenches)
-                numbers[:, columns[d]] = 1.0
-                entries.tangent(inputs, span, state, Bars(np.zeros_like(z), none, none[..., 0], numbers), found, change)
-                slopes[at, ..., d] = change[at]
+        def one(k: int) -> tuple[np.ndarray, np.ndarray]:
+            cells = slice(k * lanes, (k + 1) * lanes)
+            own, found = state[..., cells].reshape(1, 1, -1), (np.zeros_like(wrenches), np.zeros_like(slopes))
+            shapes, by_load = (np.ascontiguousarray(each[..., cells]) for each in (inputs.shapes, inputs.by_load))
+            part = inputs._replace(data=data[k], shapes=shapes, by_load=by_load)
+            forwards(part, span, own, wanted, *found)
+            state[..., cells] = own.reshape(1, 1, 2, -1)
+            return found
 
-        alone = len(columns) * len(inputs.dt) // WORTH_A_THREAD if len(wrenches) == 1 else 1
-        threads.share(len(columns), alone, some)
+        for found, change in threads.each(one, range(blocks)):
+            wrenches += found
+            slopes += change
 
     names, columns = cells_rollout.PARAMETERS, np.array(cells_rollout.COLUMNS)
     return Family(names, columns, entries.rollout, entries.gradient, sensitivities, entries.tangent)
 
 
-CELLS, TURNED_CELLS = _cells(cells_rollout.ISOTROPIC), _cells(cells_rollout.TURNED)
+CELLS, TURNED_CELLS = (
+    _cells(cells_rollout.ISOTROPIC, cells_sensitivities.ISOTROPIC),
+    _cells(cells_rollout.TURNED, cells_sensitivities.TURNED),
+)
 """`DistributedModel`, isotropic or with a friction metric."""
 
 

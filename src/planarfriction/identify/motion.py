@@ -12,7 +12,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.identify.parameters import check_names, fitted_law, scaled_patch
 from planarfriction.identify.problem import Problem
 from planarfriction.identify.result import Identification
-from planarfriction.identify.search import Fit, Report, multistart, refine
+from planarfriction.identify.search import Fit, interruptible, multistart, refine
 from planarfriction.identify.slides import (
     Slide,
     SlidingBody,
@@ -113,6 +113,8 @@ def identify_motion(
     ------
     InvalidValueError
         A parameter breaks its rule.
+    IdentificationInterrupted
+        Ctrl-C, with the best values so far.
     """
     slides = as_slides(slides)
     names = check_names(parameters, MOTION_PARAMETERS)
@@ -127,11 +129,12 @@ def identify_motion(
     strange = contradictions(slides, body) if robust else {}
     left_out = [Verdict("fit", True, f"{slides[i].name} is left out: {why}") for i, why in strange.items()]
     slides = tuple(slide for i, slide in enumerate(slides) if i not in strange)
-    report = (lambda text: None) if progress is None else progress
-    problem = SlideProblem(slides, patch, body, names, start, model, samples, robust, report)
+    problem = SlideProblem(slides, patch, body, names, start, model, samples, robust)
+    problem.progress = progress
     noise = np.array([FIRST_NOISE, FIRST_NOISE, FIRST_NOISE / float(patch.contact_radius())])
-    fit = refine(multistart(problem, [problem.start_values()], noise=noise, report=report), report=report)
-    return _identification(fit, problem, left_out)
+    with interruptible([problem]):
+        fit = refine(multistart(problem, [problem.start_values()], noise=noise))
+        return _identification(fit, problem, left_out)
 
 
 class SlideProblem(Problem):
@@ -152,10 +155,9 @@ class SlideProblem(Problem):
         build: Build,
         samples: int | None,
         robust: bool,
-        report: Report,
     ) -> None:
         self.slides, self.patch, self.body, self.names = slides, patch, body, names
-        self.law, self.build, self.samples, self.robust, self.report = law, build, samples, robust, report
+        self.law, self.build, self.samples, self.robust = law, build, samples, robust
         self.starts: list[np.ndarray] = [start_of(slide) for slide in slides]
         self._turns = 3  # of the first evaluation; later ones begin where the last one ended
 

@@ -52,6 +52,15 @@ class Problem:
     """Least relative change of the cost for which a search goes on."""
     steps = 1
     """Number of steps between two samples."""
+    progress: Callable[[str], Any] | None = None
+    """Receives lines of text about the progress."""
+    so_far: np.ndarray | None = None
+    """Best values that a search has found."""
+
+    def report(self, text: str) -> None:
+        """Tell the progress."""
+        if self.progress is not None:
+            self.progress(text)
 
     def coordinates(self, start: np.ndarray) -> Coordinates:
         """Return the optimiser's coordinates for a search from values `[F]`."""
@@ -120,9 +129,10 @@ class LogProblem(Problem):
         law: LuGre,
         options: FitOptions,
         model: str = "reduced-published",
+        progress: Callable[[str], Any] | None = None,
     ) -> None:
         self.logs, self.patch, self.names, self.law = logs, patch, names, law
-        self.options, self.model = options, model
+        self.options, self.model, self.progress = options, model, progress
         loads = [mean_load(log) for log in logs]
         _check(logs, loads, patch, [name for name in names if name in known.SOFT_FINGER])
         self.reference_load = float(np.median(loads))
@@ -166,6 +176,9 @@ class LogProblem(Problem):
             kind: Any = PartsPrediction if len(log.parts) > 1 else Prediction
             result.append(kind(self.simulator, log, twist, begins=self.options.begins, refine=steps))
         return result
+
+    def report(self, text: str) -> None:
+        super().report(f"{self.model}: {text}")
 
     @property
     def work(self) -> float:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from planarfriction.errors import IdentificationInterrupted
 from planarfriction.identify.parameters import ALL, Coordinates
 from planarfriction.identify.problem import LogProblem, Problem
 from planarfriction.laws import LuGre
@@ -27,14 +29,17 @@ NEAR = 4.0
 MOST_EVALUATIONS, SAME_COST = 100, 1e-3
 """Most evaluations of one start, and largest difference of costs, as a share, of starts that found one minimum."""
 
+TOUCHING = 1e-9
+"""Distance from a bound, over the size of a coordinate above 1, at which a search has ended on it."""
+
+IN_CACHE = 256
+"""Number of rows that are reduced at a time: a triangle of triangles takes a third of the time."""
+
 SPEEDS, STIFFNESSES = 6, 7
 """Size of the grid of Stribeck speeds and stiffnesses from which a search starts."""
 
 SCATTER = 0.7
 """Standard deviation of the logarithms of starts around a given one."""
-
-Report = Callable[[str], None]
-"""Function that receives lines of text about the progress."""
 
 
 @dataclass(frozen=True)
@@ -65,14 +70,14 @@ class Fit:
         return 2.0 * self.cost <= NEAR * self.problem.numbers
 
 
-def multistart(problem: Problem, starts: Sequence[np.ndarray], *, noise: np.ndarray, report: Report) -> Fit:
+def multistart(problem: Problem, starts: Sequence[np.ndarray], *, noise: np.ndarray) -> Fit:
     """Find the best rough fit from starts `[F]` or `[F + K]`, with the same noise for all samples of a channel."""
     coordinates, sigma = problem.coordinates(starts[0]), problem.even_sigma(noise)
     points = [coordinates.of(each) for each in starts]
-    return _best(problem, coordinates, points, noise, sigma, ROUGH, report)
+    return _best(problem, coordinates, points, noise, sigma, ROUGH)
 
 
-def refine(fit: Fit, *, report: Report) -> Fit:
+def refine(fit: Fit) -> Fit:
     """Find the best fit that a rough one leads to: noise from what is left, steps as fine as the errors ask for."""
     problem, coordinates, starts = fit.problem, fit.coordinates, fit.starts
     for turn in range(ROUNDS):
@@ -80,18 +85,17 @@ def refine(fit: Fit, *, report: Report) -> Fit:
         settled = turn > 0 and np.allclose(noise, fit.noise, rtol=STEADY, atol=0.0)
         finer = problem.refine_steps(fit.values, sigma)
         if finer:
-            report(f"{problem.steps} steps between two samples")
+            problem.forget()
+            problem.report(f"{problem.steps} steps between two samples")
         elif settled:
             break
-        fit = _best(problem, coordinates, [fit.x], noise, sigma, ROUGH if finer else FINE, report)
+        fit = _best(problem, coordinates, [fit.x], noise, sigma, ROUGH if finer else FINE)
     problem.forget()
-    found = _best(problem, coordinates, [fit.x], noise, sigma, FINE, report)
+    found = _best(problem, coordinates, [fit.x], noise, sigma, FINE)
     return dataclasses.replace(found, starts=starts)
 
 
-def warm_start(
-    problem: LogProblem, lead: Fit, guesses: Sequence[np.ndarray], *, noise: np.ndarray, report: Report
-) -> Fit:
+def warm_start(problem: LogProblem, lead: Fit, guesses: Sequence[np.ndarray], *, noise: np.ndarray) -> Fit:
     """Find the best rough fit of another model than that of `lead`.
 
     The search begins where the lead ended, if that is near the data, else at the best of the `guesses` `[F]`: a model
@@ -100,10 +104,59 @@ def warm_start(
     guess = min(guesses, key=lambda values: misfit(problem, values, noise))
     fits = []
     for start in (lead.values, guess) if lead.near else (guess, lead.values):
-        fits.append(multistart(problem, [start], noise=noise, report=report))
+        fits.append(multistart(problem, [start], noise=noise))
         if fits[-1].near:
             break
     return min(fits, key=lambda fit: fit.cost)
+
+
+@contextlib.contextmanager
+def interruptible(problems: Sequence[Problem]) -> Iterator[None]:
+    """Let Ctrl-C raise `IdentificationInterrupted` with the best values so far of the last problem that has any."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        for problem in reversed(problems):
+            if problem.so_far is not None:
+                raise IdentificationInterrupted(problem.by_name(problem.so_far)) from None
+        raise
+
+
+class _SettledError(Exception):
+    """The cost changes no more."""
+
+
+class _Descent:
+    """Search from one start, and the best point that it has found.
+
+    It ends where a try changes the cost by less than `share` of it, up or down. `least_squares` alone continues until
+    its steps vanish, if derivatives that are kept from nearby promise a gain that is not there.
+    """
+
+    def __init__(self, residuals: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], x: np.ndarray, share: float):
+        self.residuals, self.x, self.share = residuals, x, share
+        self.cost, self._last = np.inf, (np.empty(0), np.empty(0))
+
+    def run(self, bounds: tuple[np.ndarray, np.ndarray]) -> None:
+        """Minimise the sum of squares."""
+        from scipy.optimize import least_squares
+
+        settings: Any = {"jac": self._jacobian, "x_scale": "jac", "xtol": 1e-9, "ftol": self.share, "gtol": 1e-12}
+        with contextlib.suppress(_SettledError):
+            least_squares(self._residual, self.x, bounds=bounds, max_nfev=MOST_EVALUATIONS, **settings)
+
+    def _residual(self, x: np.ndarray) -> np.ndarray:
+        self._last = condensed(*self.residuals(x))
+        cost = 0.5 * float(self._last[0] @ self._last[0])
+        settled = abs(cost - self.cost) < self.share * cost
+        if cost < self.cost:
+            self.x, self.cost = x.copy(), cost
+        if settled:
+            raise _SettledError
+        return self._last[0]
+
+    def _jacobian(self, x: np.ndarray) -> np.ndarray:
+        return self._last[1]  # least_squares asks for those at its last residuals
 
 
 def _best(
@@ -113,45 +166,29 @@ def _best(
     noise: np.ndarray,
     sigma: list[np.ndarray],
     change: float,
-    report: Report,
 ) -> Fit:
     """Minimise the sum of squares from coordinates `[F + K]` until the cost changes by less than `change`.
 
     Coordinates at a bound are set to it.
     """
-    from scipy.optimize import least_squares
+    residuals, bounds, evaluations = problem.residuals(coordinates, sigma), coordinates.bounds(), itertools.count(1)
+    share, found = max(change / (0.5 * problem.numbers), problem.least_change), []
 
-    residuals, bounds = problem.residuals(coordinates, sigma), coordinates.bounds()
-    memory: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
+    def told(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        problem.report(f"start {len(found)} of {len(points)}, evaluation {next(evaluations)}")
+        problem.so_far = coordinates.values(min(found, key=lambda each: each.cost).x)
+        return residuals(x)
 
-    def evaluate(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        key = x.tobytes()
-        if key not in memory:  # least_squares asks for the residuals, then for their derivatives
-            memory.clear()
-            report(f"{words}, evaluation {next(evaluations)}")
-            memory[key] = condensed(*residuals(x))
-        return memory[key]
-
-    found, evaluations, words = [], itertools.count(1), ""
-    for number, point in enumerate(points, start=1):
-        words = f"start {number} of {len(points)}"
-        each = least_squares(
-            lambda x: evaluate(x)[0],
-            point,
-            jac=lambda x: evaluate(x)[1],  # pyright: ignore
-            bounds=bounds,
-            x_scale="jac",
-            xtol=1e-9,
-            ftol=max(change / (0.5 * problem.numbers), problem.least_change),
-            gtol=1e-12,
-            max_nfev=MOST_EVALUATIONS,
-        )
-        found.append(each)
+    for point in points:
+        found.append(_Descent(told, point, share))
+        found[-1].run(bounds)
     best = min(found, key=lambda each: each.cost)
-    agreeing = sum(bool(each.cost <= best.cost * (1.0 + SAME_COST)) for each in found)
-    x = np.where(best.active_mask < 0, bounds[0], np.where(best.active_mask > 0, bounds[1], best.x))
-    starts, cost = (agreeing, len(points)), float(best.cost)
-    return Fit(problem, coordinates, x, coordinates.values(x), best.active_mask != 0, noise, sigma, starts, cost)
+    agreeing = sum(each.cost <= best.cost * (1.0 + SAME_COST) for each in found)
+    low, high = (np.abs(best.x - each) <= TOUCHING * np.maximum(1.0, np.abs(best.x)) for each in bounds)
+    x = np.where(low, bounds[0], np.where(high, bounds[1], best.x))
+    return Fit(
+        problem, coordinates, x, coordinates.values(x), low | high, noise, sigma, (agreeing, len(points)), best.cost
+    )
 
 
 def condensed(residual: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -159,7 +196,10 @@ def condensed(residual: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, n
 
     They are the triangle of `[J, r] = Q R`: all that least squares needs, at a fraction of the cost.
     """
-    triangle = np.asarray(np.linalg.qr(np.column_stack([jacobian, residual]), mode="r"))
+    rows = np.column_stack([jacobian, residual])
+    count, width = len(rows) // IN_CACHE, rows.shape[1]
+    blocks = np.asarray(np.linalg.qr(rows[: count * IN_CACHE].reshape(count, IN_CACHE, width), mode="r"))
+    triangle = np.asarray(np.linalg.qr(np.concatenate([blocks.reshape(-1, width), rows[count * IN_CACHE :]]), mode="r"))
     return triangle[:, -1], triangle[:, :-1]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from planarfriction.compiler import threads
 from planarfriction.derivatives import PARAMETERS, rollout, rollout_jacobian
 from planarfriction.identify.logs import EVEN, Log
-from planarfriction.identify.parameters import RADIUS
+from planarfriction.identify.parameters import RADIUS, SHAPE
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
@@ -99,20 +99,24 @@ class PublishedSimulator(Simulator):
         return 0.3 * parameters
 
 
-class ScaledSimulator(Simulator):
-    """Simulator of a fixed patch that is scaled and moved through its twists and wrenches, which is exact.
+class DistributedSimulator(Simulator):
+    """Simulator of `DistributedModel` on a fixed patch, which is scaled and moved through its twists and wrenches.
 
-    A point at `p = c + s (p0 - c0)` has the velocity that its image `p0` has at the twist `(v + omega x d, s omega)`,
-    `d = c - s c0`, and the torque is `s tau0 + d x f`.
+    That is exact: a point at `p = c + s (p0 - c0)` has the velocity that its image `p0` has at the twist
+    `(v + omega x d, s omega)`, `d = c - s c0`, and the torque is `s tau0 + d x f`.
     """
+
+    model_class: type = DistributedModel
 
     def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
         self.patch = patch.compressed(degree=DEGREE) if len(patch.positions) > CELLS else patch
-        self._law = law
         self._radius, self._centre = float(patch.contact_radius()), patch.centre_of_pressure()
+        self._model = self.model_class(self.patch, law)
 
     def wrenches(self, twists, loads, dt, vector):
-        return self._placed(vector, twists, lambda inner: self._inner(inner, loads, dt, vector))
+        own = vector[: len(LAW_NAMES)]
+        roll = lambda inner: rollout(self._model, None, inner, loads, dt, parameters=own).wrenches  # noqa: E731
+        return self._placed(vector, twists, roll)
 
     def _placed(self, vector, twists, work):
         s = vector[RADIUS] / self._radius
@@ -122,65 +126,38 @@ class ScaledSimulator(Simulator):
         fx, fy, tau = np.moveaxis(work(inner), 1, 0)
         return np.stack([fx, fy, s * tau + dx * fy - dy * fx], 1)
 
-    def _inner(self, twists, loads, dt, vector) -> np.ndarray:
-        raise NotImplementedError
-
     def sensitivities(self, twists, loads, dt, vector, names):
-        base = self.wrenches(twists, loads, dt, vector)
-        return base, self._differences(twists, loads, dt, vector, names, base)
+        of_law, shape = ([name for name in names if name in group] for group in (LAW_NAMES, SHAPE))
+        own, slopes = vector[: len(LAW_NAMES)], np.zeros((len(twists), 3, len(names)))
 
-    def _differences(self, twists, loads, dt, vector, names, base):
-        """Compute difference quotients of the wrenches, on all processors."""
-        slopes = np.empty((*base.shape, len(names)))
+        def work(inner):
+            found = rollout_jacobian(self._model, None, inner, loads, dt, of_law, parameters=own)
+            return np.concatenate([found.wrenches[..., None], found.d_wrenches], -1)
 
-        def work(first: int, last: int) -> None:
-            for i in range(first, last):
-                at = PARAMETERS.index(names[i])
-                change = CHANGE * max(abs(vector[at]), LEAST_CHANGE.get(names[i], 1e-3))
-                moved = vector.copy()
-                moved[at] += change
-                slopes[..., i] = (self.wrenches(twists, loads, dt, moved) - base) / change
+        found = self._placed(vector, twists, work)
+        base, slopes[..., [names.index(name) for name in of_law]] = found[..., 0], found[..., 1:]
 
-        threads.share(len(names), len(names), work)
-        return slopes
+        def differences(first: int, last: int) -> None:
+            for name in shape[first:last]:
+                at = PARAMETERS.index(name)
+                change = CHANGE * max(abs(vector[at]), LEAST_CHANGE.get(name, 1e-3))
+                moved = vector + change * (np.arange(len(vector)) == at)
+                slopes[..., names.index(name)] = (self.wrenches(twists, loads, dt, moved) - base) / change
 
-
-class DistributedSimulator(ScaledSimulator):
-    """Simulator of `DistributedModel`."""
-
-    model_class: type = DistributedModel
-
-    def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
-        super().__init__(patch, law)
-        self._model = self.model_class(self.patch, law)
-
-    def _inner(self, twists, loads, dt, vector):
-        return rollout(self._model, None, twists, loads, dt, parameters=vector[: len(LAW_NAMES)]).wrenches
-
-    def sensitivities(self, twists, loads, dt, vector, names):
-        of_law, rest = [n for n in names if n in LAW_NAMES], [n for n in names if n not in LAW_NAMES]
-        own, slopes = vector[: len(LAW_NAMES)], np.empty((len(twists), 3, len(names)))
-        if not of_law:
-            base = self.wrenches(twists, loads, dt, vector)
-        else:
-
-            def work(inner):
-                found = rollout_jacobian(self._model, None, inner, loads, dt, of_law, parameters=own)
-                return np.concatenate([found.wrenches[..., None], found.d_wrenches], -1)
-
-            found = self._placed(vector, twists, work)
-            base, slopes[..., [names.index(name) for name in of_law]] = found[..., 0], found[..., 1:]
-        slopes[..., [names.index(n) for n in rest]] = self._differences(twists, loads, dt, vector, rest, base)
+        threads.share(len(shape), len(shape), differences)
         return base, slopes
 
     def work(self, parameters):
-        return 0.03 * self._model.state_shape[1] * (parameters + 1)
+        return 0.1 * self.patch.cells
 
 
 class ReducedSimulator(DistributedSimulator):
     """Simulator of `ReducedModel`."""
 
     model_class = ReducedModel
+
+    def work(self, parameters):
+        return 0.1 * (parameters + 1)
 
 
 SIMULATORS: dict[str, type[Simulator]] = {

@@ -20,7 +20,7 @@ from planarfriction.identify.parameters import fitted_law, scaled_patch
 from planarfriction.identify.problem import LogProblem, mean_load
 from planarfriction.identify.result import Identification
 from planarfriction.identify.rig import CHANNELS, Nuisance, first_noise
-from planarfriction.identify.search import guess_starts, multistart, refine, warm_start
+from planarfriction.identify.search import guess_starts, interruptible, multistart, refine, warm_start
 from planarfriction.identify.simulators import SIMULATORS
 from planarfriction.identify.uncertainty import correlations, uncertainty
 from planarfriction.identify.verdicts import Candidate, Evidence, judge, verdicts_on_samples, verdicts_on_turns
@@ -80,6 +80,8 @@ def identify_lugre(
     ------
     InvalidValueError
         A parameter breaks its rule.
+    IdentificationInterrupted
+        Ctrl-C, with the best values so far.
     """
     logs, names = as_logs("log", log), known.check_names(parameters)
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
@@ -92,25 +94,26 @@ def identify_lugre(
     noise = first_noise(logs) if options.noise is None else np.array(options.noise)
     # The quickest model leads: it finds where the others begin.
     guesses, candidates, skipped, lead = [], [], [], None
-    for name in dict.fromkeys((next(iter(SIMULATORS)), *models)):
-        problem = LogProblem(logs, patch, names, law, options, name)
-        tell = lambda text, name=name: progress and progress(f"{name}: {text}")  # noqa: E731
-        if lead is None:
-            tell("looking for starts")
-            guesses = guess_starts(problem, given, starts=options.starts, seed=options.seed, noise=noise)
-            fit = multistart(problem, guesses, noise=noise, report=tell)
-        elif model == "auto" and problem.work * USUAL_EVALUATIONS > PATIENCE:
-            skipped.append(name)
-            continue
-        else:
-            fit = warm_start(problem, lead, guesses, noise=noise, report=tell)
-        if name in models:
-            fit = refine(fit, report=tell)
-            candidates.append(Candidate(fit, uncertainty(fit)))
-        lead = fit if lead is None else lead
-    assert lead is not None
-    best = min(candidates, key=lambda each: each.uncertainty.score)
-    found = _identification(best, candidates, skipped, lead.starts)
+    in_turn = dict.fromkeys((next(iter(SIMULATORS)), *models))
+    problems = [LogProblem(logs, patch, names, law, options, each, progress) for each in in_turn]
+    with interruptible(problems):
+        for problem in problems:
+            if lead is None:
+                problem.report("looking for starts")
+                guesses = guess_starts(problem, given, starts=options.starts, seed=options.seed, noise=noise)
+                fit = multistart(problem, guesses, noise=noise)
+            elif model == "auto" and problem.work * USUAL_EVALUATIONS > PATIENCE:
+                skipped.append(problem.model)
+                continue
+            else:
+                fit = warm_start(problem, lead, guesses, noise=noise)
+            if problem.model in models:
+                fit = refine(fit)
+                candidates.append(Candidate(fit, uncertainty(fit)))
+            lead = fit if lead is None else lead
+        assert lead is not None
+        best = min(candidates, key=lambda each: each.uncertainty.score)
+        found = _identification(best, candidates, skipped, lead.starts)
     return with_findings(found, whole, findings)
 
 

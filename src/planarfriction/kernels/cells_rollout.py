@@ -53,33 +53,33 @@ _pushed = forward(distributed_step.cell, _BY, ("z", "u"))
 
 
 @kernel
-def _lay(w, blocks, levers):
+def _lay(w, blocks, levers, size=BLOCK):
     """Write the numbers of the levers, states of zero and no cotangents."""
     per_block = levers.shape[0] // blocks
     for k in range(blocks):
-        block = at(w, k * BLOCK)
-        for i in range(BLOCK):
+        block = at(w, k * size)
+        for i in range(size):
             block[i] = 0.0
         for i in range(per_block):
             block[i] = levers[k * per_block + i]
 
 
 @kernel
-def _write(w, field, values, n):
+def _write(w, field, values, n, size=BLOCK):
     """Write vectors [2 n] to a field of all blocks."""
     blocks, lanes = divided(n)
     for k in range(blocks):
-        block, first = at(w, k * BLOCK + field), k * lanes
+        block, first = at(w, k * size + field), k * lanes
         for i in range(min(lanes, n - first)):
             block[i], block[LANES + i] = values[first + i], values[n + first + i]
 
 
 @kernel
-def _read(w, field, values, n):
+def _read(w, field, values, n, size=BLOCK):
     """Read vectors [2 n] from a field of all blocks."""
     blocks, lanes = divided(n)
     for k in range(blocks):
-        block, first = at(w, k * BLOCK + field), k * lanes
+        block, first = at(w, k * size + field), k * lanes
         for i in range(min(lanes, n - first)):
             values[first + i], values[n + first + i] = block[i], block[LANES + i]
 

@@ -7,50 +7,69 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from planarfriction.compiler import kernel
 from planarfriction.kernels.derive import Derivative, Step, Walk, run_source, text_of
 from planarfriction.kernels.rules import Rule
 
 
-@functools.cache
+class Directions(NamedTuple):
+    """A function with its changes along several directions, compiled into its callers."""
+
+    pushed: Any
+    """Takes the arguments, then the changes of each direction; returns the results, then their changes likewise."""
+    moved: tuple[tuple[bool, ...], ...]
+    """For each direction, True for the results that change along it."""
+
+
 def forward(function: Callable, by: tuple[str, ...], vectors: tuple[str, ...] = ()) -> Any:
     """Write a compiled function of `(arguments..., changes...)` that returns `results..., changes of the results...`.
 
     `by` are the arguments that change, `vectors` the arguments that are vectors (fields of records: `law.mu`).
     Raises `NotStraightError` as `derive` does.
     """
-    walk = Walk(function, by, vectors)
-    changes = _Changes(walk, by)
-    heads = [*(walk.first[name] for name in walk.arguments), *(changes.of[walk.outer(name)] for name in by)]
-    lines = [*changes.lines, f"return ({''.join(f'{name}, ' for name in [*walk.results, *changes.results()])})"]
+    return forwards(function, (by,), vectors).pushed
+
+
+@functools.cache
+def forwards(function: Callable, directions: tuple[tuple[str, ...], ...], vectors: tuple[str, ...] = ()) -> Directions:
+    """Write the same along several `directions`, each the arguments that change; what they share is computed once."""
+    walk = Walk(function, dict.fromkeys(name for by in directions for name in by), vectors)
+    changes = _Changes(walk, directions)
+    given = [own[walk.outer(name)] for own, by in zip(changes.of, directions, strict=True) for name in by]
+    heads = [*(walk.first[name] for name in walk.arguments), *given]
+    results = [changes.of_one(own, name) for own in changes.of for name in walk.results]
+    lines = [*changes.lines, f"return ({''.join(f'{name}, ' for name in [*walk.results, *results])})"]
     source = text_of(f"pushed({', '.join(heads)})", lines)
-    return kernel(run_source(walk.where, source, walk.names)["pushed"])
+    moved = tuple(tuple(name in own for name in walk.results) for own in changes.of)
+    return Directions(kernel(run_source(walk.where, source, walk.names)["pushed"]), moved)
 
 
 class _Changes:
-    """Lines of a function, each followed by the change of what it finds."""
+    """Lines of a function, each followed by the changes of what it finds."""
 
-    def __init__(self, walk: Walk, by: tuple[str, ...]):
+    def __init__(self, walk: Walk, directions: tuple[tuple[str, ...], ...]):
         self.walk, self.lines, self.count = walk, [], 0
-        self.of = {walk.outer(name): f"change_{name.replace('.', '_')}" for name in by}
+        self.of = [
+            {walk.outer(name): f"change_{name.replace('.', '_')}_of_{i}" for name in by}
+            for i, by in enumerate(directions)
+        ]
+        """Names of the changes by those of what changes, for each direction."""
         at = {step.line: step for step in walk.steps}
         for i, line in enumerate(walk.lines):
             step = at.get(i)
             if step is not None and isinstance(step.rule, Derivative):
                 self._by_function(step, step.rule)
-            else:
-                self.lines.append(line)
-                if step is not None:
-                    self._by_rule(step, step.rule)
+                continue
+            self.lines.append(line)
+            if step is not None:
+                for own in self.of:
+                    self._by_rule(step, step.rule, own)
 
-    def results(self) -> list[str]:
-        """Return the names of the changes of the results."""
-        return [self._change(name) for name in self.walk.results]
-
-    def _change(self, name: str) -> str:
-        return self.of.get(name) or (f"times(0.0, {name})" if name in self.walk.vectors else "0.0")
+    def of_one(self, own: dict[str, str], name: str) -> str:
+        """Return the change of a name along one direction."""
+        return own.get(name) or (f"times(0.0, {name})" if name in self.walk.vectors else "0.0")
 
     def _emit(self, text: str) -> str:
         self.count += 1
@@ -58,11 +77,11 @@ class _Changes:
         self.lines.append(f"{name} = {text}")
         return name
 
-    def _by_rule(self, step: Step, rule: Rule) -> None:
+    def _by_rule(self, step: Step, rule: Rule, own: dict[str, str]) -> None:
         results = {"t": step.targets[0], **{f"t{r}": target for r, target in enumerate(step.targets)}}
         terms: dict[str, list[str]] = {target: [] for target in step.targets}
         for i, atom in enumerate(step.atoms):
-            if (d := self.of.get(atom)) is None:
+            if (d := own.get(atom)) is None:
                 continue
             if i in rule.pushes:
                 terms[step.targets[0]].append(rule.pushes[i].format(*step.atoms, **results, d=d))
@@ -74,18 +93,26 @@ class _Changes:
             if texts:
                 vector = target in self.walk.vectors
                 added = functools.reduce(lambda a, b: f"plus({a}, 1.0, {b})", texts) if vector else " + ".join(texts)
-                self.of[target] = self._emit(added)
+                own[target] = self._emit(added)
 
     def _by_function(self, step: Step, inner: Derivative) -> None:
+        places = {path: _place(step, inner, path) for path in inner.by}
+        given = [{path: own[place] for path, place in places.items() if place in own} for own in self.of]
+        found = forwards(inner.function, tuple(tuple(each) for each in given), inner.vectors)
         name = f"pushed_{inner.function.__name__.strip('_')}_{step.line}"
-        self.walk.names[name] = forward(inner.function, inner.by, inner.vectors)
-        for target in step.targets:
-            self.count += 1
-            self.of[target] = f"change_{self.count}"
-        changes = [self._change_of(step, inner, path) for path in inner.by]
-        targets = [*step.targets, *(self.of[target] for target in step.targets)]
+        self.walk.names[name] = found.pushed
+        targets = list(step.targets)
+        for own, moved in zip(self.of, found.moved, strict=True):
+            for target, moves in zip(step.targets, moved, strict=True):
+                self.count += 1
+                targets.append(f"change_{self.count}")
+                if moves:
+                    own[target] = targets[-1]
+        changes = [change for each in given for change in each.values()]
         self.lines.append(f"{', '.join(targets)} = {name}({', '.join([*step.atoms, *changes])})")
 
-    def _change_of(self, step: Step, inner: Derivative, path: str) -> str:
-        head, dot, rest = path.partition(".")
-        return self._change(step.atoms[inner.arguments.index(head)] + dot + rest)
+
+def _place(step: Step, inner: Derivative, path: str) -> str:
+    """Return the name of what a step gives to an inner function as an argument, or a field of one."""
+    head, dot, rest = path.partition(".")
+    return step.atoms[inner.arguments.index(head)] + dot + rest

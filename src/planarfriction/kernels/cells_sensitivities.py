@@ -1,0 +1,127 @@
+"""Derivatives of roll-outs of cells by all numbers of their law, forward in time, in one pass.
+
+A step and what its derivatives share is computed once: for each number of the law a bristle carries its change. Those
+of `sigma_1` and `sigma_2` move no bristle.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planarfriction.compiler import jit, kernel
+from planarfriction.compiler.calls import pointer
+from planarfriction.compiler.memory import at
+from planarfriction.kernels import cells, distributed_step
+from planarfriction.kernels.bind import bind
+from planarfriction.kernels.cell_blocks import BLOCK, LANES, WEIGHT, Z, divided, lever_at, pair, put_pair
+from planarfriction.kernels.cells_rollout import _lay, _Model, _read, _write
+from planarfriction.kernels.forward import forwards
+from planarfriction.kernels.law import law_of
+from planarfriction.kernels.rollouts import row_of
+from planarfriction.kernels.vectors import add, plus, scatter, three
+
+_MOVING = "sigma_0", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
+PARAMETERS = (*_MOVING, "sigma_1", "sigma_2")
+"""Numbers of the law, those first that move bristles."""
+
+_BY = tuple((f"law.{name}", "z")[: 1 + (name in _MOVING)] for name in PARAMETERS)
+_pushed = forwards(distributed_step.cell, _BY, ("z", "u")).pushed
+
+_CHANGE, _PULL = BLOCK, BLOCK + 2 * LANES * len(_MOVING)
+"""Fields behind those of a block: changes of the state, and traction with its changes."""
+
+_ALL = _PULL + 2 * LANES * (1 + len(PARAMETERS))
+_SIZE = _ALL + LANES * (1 - _ALL // LANES % 2)
+"""Numbers of a block, an odd number of fields (see `cell_blocks`)."""
+
+
+@kernel
+def _change(block, n, i):
+    return pair(block, _CHANGE + 2 * n * LANES, i)
+
+
+@kernel
+def _push_one(lever, law, block, i, twist, dt):
+    found = _pushed(
+        law, pair(block, Z, i), lever.seen(lever_at(lever, block, i), twist), dt, 1.0, _change(block, 0, i), 1.0,
+        _change(block, 1, i), 1.0, _change(block, 2, i), 1.0, _change(block, 3, i), 1.0, _change(block, 4, i), 1.0,
+        _change(block, 5, i), 1.0, 1.0
+    )  # fmt: skip
+    put_pair(block, Z, i, found[0])
+    scatter(block, _CHANGE + i, LANES, found[2:14:2])
+    scatter(block, _PULL + i, LANES, found[1::2])
+
+
+@kernel
+def _push(lever, law, block, twist, dt, lanes):
+    for i in range(lanes):
+        _push_one(lever, law, block, i, twist, dt)
+
+
+@kernel
+def _total(lever, block, lanes, load, n):
+    """Return the wrench of a block, n = 0, or its change with the number n - 1 of the law.
+
+    The load is a factor inside the sum, so that what adds up blocks rounds alike in compiled code and outside.
+    """
+    total = (0.0, 0.0, 0.0)
+    for i in range(lanes):
+        pull = pair(block, _PULL + 2 * n * LANES, i)
+        total = plus(total, load * block[WEIGHT + i], lever.wrench(lever_at(lever, block, i), pull))
+    return total
+
+
+@kernel
+def _forget(block):
+    for i in range(2 * LANES):
+        block[Z + i] = 0.0
+    for i in range(_CHANGE, _PULL):
+        block[i] = 0.0
+
+
+@kernel
+def _follow(lever, law, block, inputs, b, k, lanes, wanted, wrench, slopes):
+    """Step block k of contact b through all steps: one block fits into the cache."""
+    twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
+    which, last = inputs.which[row_of(inputs.which, b)], -1
+    for t in range(inputs.dt.shape[0]):
+        if which[t] != last:
+            last = which[t]
+            for i in range(lanes):
+                block[WEIGHT + i] = inputs.shapes[0, last, k * lanes + i]
+        load = loads[t]
+        if load == 0.0:
+            _forget(block)
+            continue
+        _push(lever, law, block, three(twists[t]), inputs.dt[t], lanes)
+        add(wrench[t], _total(lever, block, lanes, load, 0))
+        for d in range(wanted.shape[0]):
+            change = _total(lever, block, lanes, load, 1 + wanted[d])
+            for m in range(3):
+                slopes[t, m, d] += change[m]
+
+
+@kernel
+def _sensitivities(lever, inputs, span, z, wanted, wrenches, slopes, scratch):
+    w, n, rows = pointer(scratch), z.shape[2] // 2, inputs.rows[0]
+    blocks, lanes = divided(inputs.shapes.shape[2])
+    for b in range(span[0], span[1]):
+        _lay(w, blocks, inputs.data, _SIZE)
+        _write(w, Z, z[0, b], n, _SIZE)
+        law = law_of(rows[row_of(rows, b)])
+        for k in range(blocks):
+            _follow(lever, law, at(w, k * _SIZE), inputs, b, k, lanes, wanted, wrenches[b], slopes[b])
+        _read(w, Z, z[0, b], n, _SIZE)
+
+
+def sensitivities(lever, inputs, span, z, wanted, wrenches, slopes):
+    """Run roll-outs with their derivatives by the numbers `wanted` of `PARAMETERS`.
+
+    They are added to `wrenches` [B, T, 3] and `slopes` [B, T, 3, len(wanted)]; `z` [1, B, 2 n] in place.
+    """
+    scratch = np.empty(divided(inputs.shapes.shape[2])[0] * _SIZE)
+    _sensitivities(lever, inputs, span, z, wanted, wrenches, slopes, scratch)
+
+
+ISOTROPIC = bind(sensitivities, _Model(cells.POSITIONS), "isotropic_sensitivities", jit)
+TURNED = bind(sensitivities, _Model(cells.LEVERS), "turned_sensitivities", jit)
