@@ -136,6 +136,8 @@ class System(Packed):
         sizes = n, int(contacts.state[n]), pressures, len(motion.breaks) - 1
         super().__init__(SystemRecord(contacts, motion, work.placed(self._block), *sizes, *addresses))
         self.contacts, self.motion, self.keepalive = contacts, motion, keepalive
+        self.wrench = self._block[work.slices["wrench"]].reshape(n, 3)
+        """Wrenches of the contacts per unit load, as they were last evaluated."""
 
 
 @kernel

@@ -22,13 +22,12 @@ VECTOR = 8
 LANES = 64
 """Most cells of a block: several of the longest vectors of processors, so that constants are read once for all."""
 
-Z, WEIGHT, BY_LOAD, BAR, OUT, LAW_BAR = (LANES * n for n in (5, 7, 8, 9, 11, 17))
+Z, WEIGHT, BY_LOAD, BAR, OUT = (LANES * n for n in (5, 7, 8, 9, 11))
 """Fields of a block behind the numbers of the levers: state, weights, their slopes by the load, cotangent or change of
-the state, what adds up over the cells (the wrench and its change; on the way back the cotangents of twist and load),
-and what adds up over the steps too: the cotangent of the law. Blocks share nothing, so that each is seen to be free of
-dependences."""
+the state, and the wrench with its change, which add up over the cells. Blocks share nothing, so that each is seen to be
+free of dependences."""
 
-BLOCK = LANES * 25
+BLOCK = LANES * 17
 """Numbers of a block: an odd number of fields, for if it were a power of two, blocks would drive each other out of the
 cache."""
 
@@ -80,17 +79,6 @@ def totals(w, blocks, field, lanes):
         block = at(w, k * BLOCK + field)
         for i in range(lanes):
             total = plus(total, 1.0, (block[i], block[LANES + i], block[2 * LANES + i]))
-    return total
-
-
-@kernel
-def total(w, blocks, field, lanes):
-    """Return the sum of a field over all cells."""
-    total = 0.0
-    for k in range(blocks):
-        block = at(w, k * BLOCK + field)
-        for i in range(lanes):
-            total += block[i]
     return total
 
 

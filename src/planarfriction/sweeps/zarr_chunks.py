@@ -74,7 +74,7 @@ class ChunkedArray:
         chunks = np.array(indices) // self._array.chunks[: self._swept]
         different, which = np.unique(chunks, axis=0, return_inverse=True)
         there = np.array([os.path.isfile(self._file(chunk)) for chunk in different.tolist()])
-        return {indices[i] for i in np.flatnonzero(~there[which.ravel()])}
+        return {indices[i] for i in np.flatnonzero(~there[which.ravel()]).tolist()}
 
     def _read(self, chunk: Index) -> np.ndarray:
         """Return the content of a chunk, fill values where it has none."""

@@ -72,10 +72,10 @@ def kernel_of(source: str, struct: Any) -> Any:
     """Return the kernel of native source with one thread for each contact of a `Batch`, or world of `Problems`."""
 
     @wp.func_native(source)
-    def advance(thread: wp.int32, batch: struct): ...  # pyright: ignore[reportGeneralTypeIssues]
+    def advance(thread: wp.int32, batch: struct): ...  # pyright: ignore[reportGeneralTypeIssues, reportInvalidTypeForm]
 
     @wp.kernel(enable_backward=False, module="unique")
-    def friction_step(batch: struct):  # pyright: ignore[reportGeneralTypeIssues]
+    def friction_step(batch: struct):  # pyright: ignore[reportGeneralTypeIssues, reportInvalidTypeForm]
         advance(wp.tid(), batch)
 
     return friction_step

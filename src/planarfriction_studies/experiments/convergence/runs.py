@@ -188,7 +188,7 @@ def _euler_part(contacts: Sequence[Contact], part: int, state: np.ndarray | None
         y[bristles : bristles + 3] = twists[k]
         right_hand_side(packed.system.address, 0, 0.0, y, rate)
         if k % stride == 0:
-            samples.append(packed.system.work.wrench.copy())
+            samples.append(packed.system.wrench.copy())
             y[:bristles][np.abs(y[:bristles]) < _NOTHING] = 0.0
         y[:bristles] += EULER_STEP * rate[:bristles]
     return {"wrench": np.array(samples), "state": y}
