@@ -222,7 +222,7 @@ def rollout_jvp(
 ) -> RolloutJVP:
     """Step a model as `rollout` does, with the change of the result for changes of the inputs (`tangent`).
 
-    Computed forward in time, at about six times the cost of `rollout_vjp`: it gives `J x` where that gives `J' x`.
+    Computed forward in time, at several times the cost of `rollout_vjp`: it gives `J x` where that gives `J' x`.
 
     Raises `InvalidValueError` as `rollout_vjp` does.
     """

@@ -39,7 +39,7 @@ U, SPEED, EFFECT, GRIP, DECAY_DT, LEFT, MEAN, FREE, NEW = (LANES * n for n in (1
 """Fields of the step; those that are vectors have two."""
 
 FIELDS = LANES * 27
-"""Where other fields may begin."""
+"""First number behind these fields, where others may begin."""
 
 # ---------------------------------------------------------------------- functions of a bristle
 

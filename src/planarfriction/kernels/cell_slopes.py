@@ -61,7 +61,7 @@ class StepBars(NamedTuple):
 
 _U_BAR, _BRISTLE_BAR, _SPEED_BAR, _GRIP_BAR = (cell_passes.FIELDS + LANES * n for n in (0, 2, 4, 5))
 _DEFLECTION_BAR, _ALONG_BAR, _DECAY_BAR, _START_BAR, _BOUND_BAR = (cell_passes.FIELDS + LANES * n for n in range(6, 11))
-"""Cotangents: of the deflection and of the decay those in turn, `_BOUND_BAR` of that deflection which bounds others."""
+"""Cotangents: of the deflection and of the decay those in turn, `_BOUND_BAR` of that which the cap starts from."""
 
 _WORK = cell_passes.FIELDS + LANES * 11
 
@@ -76,7 +76,7 @@ _forth_power, _back_power = _ways(cell_passes.power, ("speed", "law.v_s", "law.g
 _forth_grip, _back_grip = _ways(cell_passes.grip, ("effect", "law.sigma_0", "law.mu_c", "law.mu_s"))
 _forth_seen, _back_seen = _ways(bristle_step.seen, ("z", "size", "u", "q"), ("z", "u"))
 _forth_decay, _back_decay = _ways(cell_passes.decay, ("alpha", "along", "speed", "q"))
-_forth_bounded, _back_bounded = _ways(bristle_step.bounded, ("far", "start", "deflection"))
+_forth_bounded, _back_bounded = _ways(bristle_step.bounded, ("far", "start"))
 _forth_mean, _back_mean = _ways(cell_passes.mean_decay, ("start", "end"))
 _forth_capped, _back_capped = _ways(bristle_step.capped, ("free", "far", "deflection"), ("free",))
 _SIGMAS = "law.sigma_0", "law.sigma_1", "law.sigma_2"
@@ -165,8 +165,7 @@ def _look_ahead_back(lever, law, on, i):
     work, u = on.work, pair(on.work, U, i)
     far, start = work[AHEAD + SIZE + i] * work[GRIP + i], work[SEEN + DECAY + i]
     _, tape = _forth_bounded(far, start, on.dt, work[SEEN + DEFLECTION + i])
-    by_far, by_start, deflection = _back_bounded(tape, (work[_DEFLECTION_BAR + i],))
-    work[_BOUND_BAR + i] += deflection
+    by_far, by_start = _back_bounded(tape, (work[_DEFLECTION_BAR + i],))  # none by the bound, where alpha is held
     work[_DECAY_BAR + i] = work[_START_BAR + i] + by_start
     ahead = _look_back(on, AHEAD, plus(pair(on.block, Z, i), on.dt, u), by_far, i)
     accumulate(on.block, BAR + i, LANES, ahead)
