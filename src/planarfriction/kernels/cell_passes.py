@@ -16,6 +16,7 @@ from planarfriction.compiler.memory import at
 from planarfriction.kernels.bristle_step import bounded, capped, seen
 from planarfriction.kernels.cell_blocks import BLOCK, LANES, WEIGHT, Z, lever_at, pair, put_pair, room
 from planarfriction.kernels.contacts import traction
+from planarfriction.kernels.law import squared
 from planarfriction.kernels.vectors import norm, plus, times
 
 
@@ -192,7 +193,10 @@ def _settle(lever, law, on, i):
 def step(lever, law, on, lanes):
     """Write the fields of a step."""
     _drive(lever, law, on, lanes)
-    _fade(lever, law, on, lanes)
+    if law.gamma == 2.0:
+        _fade(lever, squared(law), on, lanes)
+    else:
+        _fade(lever, law, on, lanes)
     _hold(lever, law, on, lanes)
     _see(lever, law, on, lanes)
     _start(lever, law, on, lanes)

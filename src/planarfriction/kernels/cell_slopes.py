@@ -35,6 +35,7 @@ from planarfriction.kernels.cell_passes import (
     sum_over_cells,
 )
 from planarfriction.kernels.derive import derive
+from planarfriction.kernels.law import squared
 from planarfriction.kernels.rules import ratio, slip_slope
 from planarfriction.kernels.vectors import accumulate, dot, plus, times
 
@@ -227,6 +228,9 @@ def retreat(lever, law, block, lanes, held, pull, load):
     start = _start_back(lever, law, on, lanes)
     _see_back(lever, law, on, lanes)
     sigma_0, mu_c, mu_s = _hold_back(lever, law, on, lanes)
-    v_s, gamma = _fade_back(lever, law, on, lanes)
+    if law.gamma == 2.0:
+        v_s, gamma = _fade_back(lever, squared(law), on, lanes)
+    else:
+        v_s, gamma = _fade_back(lever, law, on, lanes)
     law_bar = by_spring + sigma_0, sigma_1, sigma_2, mu_c, mu_s, v_s, gamma, end[0] + ahead[0] + start[0]
     return StepBars(_drive_back(lever, law, on, lanes), by_load, law_bar)

@@ -34,7 +34,7 @@ from planarfriction.kernels.cell_passes import advance
 from planarfriction.kernels.cell_slopes import retreat
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.forward import forward
-from planarfriction.kernels.law import law_of, squared
+from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rollouts import row_of
 from planarfriction.kernels.vectors import add, plus, scatter, three, times
 
@@ -129,10 +129,7 @@ def _rollout(lever, inputs, span, z, wrench, states, scratch):
         law = law_of(rows[row_of(rows, b)])
         _lay(w, blocks, inputs.data)
         _write(w, Z, z[0, b], n)
-        if law.gamma == 2.0:
-            _roll(lever, squared(law), inputs, b, n, w, wrench[b], states[0, b])
-        else:
-            _roll(lever, law, inputs, b, n, w, wrench[b], states[0, b])
+        _roll(lever, law, inputs, b, n, w, wrench[b], states[0, b])
         _read(w, Z, z[0, b], n)
 
 
@@ -177,10 +174,7 @@ def _gradient(lever, inputs, states, wrench_bar, span, bars, scratch):
         before, row_bar = before[row_of(before, b)], bars.rows[0, b]
         _lay(w, blocks, inputs.data)
         _write(w, BAR, bars.state[0, b], n)
-        if law.gamma == 2.0:
-            by_law = _pull(lever, squared(law), inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b])
-        else:
-            by_law = _pull(lever, law, inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b])
+        by_law = _pull(lever, law, inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b])
         _read(w, BAR, bars.state[0, b], n)
         for m in range(len(by_law)):
             row_bar[COLUMNS[m]] += by_law[m]

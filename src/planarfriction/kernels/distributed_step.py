@@ -20,7 +20,7 @@ from planarfriction.kernels.cell_blocks import (
 )
 from planarfriction.kernels.cell_passes import advance, end_traction
 from planarfriction.kernels.general_cells import Bristle, slopes, slopes_of
-from planarfriction.kernels.law import grip, squared
+from planarfriction.kernels.law import grip
 from planarfriction.kernels.steps import step_functions
 from planarfriction.kernels.vectors import norm, plus, put, three
 
@@ -72,10 +72,7 @@ def _step(lever, law, own, z, twist, dt, new, out):
 def step(lever, contact, z, v, dt, new, out):
     """Advance the bristles by `dt` at a held twist (see `formulas.relaxation`), and write the wrench at the end."""
     own = cells.read(contact)
-    if own.law.gamma == 2.0:
-        _step(lever, squared(own.law), own, z, three(v), dt, new, out)
-    else:
-        _step(lever, own.law, own, z, three(v), dt, new, out)
+    _step(lever, own.law, own, z, three(v), dt, new, out)
 
 
 TEMPLATES = step, slopes
