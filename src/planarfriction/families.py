@@ -92,10 +92,10 @@ LAWS = Family(
     "law",
     {
         "lugre": ("LuGre bristles, plain or elasto-plastic, with Stribeck and viscous terms", "laws.lugre:LuGre"),
-        "dahl": ("Dahl's bristles: a force that depends on the distance, not on the speed", "laws.lugre:Dahl"),
+        "dahl": ("Dahl's bristles: a force that depends on the distance, not on the speed", "laws.dahl:Dahl"),
         "coulomb-stribeck": (
             "Coulomb with Stribeck and viscous terms, regularised by a creep speed",
-            "laws.lugre:CoulombStribeck",
+            "laws.coulomb_stribeck:CoulombStribeck",
         ),
     },
 )
@@ -103,11 +103,11 @@ LAWS = Family(
 SURFACES = Family(
     "limit surface",
     {
-        "cells": ("sum over the cells", "limit_surface.compiled:LimitSurfaceCells"),
+        "cells": ("sum over the cells", "limit_surface.cells:LimitSurfaceCells"),
         "exact": ("exact", "limit_surface.exact:LimitSurfaceExact"),
         "table": ("table, smooth", "limit_surface.table:LimitSurfaceTable"),
-        "table-published": ("table, as published", "limit_surface.table:LimitSurfaceTablePublished"),
-        "ellipsoid": ("ellipsoid", "limit_surface.compiled:LimitSurfaceEllipsoid"),
+        "table-published": ("table, as published", "limit_surface.table_published:LimitSurfaceTablePublished"),
+        "ellipsoid": ("ellipsoid", "limit_surface.ellipsoid:LimitSurfaceEllipsoid"),
         "quartic": ("convex quartic", "limit_surface.quartic:LimitSurfaceQuartic"),
     },
 )

@@ -52,7 +52,7 @@ def power(law, speed):
 
 
 @kernel
-def grip(law, effect):
+def grip_at(law, effect):
     """Return one over the steady deflection, from the Stribeck effect."""
     return law.sigma_0 / formulas.stribeck_at(effect, law)
 
@@ -123,7 +123,7 @@ def _fade(lever, law, on, i):
 @over_cells
 @kernel
 def _hold(lever, law, on, i):
-    on.work[GRIP + i] = grip(law, on.work[EFFECT + i])
+    on.work[GRIP + i] = grip_at(law, on.work[EFFECT + i])
 
 
 @kernel

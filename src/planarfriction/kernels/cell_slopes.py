@@ -74,7 +74,7 @@ def _ways(function: Any, by: tuple[str, ...], vectors: tuple[str, ...] = ()) -> 
 
 
 _forth_power, _back_power = _ways(cell_passes.power, ("speed", "law.v_s", "law.gamma"))
-_forth_grip, _back_grip = _ways(cell_passes.grip, ("effect", "law.sigma_0", "law.mu_c", "law.mu_s"))
+_forth_grip, _back_grip = _ways(cell_passes.grip_at, ("effect", "law.sigma_0", "law.mu_c", "law.mu_s"))
 _forth_seen, _back_seen = _ways(bristle_step.seen, ("z", "size", "u", "q"), ("z", "u"))
 _forth_decay, _back_decay = _ways(cell_passes.decay, ("alpha", "along", "speed", "q"))
 _forth_bounded, _back_bounded = _ways(bristle_step.bounded, ("far", "start"))

@@ -5,7 +5,9 @@ from typing import TYPE_CHECKING, Any
 from planarfriction.families import LAWS
 from planarfriction.laws.base import FrictionLaw
 from planarfriction.laws.coulomb import Coulomb
-from planarfriction.laws.lugre import CoulombStribeck, Dahl, ElastoPlastic, LuGre
+from planarfriction.laws.coulomb_stribeck import CoulombStribeck
+from planarfriction.laws.dahl import Dahl
+from planarfriction.laws.lugre import ElastoPlastic, LuGre
 
 if TYPE_CHECKING:
     from planarfriction.laws.rate_law import RateLaw

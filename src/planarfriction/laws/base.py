@@ -28,6 +28,13 @@ class FrictionLaw(Checked):
     def _repr_html_(self) -> str:
         return picture("law in a notebook", self)
 
+    def _settle_static(self: Any) -> None:
+        """Set a `mu_s` that is None to `mu_c`; raise for one below it."""
+        if self.mu_s is None:
+            self._set(mu_s=self.mu_c)
+        if self.mu_s < self.mu_c:
+            raise InvalidValueError("mu_s", "be >= mu_c", f"mu_s={self.mu_s}, mu_c={self.mu_c}")
+
     @property
     def numbers(self) -> LawNumbers:
         """The numbers that the law puts into the formulas; a new law of this form must define only this."""

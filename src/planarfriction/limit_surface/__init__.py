@@ -2,11 +2,13 @@
 
 from planarfriction.families import SURFACES
 from planarfriction.limit_surface.base import LimitSurface
+from planarfriction.limit_surface.cells import LimitSurfaceCells
 from planarfriction.limit_surface.comparison import SurfaceComparison
-from planarfriction.limit_surface.compiled import LimitSurfaceCells, LimitSurfaceEllipsoid
+from planarfriction.limit_surface.ellipsoid import LimitSurfaceEllipsoid
 from planarfriction.limit_surface.exact import LimitSurfaceExact
 from planarfriction.limit_surface.quartic import LimitSurfaceQuartic
-from planarfriction.limit_surface.table import LimitSurfaceTable, LimitSurfaceTablePublished
+from planarfriction.limit_surface.table import LimitSurfaceTable
+from planarfriction.limit_surface.table_published import LimitSurfaceTablePublished
 
 __all__ = [
     "SURFACES",

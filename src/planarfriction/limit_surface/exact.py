@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers, _norm
-from planarfriction.limit_surface.compiled import LimitSurfaceCells
+from planarfriction.limit_surface.cells import LimitSurfaceCells
 from planarfriction.limit_surface.loops import closed_forms as kernels
 from planarfriction.limit_surface.loops.twists import exact_twists
 from planarfriction.patch import SoftFinger, Uniform

@@ -15,8 +15,8 @@ from planarfriction import validation
 from planarfriction.errors import FrictionError, InvalidValueError, MissingExtraError
 from planarfriction.geometry import transformed
 from planarfriction.limit_surface.base import MOST_SEGMENTS, LimitSurface, _rows, scaling
+from planarfriction.limit_surface.cells import LimitSurfaceCells
 from planarfriction.limit_surface.comparison import directions
-from planarfriction.limit_surface.compiled import LimitSurfaceCells
 from planarfriction.limit_surface.loops.twists import BAD_WRENCH
 from planarfriction.patch import ContactPatch
 

@@ -1,4 +1,4 @@
-"""Stored limit surfaces: one that is smooth and exactly passive, and the one of the paper."""
+"""A stored limit surface that is smooth and exactly passive."""
 
 from __future__ import annotations
 
@@ -8,12 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.kernels import spin_sums
 from planarfriction.kernels import surfaces as kernels
 from planarfriction.limit_surface.base import MOST_SEGMENTS, SurfaceNumbers
 from planarfriction.limit_surface.compiled import CompiledLimitSurface
 from planarfriction.limit_surface.exact import STORED_RULES, LimitSurfaceExact
-from planarfriction.limit_surface.loops.published_twists import published_twists
 from planarfriction.limit_surface.loops.twists import table_twists
 from planarfriction.limit_surface.stored import cell_sums, stored_potential
 
@@ -62,54 +60,3 @@ class LimitSurfaceTable(CompiledLimitSurface):
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
         return table_twists(self._table, self._scaling, wrenches, found)
-
-
-@dataclass(frozen=True, eq=False)
-class LimitSurfaceTablePublished(CompiledLimitSurface):
-    """Stored limit surface as published: smoothed sums at `segments` x `4 segments` nodes, bilinear in the two angles.
-
-    The sums, and the contact radius, are blended over the corners of the grid cell that contains the centre of
-    rotation; interpolated values are not renormalised. The map has kinks and is not the gradient of a potential;
-    `LimitSurfaceTable` is. Patches without a grid (points) use the plain sums.
-
-    Raises InvalidValueError for an unsupported number of segments, and as every limit surface does.
-
-    Source: Waltersson and Karayiannidis 2024, section IV.
-    """
-
-    segments: int = 20
-    """Segments per quadrant [-]."""
-
-    kind = kernels.BILINEAR
-
-    def __post_init__(self) -> None:
-        self._set(segments=validation.count("segments", self.segments, 2, MOST_SEGMENTS))
-        super().__post_init__()
-
-    def _grid(self) -> tuple[tuple[float, float, float, float], np.ndarray]:
-        """Return the patch's grid about the centre of pressure, and new memory for the sums at its corners.
-
-        Compiled loops fill it as they go: two threads with one place would see each other's corners half done.
-        """
-        grid = self.patch.grid
-        if grid is None:
-            return (0.0, 0.0, 1.0, 1.0), np.full((0, 0, 3), np.nan)
-        x, y = self.centre_of_pressure
-        place = (float(grid.x_min - x), float(grid.y_min - y), float(grid.cell_width), float(grid.cell_height))
-        return place, np.full((grid.columns + 1, grid.rows + 1, 3), np.nan)
-
-    def _radius(self) -> float:
-        place, corners = self._grid()
-        return float(spin_sums.smoothed_spin_sum(corners, place, *self._loaded_cells(), 0.0, 0.0)[2])
-
-    @functools.cached_property
-    def numbers(self) -> SurfaceNumbers:
-        """`h` at the nodes."""
-        place, corners = self._grid()
-        nodes = np.zeros((self.segments + 1, 4 * self.segments + 1, 4))
-        spin_sums.smoothed_nodes(corners, place, *self._loaded_cells(), self.contact_radius, self.segments, nodes)
-        return SurfaceNumbers(self.kind, self.segments, nodes.reshape(-1))
-
-    def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
-        """Find twists; of several directions that answer because the map folds, take that of least dissipation."""
-        return published_twists(self.numbers.data, self.segments, self._scaling, wrenches, found)

@@ -19,10 +19,17 @@ from planarfriction.scenes.scene import Contact
 from planarfriction.scenes.signal import SAME_TIME, Signal, breaks_between, displacement
 from planarfriction.scenes.start import first_slopes, first_states
 
-__all__ = ["STATES", "centres_of_pressure", "packed_contact"]
-
 ROOM = 1_000_000
 """Numbers of weights that are in memory at a time."""
+
+SHAPE_INTERVAL = 1e-3
+"""Longest time [s] that a patch keeps its shape while the load it depends on changes; held loads need no limit."""
+
+BATCH = 4096
+"""Segments that are packed at a time; fewer where their shapes take more than `compiled.packed.MAX_PACK_BYTES`."""
+
+MOST_PIECES = 10**12
+"""Segments of a motion, each of which the solver has to stop at."""
 
 
 def packed_contact(
@@ -47,16 +54,6 @@ def centres_of_pressure(contact: Contact, beside: np.ndarray, load: np.ndarray) 
         some = slice(first, first + most)
         found[some] = patch.weights(load[some], moments[some]) @ patch.positions
     return found
-
-
-SHAPE_INTERVAL = 1e-3
-"""Longest time [s] that a patch keeps its shape while the load it depends on changes; held loads need no limit."""
-
-BATCH = 4096
-"""Segments that are packed at a time; fewer where their shapes take more than `compiled.packed.MAX_PACK_BYTES`."""
-
-MOST_PIECES = 10**12
-"""Segments of a motion, each of which the solver has to stop at."""
 
 
 class PackedScene(NamedTuple):
