@@ -11,6 +11,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from planarfriction import formulas
+from planarfriction.compiler.inner import Inner
 from planarfriction.compiler.machine_code import Sources, kept
 
 FOLDERS = ("compiler", "kernels", "limit_surface/loops", "adapters/mujoco/loops")
@@ -41,10 +42,9 @@ def jit(function: Any) -> Any:
 # functions allocate nothing and keep no array, so they need no counting; they are called from compiled code only.
 _INNER = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
-# Inlined everywhere: a function left standing alone is optimised once by itself and once more in the module of each
-# caller. In the process that compiles, the first of these copies is called, and from the cache another: they differ in
-# the last bits. It is faster too, a third in the solver on three states.
-kernel: Any = functools.partial(njit, forceinline=True, **_INNER, **_OPTIONS)
+# Inlined everywhere: what stands alone is optimised by itself and again in the module of each caller, and rounds in
+# the process that compiles otherwise than from the cache. It is faster too, a third in the solver on three states.
+kernel: Any = functools.partial(njit, forceinline=True, pipeline_class=Inner, **_INNER, **_OPTIONS)
 """Compile an inner function into each of its callers: no allocation, no array assignments that might need a copy."""
 
 
@@ -59,4 +59,4 @@ def callback(function: Any) -> Any:
 
 
 for _name, _formula in inspect.getmembers(formulas, inspect.isfunction):
-    register_jitable(forceinline=True, **_INNER, **_OPTIONS)(_formula)
+    register_jitable(forceinline=True, pipeline_class=Inner, **_INNER, **_OPTIONS)(_formula)

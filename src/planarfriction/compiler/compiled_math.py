@@ -13,6 +13,7 @@ from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
+from planarfriction.compiler.inner import Inner
 from planarfriction.formulas import LARGEST
 
 # Not `reassoc`: the two-part constants of the argument reductions rely on the order of operations.
@@ -20,6 +21,7 @@ _inline = njit(
     error_model="numpy",
     fastmath={"contract"},
     forceinline=True,
+    pipeline_class=Inner,
     _nrt=False,
     no_cpython_wrapper=True,
     no_cfunc_wrapper=True,
