@@ -1,0 +1,39 @@
+"""The search for the least sum of squares: where it ends, and what it keeps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from planarfriction.identify.search import _Descent
+
+SHARE, LEFT = 1e-6, 3.0
+ANYWHERE = np.array([-np.inf]), np.array([np.inf])
+
+
+def descend(promised: float) -> tuple[_Descent, list[float]]:
+    """Search for the number 1 beside a residual that nothing changes, whose derivative promises a change."""
+    tried = []
+
+    def residuals(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        tried.append(float(x[0]))
+        return np.array([x[0] - 1.0, LEFT]), np.array([[1.0], [promised]])
+
+    descent = _Descent(residuals, np.array([5.0]), SHARE)
+    descent.run(ANYWHERE)
+    return descent, tried
+
+
+def test_a_search_finds_the_minimum_and_keeps_the_best_point():
+    descent, tried = descend(0.0)
+    assert descent.x[0] == pytest.approx(1.0, abs=1e-9)
+    assert descent.cost == pytest.approx(0.5 * LEFT**2, rel=1e-12)
+    assert len(tried) <= 4
+
+
+@pytest.mark.parametrize("promised", [1e-3, 1e-4])
+def test_a_search_ends_where_a_promised_gain_is_not_there(promised):
+    descent, tried = descend(promised)
+    assert abs(descent.x[0] - 1.0) <= 2.0 * LEFT * promised  # where the promise would be kept
+    assert 0.5 * LEFT**2 <= descent.cost <= 0.5 * LEFT**2 * (1.0 + 10.0 * SHARE)
+    assert len(tried) <= 4
