@@ -73,25 +73,28 @@ def _show(words: str) -> None:
 
 
 def _parts() -> list[Part]:
+    """Return parts in an order in which neighbours share functions, which one process then compiles once for them."""
     patch, law = ContactPatch.disc(radius=0.01, cells=5), LuGre(mu_s=1.2, elasto_plastic=0.9)
-    kinds = {name: MODELS[name](patch, law) for name in ("distributed", "reduced", "reduced-published")}
-    in_parts = models.ReducedModel(patch, law, parts=1)
-    rolled = {name: kinds[name] for name in ("distributed", "reduced-published")} | {"reduced in one part": in_parts}
-    sum_of_parts = models.ReducedModel(patch, law, parts=2)
+    cells, reduced, published = (MODELS[name](patch, law) for name in ("distributed", "reduced", "reduced-published"))
     grooved = models.DistributedModel(patch.with_friction_metric(friction_metric(0.0, along=1.0, across=0.8)), law)
-    rolled["friction with a grain"] = grooved
+    whole, halved = (models.ReducedModel(patch, law, parts=parts) for parts in (1, 2))
     return [
-        *(Part(f"scenes, {name}", functools.partial(_simulate, model)) for name, model in kinds.items()),
-        Part("scenes, friction with a grain", functools.partial(_simulate, grooved)),
-        Part("scenes, reduced in parts", functools.partial(_derive, sum_of_parts)),
-        *(Part(f"steps, {name}", functools.partial(_step, model)) for name, model in kinds.items()),
-        Part("coupled patches", functools.partial(_couple, [*kinds.values(), grooved])),
+        *_of(cells, "distributed", *_WORK),
+        *_of(grooved, "friction with a grain", "scenes", "roll-outs"),
+        *_of(reduced, "reduced", "scenes", "steps", "derivatives of scenes"),
+        Part("coupled patches", functools.partial(_couple, [cells, reduced, published, grooved])),
         *([Part("steps inside MuJoCo", _host)] if find_spec("mujoco") else []),
-        *(Part(f"roll-outs, {name}", functools.partial(_roll, model)) for name, model in rolled.items()),
-        *(Part(f"derivatives of scenes, {name}", functools.partial(_derive, model)) for name, model in kinds.items()),
-        Part("derivatives of scenes in reverse", functools.partial(_reverse, kinds["reduced"])),
+        *_of(halved, "reduced in parts", "derivatives of scenes"),
+        Part("derivatives of scenes in reverse", functools.partial(_reverse, reduced)),
+        *_of(whole, "reduced in one part", "roll-outs"),
+        *_of(published, "reduced-published", *_WORK),
         Part("limit surfaces", functools.partial(_surfaces, patch)),
     ]
+
+
+def _of(model: Any, name: str, *kinds: str) -> list[Part]:
+    """Return parts of these kinds of work with a model."""
+    return [Part(f"{kind}, {name}", functools.partial(_WORK[kind], model)) for kind in kinds]
 
 
 def _simulate(model: Any) -> None:
@@ -144,3 +147,7 @@ def _surfaces(patch: ContactPatch) -> None:
         surface = kind(patch)
         surface.jacobian((0.01, 0.0, 1.0))
         surface.twist(surface.wrench((0.01, 0.0, 1.0)))
+
+
+_WORK = {"scenes": _simulate, "steps": _step, "roll-outs": _roll, "derivatives of scenes": _derive}
+"""Kinds of work with a model."""

@@ -45,7 +45,7 @@ _INNER = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 # Inlined everywhere: what stands alone is optimised by itself and again in the module of each caller, and rounds in
 # the process that compiles otherwise than from the cache. It is faster too, a third in the solver on three states.
 kernel: Any = functools.partial(njit, forceinline=True, pipeline_class=Inner, **_INNER, **_OPTIONS)
-"""Compile an inner function into each of its callers: no allocation, no array assignments that might need a copy."""
+"""Compile an inner function into each of its callers: no allocation, no closures, no array assignments that copy."""
 
 
 def entry(function: Any) -> Any:
