@@ -455,6 +455,49 @@ def test_short_runs_are_handed_out_together_and_long_ones_alone():
         np.testing.assert_array_equal(data.y, pf.sweep(grip, {"grip": grips}, measure=end).y)
 
 
+def test_batches_become_smaller_towards_the_end_so_that_workers_end_together():
+    with Handed() as pool:
+        pf.sweep(grip, {"grip": np.linspace(1.0, 2.0, 40).tolist()}, executor=pool, measure=end)
+    assert pool.batches[-1] == 1 < max(pool.batches)
+
+
+class Silent(concurrent.futures.Executor):
+    """Tells no number of workers, and does nothing before it is asked to; records how much it holds."""
+
+    def __init__(self) -> None:
+        self.held: list[tuple] = []
+        self.batches: list[int] = []
+
+    def submit(self, function, batch):
+        future = concurrent.futures.Future()
+        self.held.append((future, function, batch))
+        self.batches.append(len(batch.scenes))
+        return future
+
+    def work(self) -> None:
+        """Do what is held, the first of it after a while in which nothing more comes."""
+        count = -1
+        while count < len(self.held):
+            count = len(self.held)
+            time.sleep(0.3)
+        self.before = count
+        while self.held or sum(self.batches) < 300:
+            if self.held:
+                future, function, batch = self.held.pop(0)
+                future.set_result(function(batch))
+
+
+def test_an_executor_that_tells_no_number_of_workers_gets_single_runs_until_the_first_has_ended():
+    pool = Silent()
+    worker = threading.Thread(target=pool.work, daemon=True)
+    worker.start()
+    data = pf.sweep(grip, {"grip": np.linspace(1.0, 2.0, 300).tolist()}, executor=pool, measure=end)
+    worker.join()
+    assert pool.before == 64
+    assert set(pool.batches[:64]) == {1} != set(pool.batches[64:])
+    assert (data.status == "success").all()
+
+
 def test_what_cannot_be_sent_fails_alone():
     values = {"grip": [*np.linspace(1.0, 2.0, 40).tolist(), 3.0, *np.linspace(4.0, 5.0, 9).tolist()]}
     with Handed(refused=3.0) as pool:

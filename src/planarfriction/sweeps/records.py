@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 FAILED = "failed"
 """Status of a run that ended with an error; the others are those of a `Solution`."""
 
-TURN = 0.1
+TURN = 0.25
 """Time after which a worker hands back what it has [s]: short to whoever waits, long beside handing over."""
 
 _META = "planarfriction"

@@ -41,7 +41,7 @@ _BETWEEN = 0.5
 
 _AHEAD, _WORKERS = 2, 64
 """Number of batches of runs that wait for each worker of an executor, so that none is idle and little memory is used,
-and number of workers of an executor that does not tell it."""
+and number of workers of an executor that does not tell it: each gets one run until the first has ended."""
 
 _BATCH = 64
 """Largest number of runs that are handed out together."""
@@ -234,21 +234,24 @@ class Sweeping:
         """Do all runs that are not done, so few at a time that the use of memory does not grow."""
         try:
             if executor is not None:
-                self._go(executor, _AHEAD * (getattr(executor, "_max_workers", None) or _WORKERS), None)
+                self._go(executor, getattr(executor, "_max_workers", None), None)
                 return
             workers = threads.processors()
             with ThreadPoolExecutor(workers, "sweep") as own:
-                self._go(own, _AHEAD * workers, self._stopped.is_set)
+                self._go(own, workers, self._stopped.is_set)
         finally:
             self._book.flush(at_once=True)
 
-    def _go(self, executor: Executor, most: int, stopped: Callable[[], bool] | None) -> None:
+    def _go(self, executor: Executor, workers: int | None, stopped: Callable[[], bool] | None) -> None:
         pending: dict[Future, list[_Job]] = {}
+        most = workers or _WORKERS
         done: queue.SimpleQueue[Future] = queue.SimpleQueue()
         jobs, again = self._jobs(), []
         try:
             while True:
-                batch = again.pop() if again else list(itertools.islice(jobs, self._size))
+                batch = []
+                if len(pending) < most * (_AHEAD if self._book.new else 1):
+                    batch = again.pop() if again else list(itertools.islice(jobs, self._share(workers, pending)))
                 if batch:
                     try:
                         scenes = [scene for *_, scene in batch]
@@ -259,7 +262,7 @@ class Sweeping:
                     future.add_done_callback(done.put)
                 elif not pending:
                     break
-                if not batch or len(pending) >= most or not done.empty():
+                if not batch or not done.empty():
                     again += self._collect(done, pending)
         except BaseException:
             self._stopped.set()
@@ -271,6 +274,13 @@ class Sweeping:
             raise
         finally:
             self._tell(at_once=True)
+
+    def _share(self, workers: int | None, pending: dict[Future, list[_Job]]) -> int:
+        """Return how many runs to hand out together: fewer towards the end, where workers are to end together."""
+        if workers is None:
+            return self._size
+        left = self._grid.size - self._book.found - self._book.new - sum(map(len, pending.values()))
+        return min(self._size, 1 + left // (_AHEAD * workers))
 
     def _jobs(self) -> Iterator[_Job]:
         """Yield the runs that are to be done, after noting those that are found, or have no scene, on the way."""
