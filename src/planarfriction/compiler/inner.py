@@ -66,7 +66,6 @@ class _Lowering(typed_passes.NativeLowering):
         made = state.cr.fndesc
         key = _dynfunc.make_function(made.lookup_module(), made.qualname, "", _REFUSE, state.cr.env, (state.library,))
         state.targetctx.insert_user_function(key, made, [state.library])
-        state.reload_init.extend(state.library._reload_init)
         state.cr = state.cr._replace(cfunc=key)
         return True
 
