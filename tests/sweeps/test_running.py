@@ -455,7 +455,7 @@ def test_short_runs_are_handed_out_together_and_long_ones_alone():
         np.testing.assert_array_equal(data.y, pf.sweep(grip, {"grip": grips}, measure=end).y)
 
 
-def test_batches_become_smaller_towards_the_end_so_that_workers_end_together():
+def test_batches_become_smaller_towards_the_end():
     with Handed() as pool:
         pf.sweep(grip, {"grip": np.linspace(1.0, 2.0, 40).tolist()}, executor=pool, measure=end)
     assert pool.batches[-1] == 1 < max(pool.batches)
@@ -487,7 +487,7 @@ class Silent(concurrent.futures.Executor):
                 future.set_result(function(batch))
 
 
-def test_an_executor_that_tells_no_number_of_workers_gets_single_runs_until_the_first_has_ended():
+def test_an_executor_of_unknown_size_gets_single_runs_at_first():
     pool = Silent()
     worker = threading.Thread(target=pool.work, daemon=True)
     worker.start()
