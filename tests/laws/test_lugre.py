@@ -172,7 +172,9 @@ def test_coulomb_wrench_is_the_surface_scaled():
     assert not wrench[1].any()  # at rest
     assert not wrench[2].any()  # without load
     assert pf.Coulomb(0.3).wrench(surface, twist[0], load).shape == (3, 3)  # batch axes broadcast
-    assert pf.Coulomb(0.3).wrench(surface, (0.1, 0.0, 0.0), 1.0) == pytest.approx([-0.3, 0.0, 0.0], abs=1e-16)
+    assert pf.Coulomb(0.3).wrench(surface, (0.1, 0.0, 0.0), 1.0) == pytest.approx(
+        [-0.3, 0.0, 0.0], rel=1e-15, abs=1e-16
+    )
 
 
 # ---------------------------------------------------------------------- wrong input
