@@ -88,7 +88,7 @@ def _follow(lever, law, block, inputs, b, k, lanes, wanted, wrench, slopes):
         if which[t] != last:
             last = which[t]
             for i in range(lanes):
-                block[WEIGHT + i] = inputs.shapes[0, last, k * lanes + i]
+                block[WEIGHT + i] = inputs.shapes[last, k * lanes + i]
         load = loads[t]
         if load == 0.0:
             _forget(block)
@@ -103,23 +103,23 @@ def _follow(lever, law, block, inputs, b, k, lanes, wanted, wrench, slopes):
 
 @kernel
 def _sensitivities(lever, inputs, span, z, wanted, wrenches, slopes, scratch):
-    w, n, rows = pointer(scratch), z.shape[2] // 2, inputs.rows[0]
-    blocks, lanes = divided(inputs.shapes.shape[2])
+    w, n, rows = pointer(scratch), z.shape[1] // 2, inputs.rows
+    blocks, lanes = divided(inputs.shapes.shape[1])
     for b in range(span[0], span[1]):
         _lay(w, blocks, inputs.data, _SIZE)
-        _write(w, Z, z[0, b], n, _SIZE)
+        _write(w, Z, z[b], n, _SIZE)
         law = law_of(rows[row_of(rows, b)])
         for k in range(blocks):
             _follow(lever, law, at(w, k * _SIZE), inputs, b, k, lanes, wanted, wrenches[b], slopes[b])
-        _read(w, Z, z[0, b], n, _SIZE)
+        _read(w, Z, z[b], n, _SIZE)
 
 
 def sensitivities(lever, inputs, span, z, wanted, wrenches, slopes):
     """Run roll-outs with their derivatives by the numbers `wanted` of `PARAMETERS`.
 
-    They are added to `wrenches` [B, T, 3] and `slopes` [B, T, 3, len(wanted)]; `z` [1, B, 2 n] in place.
+    They are added to `wrenches` [B, T, 3] and `slopes` [B, T, 3, len(wanted)]; `z` [B, 2 n] in place.
     """
-    scratch = np.empty(divided(inputs.shapes.shape[2])[0] * _SIZE)
+    scratch = np.empty(divided(inputs.shapes.shape[1])[0] * _SIZE)
     _sensitivities(lever, inputs, span, z, wanted, wrenches, slopes, scratch)
 
 
