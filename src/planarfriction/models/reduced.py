@@ -1,21 +1,22 @@
-"""The reduced model: a few bristles that stand for the patch, or the moments of all in a few parts."""
+"""The reduced model: a few bristles that stand for the patch."""
 
 from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from planarfriction import validation
 from planarfriction.compiled.base import CompiledModel
 from planarfriction.equality import ByValue
+from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
 from planarfriction.models.base import FrictionModel, ModelJacobians
 from planarfriction.models.distributed import DistributedModel
-from planarfriction.models.moments import MomentModel, check_maps
 from planarfriction.patch import ContactPatch
 from planarfriction.patch import compressed_rows as rows
 from planarfriction.patch.compressed import WeightProblem, chosen_cells
@@ -206,56 +207,35 @@ FEWEST = 9
 
 @dataclass(frozen=True, eq=False)
 class ReducedModel(FrictionModel):
-    """Reduced LuGre friction: bristles on a few cells of the patch, or the moments of all bristles in a few parts.
+    """Reduced LuGre friction: bristles on a few cells of the patch that stand for those of all.
 
-    By default the bristles of a few `cells` stand for those of all. Their weights keep the moments of the pressure up
-    to the second degree, the wrench of a spin, and nearly the limit surface (see `ContactPatch.compressed`). Equations
-    are those of `DistributedModel`, and the state is `[2, n]` [m], x then y: the patch lets go where that model does.
+    The weights of the few `cells` keep the moments of the pressure up to the second degree, the wrench of a spin, and
+    nearly the limit surface (see `ContactPatch.compressed`). Equations are those of `DistributedModel`, and the state
+    is `[2, n]` [m], x then y: the patch lets go where that model does.
 
-    With `parts`, the states are the first moments of the bristle field in each of so many compact parts, `[3]` or
-    `[parts, 3]` [m]: fewer states, steady sliding and pre-sliding stiffness exact, but one threshold for all cells of a
-    part (see `MomentModel`).
-
-    Raises InvalidValueError for settings out of range, and in parts for a patch with all of its load on one cell, more
-    parts than cells, and laws that creep.
+    Raises InvalidValueError for a number of cells out of range.
     """
+
+    REPLACED: ClassVar[tuple[str, ...]] = ("parts", "segments", "speeds", "load_error")
+    """Options of the moments of bristles in parts, which stood here before; few cells took their place."""
 
     _: KW_ONLY
     cells: int = 56
     """Number of cells that have bristles, twice as many if the shape of the patch depends on the load."""
-    parts: Any = None
-    """Number of compact parts with moments of their own, or "auto" (4 to 8); None: bristles on a few cells."""
-    segments: int = MomentModel.segments
-    """Squares of the map of a part along a quarter of a face of its cube; 24 give a median error of 1e-5 of z_ss."""
-    speeds: int = MomentModel.speeds
-    """Number of speeds in the map of a part, for the Stribeck effect."""
-    load_error: float = MomentModel.load_error
-    """Largest error of z_ss from interpolating maps over the load, of each part relative to the whole patch [-]; 0
-    computes a map for each load, which is slow."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "cells", validation.count("cells", self.cells, FEWEST))
-        check_maps(self)
-        if self.parts is not None:
-            for name in ("parts", "segments", "speeds", "load_error"):
-                object.__setattr__(self, name, getattr(self.reduction, name))
         _ = self.reduction
 
     @functools.cached_property
-    def reduction(self) -> DistributedModel | MomentModel:
-        """Model that stands for the patch: the distributed model on a few cells, or the moments of parts.
-
-        Raises InvalidValueError as the class does.
-        """
-        if self.parts is None:
-            return DistributedModel(few_cells(self.patch, self.cells), self.law)
-        maps = {"segments": self.segments, "speeds": self.speeds, "load_error": self.load_error}
-        return MomentModel(self.patch, self.law, parts=self.parts, **maps)
+    def reduction(self) -> DistributedModel:
+        """Distributed model on a few cells that stand for the patch."""
+        return DistributedModel(few_cells(self.patch, self.cells), self.law)
 
     @property
     def state_shape(self) -> tuple[int, ...]:
-        """`(2, n)` for n cells; `(3,)` or `(parts, 3)` with parts."""
+        """`(2, n)` for n cells."""
         return self.reduction.state_shape
 
     @property
@@ -277,9 +257,24 @@ class ReducedModel(FrictionModel):
         return changed
 
     def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:
-        if isinstance(self.reduction, MomentModel):
-            return self.reduction._state_of(deflections, load)
         return _of_few(self.reduction, self.patch, deflections, load)
+
+
+def _refusing_replaced(init: Callable[..., None]) -> Callable[..., None]:
+    """Return the constructor of `ReducedModel` with one clear line for options that were replaced."""
+
+    @functools.wraps(init)
+    def checked(self: ReducedModel, *given: Any, **options: Any) -> None:
+        for name in self.REPLACED:
+            if name in options:
+                rule = "be left out: write cells=, the number of cells that have bristles"
+                raise InvalidValueError(name, rule, options[name])
+        init(self, *given, **options)
+
+    return checked
+
+
+ReducedModel.__init__ = _refusing_replaced(ReducedModel.__init__)
 
 
 def _of_few(few: DistributedModel, patch: Any, deflections: np.ndarray, load: float) -> np.ndarray:
