@@ -62,7 +62,7 @@ def test_a_shaken_gripper_keeps_what_it_holds(integrator):
 @pytest.mark.parametrize(
     ("kind", "start"),
     [
-        *((pf.models.MomentModel, start) for start in mujoco_scenes.STARTS),
+        *((pf.ReducedModel, start) for start in mujoco_scenes.STARTS),
         (pf.DistributedModel, mujoco_scenes.STARTS[0]),
         *(pytest.param(pf.DistributedModel, start, marks=SLOW) for start in mujoco_scenes.STARTS[1:]),
     ],
@@ -120,7 +120,7 @@ def test_the_published_plate_moves_in_the_hand_as_in_the_solver(load):
 @pytest.mark.parametrize("sigma_0", [1e4, 1e6])
 def test_grips_are_quiet_at_every_time_step_that_normal_contact_allows(sigma_0, sigma_1):
     law = pf.LuGre(mu_c=1.0, mu_s=1.0, sigma_0=sigma_0, sigma_1=sigma_1, sigma_2=0.0, elasto_plastic=0.9)
-    model = pf.ReducedModel(pf.ContactPatch.disc(radius=0.01, cells=9), law, parts=1)
+    model = pf.ReducedModel(pf.ContactPatch.disc(radius=0.01, cells=9), law)
     scene = dataclasses.replace(mujoco_scenes.grip(), time=0.8)
     for dt in (5e-4, 2e-3, 5e-3, 1e-2):
         m, d, friction = scene.ours(dt, model=model)

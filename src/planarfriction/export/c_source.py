@@ -23,6 +23,11 @@ LEAST = 1.2e-38
 """Least positive constant of single precision: thresholds below it are raised."""
 
 
+def comment(text: str) -> str:
+    """Return a text that stays within a comment, on its line."""
+    return ascii(text)[1:-1].replace("*/", "* /").replace("/*", "/ *")
+
+
 class Writer:
     """Differences between precisions: constants and the names of mathematical functions."""
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from planarfriction.compiler import compiled_math, memory
 from planarfriction.export.trace import CompiledMathematics, Mathematics, Number, Table, flat
-from planarfriction.kernels import hermite, published_contact, reduced_contact, vectors
+from planarfriction.kernels import hermite, published_contact, vectors
 
 
 def _plus(a: Any, c: Any, b: Any) -> Any:
@@ -92,18 +92,6 @@ def _patch(data: Any, at: Any, node: int, row: int, u: Any, v: Any) -> tuple:
     return tuple(_read(lambda place, n: data[place + n], at, node, row, weights) for weights in _weights(u, v))
 
 
-def _patch_of_levels(data: Any, at: Any, node: int, row: int, t: tuple, t_slopes: tuple, u: Any, v: Any) -> tuple:
-    """Return what `hermite.patch_of_levels` does."""
-
-    def mixed(weights: tuple) -> Callable[[Any, int], Any]:
-        return lambda place, n: _dot(weights, [data[place + 12 * k + n] for k in range(4)])
-
-    by_value, by_u, by_v = _weights(u, v)
-    value = mixed(t)
-    read = [_read(value, at, node, row, weights) for weights in (by_value, by_u, by_v)]
-    return (*read, _read(mixed(t_slopes), at, node, row, by_value))
-
-
 _TWINS: dict[int, Any] = {
     id(own): twin
     for own, twin in (
@@ -122,9 +110,7 @@ _TWINS: dict[int, Any] = {
         (vectors.put_all, _put),
         (memory.at, _At),
         (published_contact.read, lambda record: record),
-        (reduced_contact.read, lambda record: record),
         (hermite.patch, _patch),
-        (hermite.patch_of_levels, _patch_of_levels),
     )
 }
 """Twins by the `id` of what they stand for; those of functions are added as they are made."""
