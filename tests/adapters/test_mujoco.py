@@ -211,7 +211,7 @@ def test_other_models_are_left_alone_and_copies_are_not():
 
 def test_another_model_of_the_same_size_is_not_served():
     """It has the same joints and user data, and pads with other friction; a model prepared for the same is a copy."""
-    scene = mujoco_scenes.grip()
+    scene = dataclasses.replace(mujoco_scenes.grip(), model=PAD)
     friction = _held(scene)[2]
     law = dataclasses.replace(LAW, mu_c=0.4)
     m, other, slippery = scene.ours(model=pf.ReducedModel(PAD.patch, law))

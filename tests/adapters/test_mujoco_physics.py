@@ -59,19 +59,12 @@ def test_a_shaken_gripper_keeps_what_it_holds(integrator):
     assert np.ptp(places[-steps:], axis=0).max() <= 1e-6
 
 
-@pytest.mark.parametrize(
-    ("kind", "start"),
-    [
-        *((pf.ReducedModel, start) for start in mujoco_scenes.STARTS),
-        (pf.DistributedModel, mujoco_scenes.STARTS[0]),
-        *(pytest.param(pf.DistributedModel, start, marks=SLOW) for start in mujoco_scenes.STARTS[1:]),
-    ],
-)
-def test_a_disc_slides_and_spins_to_rest_where_theory_says(kind, start):
+@pytest.mark.parametrize("start", mujoco_scenes.STARTS)
+def test_a_disc_slides_and_spins_to_rest_where_theory_says(start):
     """Less the stepper's own `v dt/2`; sliding and spinning end together."""
     dt, (speed, spin) = 2e-3, start
     scene = mujoco_scenes.disc(speed, spin)
-    m, d, friction = scene.ours(dt, model=kind(scene.model.patch, scene.model.law))
+    m, d, friction = scene.ours(dt, model=pf.DistributedModel(scene.model.patch, scene.model.law))
     velocities = []
 
     def step():
