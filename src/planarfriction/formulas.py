@@ -160,6 +160,9 @@ def cap(xp, deflection, largest):
 DISC_A, DISC_B, DISC_C = 1.41004444 - 12.0 / 7.0, 1.41004444, 2.28646589
 """Coefficients of the mean speed of a disc, fitted to its elliptic integral (see `disc_friction`)."""
 
+FAINT = 1e-300
+"""Square of a speed up to which a disc is at rest: its inverse is a number."""
+
 UNEVEN = 1.2
 """Unevenness of the bristles inside a disc [-]: 1 for a rigid field, more takes off a small delay of slip."""
 
@@ -173,9 +176,9 @@ def disc_friction(xp, slide, spin):
     `h = 7/36 ((A - B) e_1 - 2 C e_2 - A C e_3)`. Within 0.0085 of the exact disc. ("Discs")
     """
     total = slide + spin
-    per = 1.0 / xp.where(total > 0.0, total, 1.0)
-    x, y = slide * per, spin * per
-    y = xp.where(total > 0.0, y, 1.0)
+    moves = total > FAINT
+    per = 1.0 / xp.where(moves, total, 1.0)
+    x, y = slide * per, xp.where(moves, spin * per, 1.0)
     xx, xy, yy = x * x, x * y, y * y
     scale = 1.0 / (yy + (DISC_B * xy + DISC_C * xx))
     e_1, e_2, e_3 = yy * scale, xy * scale, xx * scale

@@ -13,7 +13,7 @@ import numpy as np
 from planarfriction import validation, writing
 from planarfriction.compiler import compiled_math
 from planarfriction.errors import InvalidValueError
-from planarfriction.export.c_source import Writer, comment, of_compiled, passes_of
+from planarfriction.export.c_source import SQRT, Writer, comment, of_compiled, passes_of
 from planarfriction.export.c_values import Array, Fixed, Scalar
 from planarfriction.export.loops import Loops
 from planarfriction.export.pieces import Pieces, pieces_of
@@ -167,8 +167,9 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, grip: dict, ki
     vector = Writer(precision, own=precision == "double")
     share = "(at->low[k] + at->part * (at->high[k] - at->low[k]))" if pieces.rungs else "share[k]"
     passes = passes_of(vector, pieces.step, pieces.count, _places(pieces), "shares[k]")
-    own = {each: "\n".join(of_compiled(getattr(compiled_math, each))) for each in ("exp", "sin")}
-    own = {each: lines for each, lines in own.items() if passes and f"{each}_of(" in "".join([passes.shared, *passes.each])}
+    bodies = {"exp": of_compiled(compiled_math.exp), "sin": of_compiled(compiled_math.sin), "sqrt": SQRT}
+    stepping = "".join([passes.shared, *passes.each]) if passes else ""
+    own = {each: "\n".join(lines) for each, lines in bodies.items() if f"{each}_of(" in stepping}
     values = (
         functions
         | grip

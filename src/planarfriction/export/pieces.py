@@ -12,7 +12,8 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.export.trace import Block, Mathematics, Number, Table, Trace, traced
 from planarfriction.export.twins import twin
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, cells_rollout, distributed_step, moment_steps, published_step
+from planarfriction.kernels import cells, cells_rollout, disc_cells, discs, distributed_step, moment_steps, published_step
+from planarfriction.kernels.derive import derive
 from planarfriction.kernels.law import grip
 from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, Root
 from planarfriction.kernels.rules import ratio
@@ -129,36 +130,36 @@ _TWIST = "v[0]", "v[1]", "v[2]"
 def _distributed(model: DistributedModel) -> Pieces:
     if model.patch.asymmetry is not None:
         raise InvalidValueError("model", "have no asymmetry", model.patch.asymmetry)
-    numbers, n, law = model.compiled.numbers(), model.patch.cells, model.law.numbers
-    lever = twin(cells.LEVERS if model.patch.anisotropic else cells.POSITIONS)
+    numbers, n, law, size = model.compiled.numbers(), model.patch.cells, model.law.numbers, model.compiled.size
+    kind, cell = (disc_cells, discs.step) if size == 3 else (cells, distributed_step.cell)
+    lever = twin(kind.LEVERS if model.patch.anisotropic else kind.POSITIONS)
     names = (
         ["lever_xx", "lever_xy", "lever_yy", "lever_x", "lever_y"]
         if model.patch.anisotropic
         else ["place_x", "place_y"]
-    )
+    ) + ["gyration"] * (size == 3)
 
     def step(trace: Trace) -> Any:
         own = _vector(trace, *(f"{name}[k]" for name in names))
         u = lever.seen(own, _vector(trace, *_TWIST))
-        z, dt = _state(trace, 2, n), Number(trace, "dt")
-        new, traction = twin(distributed_step.cell)(_law(trace, law), z, u, dt)
+        new, traction = twin(cell)(_law(trace, law), _state(trace, size, n), u, Number(trace, "dt"))
         return new, lever.wrench(own, traction)
 
     def steady(trace: Trace) -> Any:
         own, given = _vector(trace, *(f"{name}[k]" for name in names)), _law(trace, law)
         u = lever.seen(own, _vector(trace, *_TWIST))
-        speed = twin(norm)(u)
-        z = twin(times)(twin(ratio)(1.0, speed * twin(grip)(given, speed)), u)
-        return lever.wrench(own, twin(distributed_step.cell)(given, z, u, 0.0)[1])
+        speed, pull = twin(discs.sliding)(u)[2:] if size == 3 else (twin(norm)(u), u)
+        z = twin(times)(twin(ratio)(1.0, speed * twin(grip)(given, speed)), pull)
+        return lever.wrench(own, twin(cell)(given, z, u, 0.0)[1])
 
     def slopes(trace: Trace) -> Any:
         own = _vector(trace, *(f"{name}[k]" for name in names))
-        forth, back = twin(cells_rollout._WRITTEN.forth), twin(cells_rollout._WRITTEN.back)
-        u, none, units = lever.seen(own, _vector(trace, *_TWIST)), (0.0, 0.0), np.eye(3).tolist()
-        z, dt = _state(trace, 2, n), Number(trace, "dt")
-        (new, traction), tape = forth(_law(trace, law), z, u, dt)
-        bars = [back(tape, (none, lever.seen(own, unit))) for unit in units]
-        bars += [back(tape, (unit, none)) for unit in ((1.0, 0.0), (0.0, 1.0))]
+        written = derive(cell, cells_rollout._BY, ("z", "u"))
+        forth, back = twin(written.forth), twin(written.back)
+        u, none = lever.seen(own, _vector(trace, *_TWIST)), (0.0,) * size
+        (new, traction), tape = forth(_law(trace, law), _state(trace, size, n), u, Number(trace, "dt"))
+        bars = [back(tape, (none, lever.seen(own, unit))) for unit in np.eye(3).tolist()]
+        bars += [back(tape, (tuple(unit), none)) for unit in np.eye(size).tolist()]
         kept = [cells_rollout.PARAMETERS.index(name) for name in _parameters(law)]
         rows = tuple((by_z, lever.wrench(own, by_u), *(by_law[i] for i in kept)) for by_z, by_u, *by_law in bars)
         return new, lever.wrench(own, traction), rows
@@ -170,7 +171,7 @@ def _distributed(model: DistributedModel) -> Pieces:
         rungs = len(ladder.rungs)
     else:
         tables["share"] = model.patch.weights()
-    return Pieces(n, 2, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes), rungs)
+    return Pieces(n, size, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes), rungs)
 
 
 def _published(model: ReducedModelPublished) -> Pieces:
