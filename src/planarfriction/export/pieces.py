@@ -9,8 +9,8 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction.errors import InvalidValueError
-from planarfriction.export.trace import Block, Mathematics, Number, Table, Trace, traced
-from planarfriction.export.twins import twin
+from planarfriction.kernels.trace import Block, Mathematics, Number, Table, Trace, traced
+from planarfriction.kernels.twins import twin
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import cells, cells_rollout, disc_cells, discs, distributed_step, moment_steps, published_step
 from planarfriction.kernels.derive import derive
@@ -154,7 +154,7 @@ def _distributed(model: DistributedModel) -> Pieces:
 
     def slopes(trace: Trace) -> Any:
         own = _vector(trace, *(f"{name}[k]" for name in names))
-        written = derive(cell, cells_rollout._BY, ("z", "u"))
+        written = derive(cell, cells_rollout.BY, ("z", "u"))
         forth, back = twin(written.forth), twin(written.back)
         u, none = lever.seen(own, _vector(trace, *_TWIST)), (0.0,) * size
         (new, traction), tape = forth(_law(trace, law), _state(trace, size, n), u, Number(trace, "dt"))
