@@ -45,6 +45,24 @@ def test_steps(name, precision):
     assert np.quantile(of_wrenches, 0.999) < (1e-12 if precision == "double" else 1e-5)
 
 
+@pytest.mark.parametrize("precision", KINDS)
+@pytest.mark.parametrize("name", ["discs", "turned discs"])
+def test_all_speeds(name, precision):
+    """Steps from rest, and from deflections as faint, are numbers at any speed, and those of the model."""
+    made, rng = library(name, precision), np.random.default_rng(2)
+    speed = 10.0 ** np.repeat(np.arange(-30.0, 4.0), 12)
+    twist = speed[:, None] * rng.normal(size=(len(speed), 3)) * [1.0, 1.0, 150.0]
+    twist[::4, 2], twist[1::4, :2] = 0.0, 0.0
+    state = np.minimum(speed, 1e-6)[:, None, None] * rng.normal(size=(len(speed), *made.model.state_shape))
+    state[::3] = 0.0
+    inputs = [each.astype(made.kind).astype(float) for each in (state, twist, np.ones_like(speed), speed * 0.0 + 1e-4)]
+    found, pressed = run(made, inputs)
+    new, wrench = made.model.step(*inputs)
+    off, scale = np.abs(pressed - wrench) * [1.0, 1.0, 100.0], np.abs(wrench * [1.0, 1.0, 100.0])
+    assert np.all(off.max(axis=1) <= (1e-11 if precision == "double" else 1e-3) * scale.max(axis=1))
+    assert np.abs(found - new).max() < (1e-11 if precision == "double" else 1e-4) * LAW.largest_deflection
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("precision", KINDS)
 @pytest.mark.parametrize("name", MODELS)

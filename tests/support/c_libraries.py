@@ -14,14 +14,15 @@ import numpy as np
 import planarfriction as pf
 
 DISC = pf.ContactPatch.disc(0.01)
+FEW = pf.ContactPatch.disc(0.01, cells=5)
 METRIC = pf.ContactPatch.rectangle(0.02, 0.01).with_friction_metric([[1.0, 0.2], [0.2, 1.5]])
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 MODELS = {
     "few": lambda: pf.ReducedModel(DISC, LAW),
     "plain": lambda: pf.ReducedModel(DISC, pf.LuGre(mu_s=1.2)),
     "distributed": lambda: pf.DistributedModel(METRIC, LAW),
-    "discs": lambda: pf.DistributedModel(pf.ContactPatch.disc(0.01, cells=5).discs(), LAW),
-    "turned discs": lambda: pf.DistributedModel(pf.ContactPatch.disc(0.01, cells=5).with_friction_metric([[1.0, 0.2], [0.2, 1.5]]).discs(), LAW),
+    "discs": lambda: pf.DistributedModel(FEW.discs(), LAW),
+    "turned discs": lambda: pf.DistributedModel(FEW.with_friction_metric([[1.0, 0.2], [0.2, 1.5]]).discs(), LAW),
     "table": lambda: pf.ReducedModelPublished(DISC, LAW),
     "potential": lambda: pf.ReducedModelPublished(METRIC, LAW, surface=pf.LimitSurfaceTable(METRIC)),
     "ellipsoid": lambda: pf.ReducedModelPublished(DISC, LAW, surface=pf.LimitSurfaceEllipsoid(DISC)),

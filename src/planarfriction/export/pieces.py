@@ -9,8 +9,6 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.trace import Block, Mathematics, Number, Table, Trace, traced
-from planarfriction.kernels.twins import twin
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import cells, cells_rollout, disc_cells, discs, distributed_step, moment_steps, published_step
 from planarfriction.kernels.derive import derive
@@ -18,6 +16,8 @@ from planarfriction.kernels.law import grip
 from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, Root
 from planarfriction.kernels.rules import ratio
 from planarfriction.kernels.surfaces import CELLS
+from planarfriction.kernels.trace import Block, Mathematics, Number, Table, Trace, traced
+from planarfriction.kernels.twins import twin
 from planarfriction.kernels.vectors import norm, times
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished

@@ -69,7 +69,7 @@ class CoupledPatches:
             raise InvalidValueError("follows", f"hold one for each of {len(which)} models", len(follows))
         kinds = [described(model) for model in known]
         pieces = [each.pieces for each in kinds]
-        radii = [float(np.sqrt((model.patch.positions**2).sum(1).mean())) or 1.0 for model in self.models]
+        radii = [coupling.lever_of(model) or 1.0 for model in self.models]
         source = coupled_source_of(kinds, which, follows or [True] * len(which), radii, precision)
         self.state_shape = (sum(math.prod(model.state_shape) for model in self.models),)
         """Shape of the state of the patches of a world."""
