@@ -75,6 +75,8 @@ class ContactPatch(Moments):
     point_shares: Any = None
     """Factors `q` on the areas `[N]` [-] that give evenly pressed shapes by name or outline the second moments of their
     areas, although each cell is a point; None: ones (other pressures, the published masks)."""
+    radii: Any = field(default=None, kw_only=True)
+    """Radii `a` of cells that are small discs, shape `[N]` [m], 0 for points; None: points (see `discs`)."""
     outline: outlines.Outline | None = field(init=False, default=None)
     """Outline from which the class methods cut the cells; None for other cells."""
     _fixed_weights: np.ndarray | None = field(init=False, default=None, compare=False)
@@ -95,6 +97,8 @@ class ContactPatch(Moments):
             self._set(cell_size=(self.grid.cell_width, self.grid.cell_height))
         check_cells(len(positions))
         areas = validation.positive_array("areas", self.areas, (len(positions),))
+        radii = np.zeros(len(positions)) if self.radii is None else self.radii
+        radii = validation.non_negative_array("radii", radii, (len(positions),))
         law = as_law(self.pressure, positions)
         if not law.depends_on_load:
             check_pressure(law.relative(positions), positions)
@@ -102,14 +106,14 @@ class ContactPatch(Moments):
         if not kept.any():
             raise InvalidValueError("pressure", "be > 0 on at least one cell", "0 on all of them")
         self._check_anisotropy(kept)
-        self._set(positions=positions[kept], areas=areas[kept], pressure=law.only(kept))
+        self._set(positions=positions[kept], areas=areas[kept], radii=radii[kept], pressure=law.only(kept))
         if type(law) is not Uniform:  # other pressures keep their ratios
             self._set(point_shares=None)
         elif self.point_shares is not None:
             self._set(point_shares=validation.positive_array("point_shares", self.point_shares, (len(positions),)))
             self.point_shares.setflags(write=False)
-        self.positions.setflags(write=False)
-        self.areas.setflags(write=False)
+        for numbers in (self.positions, self.areas, self.radii):
+            numbers.setflags(write=False)
         if not law.depends_on_load:
             fixed = self._shares(self.pressure.relative(self.positions))
             fixed.setflags(write=False)
@@ -339,7 +343,8 @@ class ContactPatch(Moments):
     def __repr__(self) -> str:
         grid = "" if self.grid is None else f" of {self.grid.columns} x {self.grid.rows}"
         law = type(self.pressure).__name__
-        return f"ContactPatch({self.name!r}, {self.cells} cells{grid}, {law} pressure)"
+        cells = "discs" if self.has_discs else "cells"
+        return f"ContactPatch({self.name!r}, {self.cells} {cells}{grid}, {law} pressure)"
 
     def _repr_html_(self) -> str:
         return picture("patch in a notebook", self)
@@ -359,6 +364,7 @@ class ContactPatch(Moments):
             "pressure": self.pressure.to_dict(), "metric": self.metric, "asymmetry": self.asymmetry,
             "outline": self.outline and self.outline.to_dict(), "cell_size": self.cell_size and list(self.cell_size),
             "grid": self.grid and dataclasses.asdict(self.grid), "point_shares": self.point_shares,
+            "radii": self.radii if self.has_discs else None,
         }  # fmt: skip
         plain = {name: part.tolist() if isinstance(part, np.ndarray) else part for name, part in parts.items()}
         return {name: part for name, part in plain.items() if part is not None}
@@ -369,7 +375,7 @@ class ContactPatch(Moments):
 
         Raises InvalidValueError for those, and for values that break a rule of the patch.
         """
-        options = ("cell_size", "metric", "asymmetry", "point_shares")
+        options = ("cell_size", "metric", "asymmetry", "point_shares", "radii")
         optional = ("shape", "name", "pressure", "grid", "outline", *options)
         validation.keys("patch", data, required=("positions", "areas"), optional=optional)
         validation.choice("patch shape", data.get("shape", "cells"), ("cells",))
