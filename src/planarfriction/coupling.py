@@ -46,6 +46,12 @@ _INPUTS = ("state", "dt", "twist", "normal_force", "wrench", "twist_response", "
 _PLACES = ("state", "dt", "free_twist", "free_load", "guess", "response", "load_response", "moments")
 
 
+def lever_of(model: FrictionModel) -> float:
+    """Return the lever arm [m] at which spins of a patch count as speeds."""
+    patch = model.patch
+    return math.sqrt(float((patch.positions**2).sum(axis=1).mean() + 0.5 * (patch.radii**2).mean()))
+
+
 @by_parts
 class HostStep(NamedTuple):
     """The step of a host for k patches: the outcome for a guess of the wrenches, and how other wrenches change it.
@@ -335,7 +341,7 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
             known[id(model)] = packed
             (records[p],), sizes[p] = places_of(packed.records), packed.records.shape[1]
     # all cells, whatever load they carry: a lever arm that does not follow the load
-    radius = np.array([np.sqrt((model.patch.positions**2).sum(1).mean()) for model in models])
+    radius = np.array([lever_of(model) for model in models])
     followers, firsts = _followers(models), bounds.astype(np.int64)
     rows = layout(len(models), int(bounds[-1]), len(followers.x), int(followers.words.sum()))
     patches = Patches(

@@ -1,4 +1,4 @@
-"""Models taken apart for source code: their numbers as tables, and the traced step of one cell or part."""
+"""Models taken apart for source code: their numbers as tables, and the traced step of one cell."""
 
 from __future__ import annotations
 
@@ -9,19 +9,18 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.trace import Block, Mathematics, Number, Table, Trace, traced
-from planarfriction.kernels.twins import twin
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, cells_rollout, distributed_step, moment_steps, published_step, reduced_step
+from planarfriction.kernels import cells, cells_rollout, disc_cells, discs, distributed_step, moment_steps, published_step
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.law import grip
 from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, Root
-from planarfriction.kernels.reduced_contact import ReducedContact, ReducedPatch
 from planarfriction.kernels.rules import ratio
 from planarfriction.kernels.surfaces import CELLS
+from planarfriction.kernels.trace import Block, Mathematics, Number, Table, Trace, traced
+from planarfriction.kernels.twins import twin
 from planarfriction.kernels.vectors import norm, times
 from planarfriction.laws.base import is_rate_law
-from planarfriction.models import DistributedModel, MomentModel, ReducedModel, ReducedModelPublished
+from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.models.reduced import loads_of_change
 from planarfriction.patch import ContactPatch
 
@@ -62,15 +61,11 @@ FIXED = "gamma", "elasto_plastic", "creep_speed"
 
 
 class Pieces(NamedTuple):
-    """A model as source code needs it: `count` cells or parts that see the same twist and share the load."""
+    """A model as source code needs it: `count` cells that see the same twist and share the load."""
 
     count: int
     states: int
-    """Number of states of a cell or part."""
-    stride: int
-    """Places between the states of a cell or part."""
-    spacing: int
-    """Places between the first states of one cell or part and of the next."""
+    """Number of states of a cell; the first of all cells come first."""
     tables: dict[str, np.ndarray]
     """Constant arrays by name; `share` [count] is that in the load."""
     step: Block
@@ -122,6 +117,10 @@ def _vector(trace: Trace, *names: str) -> tuple[Any, ...]:
     return tuple(Number(trace, name) for name in names)
 
 
+def _state(trace: Trace, states: int, count: int) -> tuple[Any, ...]:
+    return _vector(trace, *(f"z[k + {i * count}]" for i in range(states)))
+
+
 _TWIST = "v[0]", "v[1]", "v[2]"
 
 
@@ -131,37 +130,36 @@ _TWIST = "v[0]", "v[1]", "v[2]"
 def _distributed(model: DistributedModel) -> Pieces:
     if model.patch.asymmetry is not None:
         raise InvalidValueError("model", "have no asymmetry", model.patch.asymmetry)
-    numbers, n, law = model.compiled.numbers(), model.patch.cells, model.law.numbers
-    lever = twin(cells.LEVERS if model.patch.anisotropic else cells.POSITIONS)
+    numbers, n, law, size = model.compiled.numbers(), model.patch.cells, model.law.numbers, model.compiled.size
+    kind, cell = (disc_cells, discs.step) if size == 3 else (cells, distributed_step.cell)
+    lever = twin(kind.LEVERS if model.patch.anisotropic else kind.POSITIONS)
     names = (
         ["lever_xx", "lever_xy", "lever_yy", "lever_x", "lever_y"]
         if model.patch.anisotropic
         else ["place_x", "place_y"]
-    )
+    ) + ["gyration"] * (size == 3)
 
     def step(trace: Trace) -> Any:
         own = _vector(trace, *(f"{name}[k]" for name in names))
         u = lever.seen(own, _vector(trace, *_TWIST))
-        z, dt = _vector(trace, "z[k]", f"z[{n} + k]"), Number(trace, "dt")
-        new, traction = twin(distributed_step.cell)(_law(trace, law), z, u, dt)
+        new, traction = twin(cell)(_law(trace, law), _state(trace, size, n), u, Number(trace, "dt"))
         return new, lever.wrench(own, traction)
 
     def steady(trace: Trace) -> Any:
         own, given = _vector(trace, *(f"{name}[k]" for name in names)), _law(trace, law)
         u = lever.seen(own, _vector(trace, *_TWIST))
-        speed = twin(norm)(u)
-        z = twin(times)(twin(ratio)(1.0, speed * twin(grip)(given, speed)), u)
-        return lever.wrench(own, twin(distributed_step.cell)(given, z, u, 0.0)[1])
+        speed, pull = twin(discs.sliding)(u)[2:] if size == 3 else (twin(norm)(u), u)
+        z = twin(times)(twin(ratio)(1.0, speed * twin(grip)(given, speed)), pull)
+        return lever.wrench(own, twin(cell)(given, z, u, 0.0)[1])
 
     def slopes(trace: Trace) -> Any:
         own = _vector(trace, *(f"{name}[k]" for name in names))
-        written = derive(distributed_step.cell, cells_rollout.BY, ("z", "u"))
+        written = derive(cell, cells_rollout.BY, ("z", "u"))
         forth, back = twin(written.forth), twin(written.back)
-        u, none, units = lever.seen(own, _vector(trace, *_TWIST)), (0.0, 0.0), np.eye(3).tolist()
-        z, dt = _vector(trace, "z[k]", f"z[{n} + k]"), Number(trace, "dt")
-        (new, traction), tape = forth(_law(trace, law), z, u, dt)
-        bars = [back(tape, (none, lever.seen(own, unit))) for unit in units]
-        bars += [back(tape, (unit, none)) for unit in ((1.0, 0.0), (0.0, 1.0))]
+        u, none = lever.seen(own, _vector(trace, *_TWIST)), (0.0,) * size
+        (new, traction), tape = forth(_law(trace, law), _state(trace, size, n), u, Number(trace, "dt"))
+        bars = [back(tape, (none, lever.seen(own, unit))) for unit in np.eye(3).tolist()]
+        bars += [back(tape, (tuple(unit), none)) for unit in np.eye(size).tolist()]
         kept = [cells_rollout.PARAMETERS.index(name) for name in _parameters(law)]
         rows = tuple((by_z, lever.wrench(own, by_u), *(by_law[i] for i in kept)) for by_z, by_u, *by_law in bars)
         return new, lever.wrench(own, traction), rows
@@ -173,25 +171,36 @@ def _distributed(model: DistributedModel) -> Pieces:
         rungs = len(ladder.rungs)
     else:
         tables["share"] = model.patch.weights()
-    return Pieces(n, 2, n, 1, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes), rungs)
+    return Pieces(n, size, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes), rungs)
 
 
-def _of_three_states(
-    law: LawNumbers, steps: Any, tables: dict, contact: Callable[[Trace], Any], settled: Any
-) -> Pieces:
-    """Trace `moment_steps` of the record of a contact; `settled(part, held)` is its state in steady sliding."""
+def _published(model: ReducedModelPublished) -> Pieces:
+    """Trace `moment_steps` of the record of the contact."""
+    (part,), law = next(iter(model.compiled.shapes.at([None]))), model.law.numbers
+    surface, root, shape = part.shape.surface.numbers, part.shape.root, PublishedPatch(*part.shape.numbers)
+    if surface.kind == CELLS:
+        raise InvalidValueError("surface", "be an ellipsoid or a table", type(part.shape.surface).__name__)
+    root = Root(float(root[0, 0]), float(root[0, 1]), float(root[1, 1]))
+    steps = published_step
     frame, hold, taped_step = (twin(each) for each in (steps._FRAME, steps.MODEL.hold, steps.MODEL.taped_step))
+
+    def contact(trace: Trace) -> PublishedContact:
+        data: Any = Table(trace, "surface", surface.data)
+        return PublishedContact(_law(trace, law), shape, root, surface.kind, surface.size, data)
 
     def step(trace: Trace) -> Any:
         new, out, dt = [0.0] * 3, [0.0] * 3, Number(trace, "dt")
-        z, twist = _vector(trace, "z[3 * k]", "z[3 * k + 1]", "z[3 * k + 2]"), _vector(trace, *_TWIST)
+        z, twist = _state(trace, 3, 1), _vector(trace, *_TWIST)
         twin(moment_steps.step)(frame, hold, taped_step, contact(trace), z, twist, dt, new, out)
         return tuple(new), tuple(out)
 
     def steady(trace: Trace) -> Any:
         own, part = frame.read(contact(trace))
         held = hold(part, frame.seen(own, _vector(trace, *_TWIST)))
-        wrench = frame.wrench(own, taped_step(part, held, settled(part, held), 0.0).wrench)
+        grip = part.law.sigma_0 / twin(formulas.stribeck)(Mathematics, held.v, part.law)
+        x, y, s = twin(times)(twin(ratio)(1.0, grip * held.v), held.u)
+        settled = x, y, part.shape.contact_radius * s
+        wrench = frame.wrench(own, taped_step(part, held, settled, 0.0).wrench)
         return tuple(Mathematics.where(held.v > 0.0, each, 0.0) for each in wrench)
 
     def slopes(trace: Trace) -> Any:
@@ -203,61 +212,17 @@ def _of_three_states(
             return bar
 
         new, out, dt = [0.0] * 3, [0.0] * 39, Number(trace, "dt")
-        z, twist = _vector(trace, "z[3 * k]", "z[3 * k + 1]", "z[3 * k + 2]"), _vector(trace, *_TWIST)
-        hold_slopes = twin(steps.MODEL.hold_slopes)
+        z, twist = _state(trace, 3, 1), _vector(trace, *_TWIST)
         given = contact(trace), z, twist, dt, new, out
-        twin(moment_steps.slopes)(frame, hold_slopes, taped_step, pull_back, True, *given)
+        twin(moment_steps.slopes)(frame, twin(steps.MODEL.hold_slopes), taped_step, pull_back, True, *given)
         by_law = [tuple(getattr(each, name) for name in _parameters(law)) for each in laws]
         rows = [
             (*out[at + 18 : at + 21], *out[at : at + 3], bar) for at, bar in zip(range(3, 21, 3), by_law, strict=True)
         ]
         return tuple(new), tuple(out[:3]), tuple(rows)
 
-    count = len(tables["share"])
-    return Pieces(count, 3, 1, 3, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes))
-
-
-def _published(model: ReducedModelPublished) -> Pieces:
-    (part,), law = next(iter(model.compiled.shapes.at([None]))), model.law.numbers
-    surface, root, shape = part.shape.surface.numbers, part.shape.root, PublishedPatch(*part.shape.numbers)
-    if surface.kind == CELLS:
-        raise InvalidValueError("surface", "be an ellipsoid or a table", type(part.shape.surface).__name__)
-    root = Root(float(root[0, 0]), float(root[0, 1]), float(root[1, 1]))
-
-    def contact(trace: Trace) -> PublishedContact:
-        data: Any = Table(trace, "surface", surface.data)
-        return PublishedContact(_law(trace, law), shape, root, surface.kind, surface.size, data)
-
     tables = {"share": np.ones(1)} | ({"surface": surface.data} if len(surface.data) else {})
-
-    def settled(part: Any, held: Any) -> Any:
-        grip = part.law.sigma_0 / twin(formulas.stribeck)(Mathematics, held.v, part.law)
-        x, y, s = twin(times)(twin(ratio)(1.0, grip * held.v), held.u)
-        return x, y, part.shape.contact_radius * s
-
-    return _of_three_states(law, published_step, tables, contact, settled)
+    return Pieces(1, 3, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes))
 
 
-def _moments(model: MomentModel) -> Pieces:
-    parts, law = next(iter(model.compiled.shapes.at([None]))), model.law.numbers
-    shapes, maps = [part.shape for part in parts], [part.shape.data for part in parts]
-    upper = np.array([shape.factor for shape in shapes])[:, *np.triu_indices(3)]
-
-    def contact(trace: Trace) -> ReducedContact:
-        data: Any
-        factor: list[Any]
-        if len(maps) == 1:
-            data, factor = Table(trace, "map", maps[0]), [float(each) for each in upper[0]]
-        else:
-            data = Table(trace, "map", None, Number(trace, "first[k]", "index"))
-            factor = [Number(trace, f"factor[6 * k + {i}]") for i in range(6)]
-        return ReducedContact(_law(trace, law), ReducedPatch._make([*factor, 0.0]), data, 0)
-
-    tables = {"share": np.array([part.share for part in parts]), "map": np.concatenate(maps)}
-    if len(maps) > 1:
-        first = np.cumsum([0, *(len(each) for each in maps[:-1])])
-        tables |= {"first": first, "factor": upper.ravel()}
-    return _of_three_states(law, reduced_step, tables, contact, lambda _, held: held.q)
-
-
-_KINDS = {DistributedModel: _distributed, ReducedModelPublished: _published, MomentModel: _moments}
+_KINDS = {DistributedModel: _distributed, ReducedModelPublished: _published}

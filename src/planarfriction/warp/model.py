@@ -81,7 +81,6 @@ class Model:
         self.status = wp.zeros(self.contacts, dtype=wp.int32, device=self.device)
         """Bits of what was wrong since the last `check` [contacts]: 1 in parameters, 2 in state, twist or load."""
         self._numbers = wp.array(np.stack([each.numbers for each in sources]), dtype=dtype, device=self.device)
-        self._places = wp.array(np.stack([each.places for each in sources]), dtype=wp.int32, device=self.device)
         self.kernel = kernel_of(sources[0].text, Batch)
         """Kernel of `step` and `rollout`."""
         wp.load_module(self.kernel.module, device=self.device)
@@ -155,9 +154,8 @@ class Model:
         batch.new_state = self._address("new_state", new, self.state_shape)
         batch.wrench = self._address("wrench", wrench, (*along, 3))
         batch.parameters, batch.status = self.parameters.ptr, self.status.ptr
-        batch.numbers, batch.places = self._numbers.ptr, self._places.ptr or 0
+        batch.numbers, batch.number_count = self._numbers.ptr, self._numbers.shape[1]
         batch.models, batch.which = self._numbers.shape[0], self.which.ptr
-        batch.number_count, batch.place_count = self._numbers.shape[1], self._places.shape[1]
         wp.launch(self.kernel, dim=self.contacts, inputs=[batch], device=self.device)
 
     def _indices(self, which: Any, count: int) -> np.ndarray:
