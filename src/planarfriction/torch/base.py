@@ -14,7 +14,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.laws import ElastoPlastic, FrictionLaw, LuGre
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import steps
-from planarfriction.tensors.steps import LAW, Part, TensorModel
+from planarfriction.tensors.steps import LAW, TensorModel
 from planarfriction.torch.namespace import xp
 from planarfriction.torch.parameters import PhysicalParameters
 
@@ -26,7 +26,7 @@ class Compiled(NamedTuple):
     """A model as compiled rollouts take it."""
 
     pack: Callable[..., Packed]
-    """Function that makes the parts of the model from the `buffers` as NumPy arrays."""
+    """Function that makes the model from the `buffers` as NumPy arrays."""
     buffers: tuple[Tensor, ...]
     """The model's own numbers of the patch."""
 
@@ -127,25 +127,20 @@ class FrictionModule(TensorModel, nn.Module):
         tensors that have been checked.
         """
         equations, vector = self.equations, self._vector(parameters)
-        once, parts = (self._prepared(self._named(values)) for values in (vector, vector[..., None, :]))
-        of_step = dict(zip(map(id, parts), once, strict=True))
+        of_step, contact = (self._prepared(self._named(values)) for values in (vector, vector[..., None, :]))
         z, v, dt = xp.widened(state), xp.widened(twist), steps.inner(equations, dt)
-
-        def roll(part: Part, z: Tensor) -> tuple[Tensor, Tensor]:
-            by, step = equations.drive(xp, part.law, part.shape, v), of_step[id(part)]
-            drives = zip(*(_each_step(value, v.shape[-2], equations.AXIS) for value in by), strict=True)
-            states, rates = [], []
-            for drive, now in zip(drives, normal_force.unbind(-1), strict=True):
-                new, rate = equations.advance(xp, step.law, step.shape, z, type(by)(*drive), dt)
-                states.append(new)
-                rates.append(rate)
-                z = steps.relaxed(xp, equations, new, now)
-            states, rates = (torch.stack(each, equations.AXIS - 1) for each in (states, rates))
-            return z, equations.wrench(xp, part.law, part.shape, states, rates, by)
-
-        end, unit = steps.sum_parts(xp, parts, z, roll)
+        by = equations.drive(xp, *contact, v)
+        drives = zip(*(_each_step(value, v.shape[-2], equations.AXIS) for value in by), strict=True)
+        states, rates = [], []
+        for drive, now in zip(drives, normal_force.unbind(-1), strict=True):
+            new, rate = equations.advance(xp, *of_step, z, type(by)(*drive), dt)
+            states.append(new)
+            rates.append(rate)
+            z = steps.relaxed(xp, equations, new, now)
+        states, rates = (torch.stack(each, equations.AXIS - 1) for each in (states, rates))
+        wrenches = normal_force[..., None] * equations.wrench(xp, *contact, states, rates, by)
         given = vector, state, twist
-        return xp.narrowed(end, *given), xp.narrowed(normal_force[..., None] * unit, *given)
+        return xp.narrowed(z, *given), xp.narrowed(wrenches, *given)
 
     # ------------------------------------------------------------------ inputs
 
