@@ -1,4 +1,4 @@
-"""Machine form of `DistributedModel`: cells with two bristles each, and their share of the load."""
+"""Machine form of `DistributedModel`: cells that are points or small discs, and their share of the load."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ from planarfriction.compiler.memory import places_of, rows_of, size_of
 from planarfriction.kernels import cells as contacts
 from planarfriction.kernels import distributed_step as steps
 from planarfriction.kernels.contacts import ModelFunctions
-from planarfriction.kernels.general_cells import ROWS_OF_A_CELL
+from planarfriction.kernels.disc_cells import DISCS, LEANING_DISCS, TURNED_DISCS
+from planarfriction.kernels.discs import KAPPA
+from planarfriction.kernels.general_cells import MATRICES
 from planarfriction.kernels.leaning_cells import RATES_OF_LEANING, STEPS_OF_LEANING
 from planarfriction.kernels.steps import StepFunctions
 from planarfriction.patch.tilt import tilted
@@ -31,19 +33,23 @@ class CompiledDistributed(CompiledModel):
 
     def __init__(self, law: Any, patch: Any) -> None:
         self.law, self.patch = law, patch
+        self.size = 3 if patch.radii.any() else 2
+        """Number of bristles of a cell: two of a point, three of a disc."""
         self._contact, functions = self._functions()
         cells = len(patch.positions)
-        super().__init__(functions, (2, cells), (2, 2, cells))
+        super().__init__(functions, (self.size, cells), (self.size, self.size, cells))
 
     def _functions(self) -> tuple[ModelFunctions, StepFunctions]:
+        turned = self.patch.anisotropic
+        if self.size == 3:
+            return LEANING_DISCS if self.patch.asymmetric else TURNED_DISCS if turned else DISCS
         if self.patch.asymmetric:
             return RATES_OF_LEANING, STEPS_OF_LEANING
-        turned = self.patch.anisotropic
         return (contacts.TURNED, steps.TURNED) if turned else (contacts.ISOTROPIC, steps.ISOTROPIC)
 
     def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         """Return the record of a contact, and how many numbers of a linearisation each cell has."""
-        rows = ROWS_OF_A_CELL if self.patch.asymmetric else contacts.LINEAR_ROWS
+        rows = MATRICES * self.size**2 if self.size == 3 or self.patch.asymmetric else contacts.LINEAR_ROWS
         return contacts.CellsContact(self.law.numbers, numbers.shape[1], numbers, weights), rows
 
     # ------------------------------------------------------------------ at given loads
@@ -69,18 +75,19 @@ class CompiledDistributed(CompiledModel):
         """Return linearisations `[..., L, N]` as `kernels.cells.LinearCells`, or those of `kernels.general_cells`."""
         ((_, contact),) = self.at_each_load(load)
         cells = state.shape[-1]
-        lin = linearised(contact.joined, state.reshape(load.size, 2 * cells), twist.reshape(-1, 3))
+        lin = linearised(contact.joined, state.reshape(load.size, self.size * cells), twist.reshape(-1, 3))
         return lin.reshape(*load.shape, lin.shape[-1] // cells, cells)
 
     def slopes(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> Any:
         """Return the derivatives of the rates of cells, and of their tractions per unit load, by state and velocity.
 
-        Four arrays `[..., 2, 2, N]`; the velocity is that which a cell sees.
+        Four arrays `[..., d, d, N]` of d bristles a cell; the velocity is that which a cell sees.
         """
         law, identity, lin = self.law.numbers, np.eye(2)[:, :, None], self.linearisation(state, twist, load)
-        if lin.shape[-2] == ROWS_OF_A_CELL:
-            rows = lin.reshape(*load.shape, -1, ROWS_OF_A_CELL)[..., :16]
-            return np.moveaxis(rows.reshape(*rows.shape[:-1], 4, 2, 2), (-4, -3), (-1, 0))
+        d = self.size
+        if lin.shape[-2] == MATRICES * d * d:
+            four = lin[..., : 4 * d * d, :].reshape(*load.shape, 4, d, d, -1)
+            return np.moveaxis(four, -4, 0)
         k, k_z, k_v = lin[..., :1, None, :], lin[..., None, 1:3, :], lin[..., None, 3:5, :]
         by_state = -k * identity - state[..., :, None, :] * k_z
         by_velocity = identity - state[..., :, None, :] * k_v
@@ -131,24 +138,30 @@ class CompiledDistributed(CompiledModel):
         return PackedModel(
             self._contact,
             rows_of(record, len(weights), weights=places_of(weights)),
-            2 * count,
+            self.size * count,
             rows * count,
-            np.full(2 * count, self.law.largest_deflection),
-            float(np.hypot(*(positions - positions.mean(axis=0)).T).mean()),
+            np.full(self.size * count, self.law.largest_deflection),
+            float(np.hypot(np.hypot(*(positions - positions.mean(axis=0)).T), KAPPA * self.patch.radii[chosen]).mean()),
             (weights, numbers),
             chosen,
         )
 
     def numbers(self, chosen: Any = slice(None)) -> np.ndarray:
-        """Return the numbers of the chosen cells, or of all, as `kernels.cells` reads them, `[2, n]` or `[7, n]`."""
+        """Return the numbers of the chosen cells, or of all, as their levers read them, `[numbers, n]`.
+
+        Points: `kernels.cells`; discs: `kernels.disc_cells`.
+        """
+        levers = self.patch.levers()[chosen]
+        spin = levers[:, 2:, 2].T
         if not self.patch.anisotropic:
-            return np.ascontiguousarray(self.patch.positions[chosen].T)
-        levers, asymmetry = self.patch.levers()[chosen], self.patch.asymmetries()[chosen]
-        return np.array([*(levers[:, i, j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2))), *asymmetry.T])
+            return np.ascontiguousarray(np.vstack([self.patch.positions[chosen].T, spin]))
+        asymmetry = self.patch.asymmetries()[chosen]
+        turned = [levers[:, i, j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2))]
+        return np.array([*turned, *spin, *asymmetry.T])
 
     @functools.cached_property
     def lever(self) -> np.ndarray:
-        """P `[3, 2, N]`: the velocity of a cell (`u_i`) is `P' V`, the wrench of a force on it `P f`."""
+        """P `[3, d, N]`: the velocity of a cell (`u_i`) is `P' V`, the wrench of a force on it `P f`."""
         return np.ascontiguousarray(self.patch.levers().T)
 
 

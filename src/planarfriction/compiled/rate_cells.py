@@ -12,7 +12,7 @@ from planarfriction.compiled.distributed import CompiledDistributed
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import cells
 from planarfriction.kernels.contacts import ModelFunctions
-from planarfriction.kernels.general_cells import ROWS_OF_A_CELL
+from planarfriction.kernels.general_cells import MATRICES
 from planarfriction.kernels.steps import StepFunctions
 
 
@@ -24,7 +24,7 @@ class CompiledRateCells(CompiledDistributed):
         return self.law.functions(self._lever)[1:]
 
     def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
-        return self.law.contact(self._lever, numbers, weights), ROWS_OF_A_CELL
+        return self.law.contact(self._lever, numbers, weights), 4 * MATRICES
 
 
 def _finite(door: Callable) -> Callable:

@@ -19,7 +19,7 @@ from planarfriction.kernels.cell_blocks import (
     room,
 )
 from planarfriction.kernels.cell_passes import advance, end_traction
-from planarfriction.kernels.general_cells import Bristle, slopes, slopes_of
+from planarfriction.kernels.general_cells import bristle, slopes
 from planarfriction.kernels.law import grip
 from planarfriction.kernels.steps import step_functions
 from planarfriction.kernels.vectors import norm, plus, put, three
@@ -76,6 +76,6 @@ def step(lever, contact, z, v, dt, new, out):
 
 
 TEMPLATES = step, slopes
-_MODEL = {"bristle": Bristle(None, cell, None, slopes_of(cell)), "read": cells.read}
+_MODEL = {"bristle": bristle(None, cell), "read": cells.read}
 ISOTROPIC = step_functions("isotropic", TEMPLATES, lever=cells.POSITIONS, **_MODEL)
 TURNED = step_functions("turned", TEMPLATES, lever=cells.LEVERS, **_MODEL)

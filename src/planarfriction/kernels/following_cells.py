@@ -42,6 +42,8 @@ class FollowingContact(NamedTuple):
 
     count: int
     """n"""
+    states: int
+    """Number of states of the bristles."""
     x: Doubles
     y: Doubles
     weights: Doubles
@@ -62,9 +64,9 @@ class FollowingContact(NamedTuple):
     trial: Doubles
     """Weights of anything else, [n]."""
     scratch: Doubles
-    """[2 n]"""
+    """[states]"""
     zero: Doubles
-    """Zeros, [2 n]."""
+    """Zeros, [states]."""
     rows: Doubles
     """Room for `contacts.Rows`."""
     radius: float
@@ -103,7 +105,7 @@ _PLACES, OWN = _LINEAR.offsets, _LINEAR.size
 
 @kernel
 def _centre(own, z):
-    return own.centre_x + z[2 * own.count], own.centre_y + z[2 * own.count + 1]
+    return own.centre_x + z[own.states], own.centre_y + z[own.states + 1]
 
 
 @kernel
@@ -143,7 +145,7 @@ def _slopes(own, w, along_x, along_y, out):
 @kernel
 def _pulls_to(own, z, w, zdot):
     """Write the rate of the two states of the pressure under a wrench."""
-    n = 2 * own.count
+    n = own.states
     zdot[n], zdot[n + 1] = -(z[n] + own.height * w[0]) / own.lag, -(z[n + 1] + own.height * w[1]) / own.lag
 
 
@@ -156,7 +158,7 @@ def _moved(m, a, b):
 @kernel
 def _solved(own, m, r, x, y):
     """Return `N^-1 (T r_e - h (x, y))`."""
-    x, y = own.lag * r[2 * own.count] - own.height * x, own.lag * r[2 * own.count + 1] - own.height * y
+    x, y = own.lag * r[own.states] - own.height * x, own.lag * r[own.states + 1] - own.height * y
     return m.inverse[0] * x + m.inverse[1] * y, m.inverse[2] * x + m.inverse[3] * y
 
 
@@ -223,7 +225,7 @@ def back_substitute(contact, z, r, dv, lin, out):
     x, y = m.residual[0], m.residual[1]
     for j in range(3):
         x, y = x + m.stiffness[j] * dv[j], y + m.stiffness[3 + j] * dv[j]
-    out[2 * own.count], out[2 * own.count + 1] = _solved(own, m, r, x, y)
+    out[own.states], out[own.states + 1] = _solved(own, m, r, x, y)
 
 
 @entry
@@ -231,7 +233,7 @@ def change(contact, z, zdot, lin, dz, dzdot, rows, friction, size):
     """Write the changes of z' and of the wrench; in a patch that has grown, p is nearer to the middle."""
     own, changes, m = read(contact), arrays_at(ROWS, rows), arrays_at(_PLACES, lin)
     call(own.calls[CHANGE], (own.held, z, zdot, at(lin, OWN), dz, dzdot, rows, friction, size))
-    n = 2 * own.count
+    n = own.states
     moved = _moved(m, dz[n] - size * m.centre[0], dz[n + 1] - size * m.centre[1])
     put(changes.d_wrench, plus(three(changes.d_wrench), 1.0, moved))
     _pulls_to(own, dz, changes.d_wrench, dzdot)
@@ -241,7 +243,7 @@ def change(contact, z, zdot, lin, dz, dzdot, rows, friction, size):
 def solve_transposed(contact, z, r, lin, out):
     """Solve `D' out = r`: first for the pressure, then for the bristles that it sees."""
     own, m, rows = read(contact), arrays_at(_PLACES, lin), arrays_at(ROWS, read(contact).rows)
-    n = 2 * own.count
+    n = own.states
     a, b = r[n], r[n + 1]
     a, b = own.lag * (m.inverse[0] * a + m.inverse[2] * b), own.lag * (m.inverse[1] * a + m.inverse[3] * b)
     put(rows.d_wrench, times(-own.height / own.lag, (a, b, 0.0)))
@@ -256,7 +258,7 @@ def solve_transposed(contact, z, r, lin, out):
 def pull_back(contact, z, lin, dzdot, rows, out):
     """Write the transpose of `change`."""
     own, changes, m = read(contact), arrays_at(ROWS, rows), arrays_at(_PLACES, lin)
-    n, given = 2 * own.count, three(changes.d_wrench)
+    n, given = own.states, three(changes.d_wrench)
     per = 1.0 / own.lag
     wrench = plus(given, -per * own.height, (dzdot[n], dzdot[n + 1], 0.0))
     put(changes.d_wrench, wrench)

@@ -134,6 +134,67 @@ def gathered(typingctx, row, at, stride, count):
     return result(row, types.intp, types.intp, count), generate
 
 
+def reader_of(count: int):
+    """Return a kernel `(row, first, stride)` that returns so many numbers of a pointer as a tuple."""
+    result = types.UniTuple(types.float64, count)
+
+    @intrinsic
+    def take(typingctx, row, first, stride):
+        def generate(context, builder, signature, args):
+            place, numbers = args[1], []
+            for _ in range(count):
+                numbers.append(builder.load(builder.gep(args[0], [place])))
+                place = builder.add(place, args[2], flags=("nsw",))
+            return context.make_tuple(builder, result, numbers)
+
+        return result(row, types.intp, types.intp), generate
+
+    @kernel
+    def taken(row, first, stride):
+        return take(row, first, stride)
+
+    return taken
+
+
+def _products(rows: int, inner: int, columns: int, place):
+    """Return the code of a product; number (i, j) of the first factor is at `place(i, j)`."""
+
+    def generate(context, builder, signature, args):
+        m, a = (cgutils.unpack_tuple(builder, each) for each in args)
+        numbers = []
+        for i in range(rows):
+            for k in range(columns):
+                terms = [builder.fmul(m[place(i, j)], a[j * columns + k], flags=_FLAGS) for j in range(inner)]
+                total = terms[0]
+                for term in terms[1:]:
+                    total = builder.fadd(total, term, flags=_FLAGS)
+                numbers.append(total)
+        return context.make_tuple(builder, signature.return_type, numbers)
+
+    return generate
+
+
+@intrinsic
+def matrix_applied(typingctx, m, a):
+    """Return `M a` of a square matrix, row by row."""
+    d = len(a)
+    return types.UniTuple(types.float64, d)(m, a), _products(d, d, 1, lambda i, j: i * d + j)
+
+
+@intrinsic
+def matrix_applied_back(typingctx, m, a):
+    """Return `M' a` of a square matrix, row by row."""
+    d = len(a)
+    return types.UniTuple(types.float64, d)(m, a), _products(d, d, 1, lambda i, j: j * d + i)
+
+
+@intrinsic
+def matrix_product(typingctx, m, a):
+    """Return `M A` of square matrices, row by row."""
+    d = math.isqrt(len(m))
+    return types.UniTuple(types.float64, d * d)(m, a), _products(d, d, d, lambda i, j: i * d + j)
+
+
 @kernel
 def square(a):
     """Return `a . a`."""
