@@ -47,14 +47,14 @@ class DistributedModel(FrictionPytree):
 
     def __init__(self, patch: ContactPatch, law: FrictionLaw, normal_force: float | None = None) -> None:
         super().__init__(patch, law)
-        cells = distributed.cells_of(patch, normal_force, "jax")
+        cells = distributed.cells_of(patch, law, normal_force)
         self.parameters = record_of(LawParameters, law.numbers._asdict())
         self.positions, self.weights = map(jnp.asarray, cells)
 
     @property
     def state_shape(self) -> tuple[int, ...]:
-        """Shape of the state of one contact, `(2, N)`."""
-        return 2, self.positions.shape[1]
+        """Shape of the state of one contact, `(2, N)` of points, `(3, N)` of discs."""
+        return distributed.KINDS[len(self.positions)].bristles, self.positions.shape[1]
 
     def compiled(self) -> Packed:
         """Return the model as compiled rollouts take it."""

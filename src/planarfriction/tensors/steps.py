@@ -27,7 +27,7 @@ class Contact(NamedTuple):
     """A law and a patch, ready for one evaluation or for all steps of a rollout."""
 
     law: LawNumbers
-    """Broadcasts with the lengths of bristles."""
+    """Broadcasts with the components of bristles."""
     shape: Any
     """Numbers of the patch as the model's equations know them."""
 
@@ -35,29 +35,25 @@ class Contact(NamedTuple):
 def evaluate(xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, load: Any) -> tuple[Any, Any]:
     """Return the rate of the state, and the wrench `[..., 3]`."""
     by = equations.drive(xp, *contact, twist)
-    rate = equations.rate(xp, *contact, state, by)
-    return rate, load[..., None] * equations.wrench(xp, *contact, state, rate, by)
+    rate, pull = equations.evaluate(xp, *contact, equations.split(state), by)
+    return equations.joined(xp, rate), load[..., None] * equations.wrench(xp, contact.shape, pull)
 
 
 def step(
     xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, load: Any, dt: Any
 ) -> tuple[Any, Any]:
     """Return the state after `dt` [s] of a constant twist, and the wrench at the end; without load bristles relax."""
-    given, dt = (contact.law.sigma_0, state, twist), inner(equations, dt)
+    given, state = (contact.law.sigma_0, state, twist), equations.split(xp.widened(state))
     by = equations.drive(xp, *contact, xp.widened(twist))
-    new, rate = equations.advance(xp, *contact, xp.widened(state), by, dt)
-    wrench = load[..., None] * equations.wrench(xp, *contact, new, rate, by)
-    return xp.narrowed(relaxed(xp, equations, new, load), *given), xp.narrowed(wrench, *given)
+    new, pull = equations.advance(xp, *contact, state, by, dt[..., None])
+    new = equations.joined(xp, relaxed(xp, new, load))
+    return xp.narrowed(new, *given), xp.narrowed(load[..., None] * equations.wrench(xp, contact.shape, pull), *given)
 
 
-def relaxed(xp: Any, equations: Any, state: Any, load: Any) -> Any:
-    """Return the states of contacts with load, and zeros for those without."""
-    return xp.where(inner(equations, load > 0.0), state, 0.0)
-
-
-def inner(equations: Any, value: Any) -> Any:
-    """Return one value for each contact `[...]` with axes of length 1 for those of a state."""
-    return value.reshape(value.shape + (1,) * -equations.AXIS)
+def relaxed(xp: Any, z: Any, load: Any) -> tuple[Any, ...]:
+    """Return the bristles of contacts with load, and zeros for those without."""
+    loaded = load[..., None] > 0.0
+    return tuple(xp.where(loaded, each, 0.0) for each in z)
 
 
 class TensorModel:
@@ -74,7 +70,7 @@ class TensorModel:
 
     xp: ClassVar[Namespace]
     equations: ClassVar[ModuleType]
-    """Module of the model's `drive`, `rate`, `advance` and `wrench`."""
+    """Module of the model's `drive`, `evaluate`, `advance` and `wrench`."""
     elasto_plastic: bool
 
     @staticmethod
@@ -136,7 +132,7 @@ class TensorModel:
         raise NotImplementedError
 
     def _shape(self, values: Mapping[str, Any]) -> Any:
-        """Return the numbers of the patch; physical values broadcast with the lengths of bristles."""
+        """Return the numbers of the patch; physical values broadcast with the components of bristles."""
         raise NotImplementedError
 
     def _number(self, name: str, value: Any) -> Any:
@@ -147,7 +143,7 @@ class TensorModel:
 
     def _prepared(self, values: Mapping[str, Any]) -> Contact:
         """Return the model at physical values `[...]`."""
-        wide = {name: inner(self.equations, value) for name, value in values.items()}
+        wide = {name: value[..., None] for name, value in values.items()}
         law = LawNumbers(**{name: wide[name] for name in LAW}, elasto_plastic=float(self.elasto_plastic))
         return Contact(law, self._shape(wide))
 

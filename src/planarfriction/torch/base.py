@@ -128,19 +128,17 @@ class FrictionModule(TensorModel, nn.Module):
         """
         equations, vector = self.equations, self._vector(parameters)
         of_step, contact = (self._prepared(self._named(values)) for values in (vector, vector[..., None, :]))
-        z, v, dt = xp.widened(state), xp.widened(twist), steps.inner(equations, dt)
+        z, v, dt = equations.split(xp.widened(state)), xp.widened(twist), dt[..., None]
         by = equations.drive(xp, *contact, v)
-        drives = zip(*(_each_step(value, v.shape[-2], equations.AXIS) for value in by), strict=True)
-        states, rates = [], []
+        drives, pulls = zip(*(value.unbind(-2) for value in by), strict=True), []
         for drive, now in zip(drives, normal_force.unbind(-1), strict=True):
-            new, rate = equations.advance(xp, *of_step, z, type(by)(*drive), dt)
-            states.append(new)
-            rates.append(rate)
-            z = steps.relaxed(xp, equations, new, now)
-        states, rates = (torch.stack(each, equations.AXIS - 1) for each in (states, rates))
-        wrenches = normal_force[..., None] * equations.wrench(xp, *contact, states, rates, by)
+            new, pull = equations.advance(xp, *of_step, z, _like(by, drive), dt)
+            pulls.append(pull)
+            z = steps.relaxed(xp, new, now)
+        pull = tuple(torch.stack(each, -2) for each in zip(*pulls, strict=True))
+        wrenches = normal_force[..., None] * equations.wrench(xp, contact.shape, pull)
         given = vector, state, twist
-        return xp.narrowed(z, *given), xp.narrowed(wrenches, *given)
+        return xp.narrowed(equations.joined(xp, z), *given), xp.narrowed(wrenches, *given)
 
     # ------------------------------------------------------------------ inputs
 
@@ -162,6 +160,6 @@ class FrictionModule(TensorModel, nn.Module):
         return parameters
 
 
-def _each_step(value: Any, steps: int, axis: int) -> Iterable[Any]:
-    """Return the value of each step, whose axis lies in front of `axis`; a plain number is the same for all steps."""
-    return value.unbind(value.ndim + axis - 1) if isinstance(value, Tensor) else [value] * steps
+def _like(by: Any, values: Any) -> Any:
+    """Return values as a record, or a tuple, like `by`."""
+    return type(by)(*values) if hasattr(by, "_fields") else values

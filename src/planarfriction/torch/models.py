@@ -51,7 +51,7 @@ class DistributedModel(FrictionModule):
         device: torch.device | str | None = None,
     ):
         super().__init__(patch, law)
-        cells = distributed.cells_of(patch, normal_force, "torch")
+        cells = distributed.cells_of(patch, law, normal_force)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         numbers, chosen = law.numbers._asdict(), tuple(trainable)
         lever = float(patch.contact_radius(normal_force))
@@ -71,8 +71,8 @@ class DistributedModel(FrictionModule):
 
     @property
     def state_shape(self) -> tuple[int, ...]:
-        """Shape of the state of one contact, `(2, N)`."""
-        return 2, self.positions.shape[1]
+        """Shape of the state of one contact, `(2, N)` of points, `(3, N)` of discs."""
+        return distributed.KINDS[len(self.positions)].bristles, self.positions.shape[1]
 
     def compiled(self) -> Compiled:
         """Return the model as compiled rollouts take it."""
