@@ -164,23 +164,24 @@ UNEVEN = 1.2
 """Unevenness of the bristles inside a disc [-]: 1 for a rigid field, more takes off a small delay of slip."""
 
 
+DISC_REST = 1e-37
+"""Fourth power of a speed, 0.6 nm/s [m^4/s^4], below which the surface of a disc is replaced by that at rest: an
+ellipsoid with `m = 1/4`. Even in single precision it leaves nothing to divide by zero."""
+
+
 def disc_friction(xp, slide, spin):
     """Sliding friction of a disc, `c_t`, `c_s` and `m` [-], from `p = |u|^2` of its centre and `o = (a omega)^2`.
 
-    The mean speed of the disc is `S = sqrt(p + m o)`, with `m = 1/4 + 7/36 (e_1 + A e_2)` and, of `x = p/(p + o)` and
-    `y = o/(p + o)`, `(e_1, e_2, e_3) = (y^2, x y, x^2)/(y^2 + B x y + C x^2)`. Force and scaled torque of sliding are
-    `W/S` with `W = (c_t u, c_s kappa a omega)`, the gradient of S: `c_t = 1 + h e_1`, `c_s = 2 (m - h e_2)`, and
-    `h = 7/36 ((A - B) e_1 - 2 C e_2 - A C e_3)`. Within 0.0085 of the exact disc. ("Discs")
+    The mean speed of the disc is `S = sqrt(p + m o)`, with `m = 1/4 + 7/36 (e_1 + A e_2)` and `(e_1, e_2, e_3) = (o^2,
+    p o, p^2)/(o^2 + B p o + C p^2)`. Force and scaled torque of sliding are `W/S` with `W = (c_t u, c_s kappa a omega)`,
+    the gradient of S: `c_t = 1 + h e_1`, `c_s = 2 (m - h e_2)`, and `h = 7/36 ((A - B) e_1 - 2 C e_2 - A C e_3)`. Within
+    0.0085 of the exact disc. ("Discs")
     """
-    total = slide + spin
-    per = 1.0 / xp.where(total > 0.0, total, 1.0)
-    x, y = slide * per, spin * per
-    y = xp.where(total > 0.0, y, 1.0)
-    xx, xy, yy = x * x, x * y, y * y
-    scale = 1.0 / (yy + (DISC_B * xy + DISC_C * xx))
-    e_1, e_2, e_3 = yy * scale, xy * scale, xx * scale
-    h = (7.0 / 36.0) * ((DISC_A - DISC_B) * e_1 - 2.0 * DISC_C * e_2 - DISC_A * DISC_C * e_3)
-    m = 0.25 + (7.0 / 36.0) * (e_1 + DISC_A * e_2)
+    pp, po, oo = slide * slide, slide * spin, spin * spin
+    per = 1.0 / (oo + (DISC_B * po + DISC_C * pp) + DISC_REST)
+    e_1, e_2, e_3 = oo * per, po * per, pp * per
+    h = (7.0 / 36.0 * (DISC_A - DISC_B)) * e_1 - (7.0 / 18.0 * DISC_C) * e_2 - (7.0 / 36.0 * DISC_A * DISC_C) * e_3
+    m = 0.25 + 7.0 / 36.0 * e_1 + (7.0 / 36.0 * DISC_A) * e_2
     return 1.0 + h * e_1, 2.0 * (m - h * e_2), m
 
 

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 LARGEST: float
 PARAMETERS: tuple[str, ...]
 DISC_A: float
+DISC_REST: float
 DISC_B: float
 DISC_C: float
 UNEVEN: float

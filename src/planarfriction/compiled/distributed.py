@@ -15,9 +15,9 @@ from planarfriction.compiled.rates import linearised
 from planarfriction.compiled.shapes_by_load import ShapesByLoad, cells_by_load
 from planarfriction.compiler.memory import places_of, rows_of, size_of
 from planarfriction.kernels import cells as contacts
+from planarfriction.kernels import disc_cells, disc_passes
 from planarfriction.kernels import distributed_step as steps
 from planarfriction.kernels.contacts import ModelFunctions
-from planarfriction.kernels.disc_cells import DISCS, LEANING_DISCS, TURNED_DISCS
 from planarfriction.kernels.discs import KAPPA
 from planarfriction.kernels.general_cells import MATRICES
 from planarfriction.kernels.leaning_cells import RATES_OF_LEANING, STEPS_OF_LEANING
@@ -42,7 +42,11 @@ class CompiledDistributed(CompiledModel):
     def _functions(self) -> tuple[ModelFunctions, StepFunctions]:
         turned = self.patch.anisotropic
         if self.size == 3:
-            return LEANING_DISCS if self.patch.asymmetric else TURNED_DISCS if turned else DISCS
+            if self.patch.asymmetric:
+                return disc_cells.RATES_OF_LEANING_DISCS, disc_cells.STEPS_OF_LEANING_DISCS
+            if turned:
+                return disc_cells.RATES_OF_TURNED_DISCS, disc_passes.TURNED_STEPS
+            return disc_cells.RATES_OF_DISCS, disc_passes.STEPS
         if self.patch.asymmetric:
             return RATES_OF_LEANING, STEPS_OF_LEANING
         return (contacts.TURNED, steps.TURNED) if turned else (contacts.ISOTROPIC, steps.ISOTROPIC)

@@ -16,6 +16,7 @@ from planarfriction.geometry import transformed
 from planarfriction.kernels import (
     cells_rollout,
     cells_sensitivities,
+    disc_passes,
     published_rollout,
     published_step,
     reduced_loads,
@@ -85,7 +86,7 @@ REDUCED_BY_LOAD = _family_of(_OF_LAW, reduced_step.NAMES, reduced_loads, reduced
 """The same where the shape follows the load."""
 
 
-def _cells(entries: cells_rollout.CellRollouts, forwards: Callable[..., None]) -> Family:
+def _cells(entries: cells_rollout.CellRollouts, forwards: Callable[..., None], size: int = 2) -> Family:
     def sensitivities(
         inputs: Inputs, span: Any, z: np.ndarray, columns: np.ndarray, wrenches: np.ndarray, slopes: np.ndarray
     ) -> None:
@@ -95,7 +96,7 @@ def _cells(entries: cells_rollout.CellRollouts, forwards: Callable[..., None]) -
         if blocks == 1 or len(wrenches) > 1:
             forwards(inputs, span, z, wanted, wrenches, slopes)
             return
-        state, data = z.reshape(1, 1, 2, -1), inputs.data.reshape(blocks, -1)
+        state, data = z.reshape(1, 1, size, -1), inputs.data.reshape(blocks, -1)
 
         def one(k: int) -> tuple[np.ndarray, np.ndarray]:
             cells = slice(k * lanes, (k + 1) * lanes)
@@ -103,7 +104,7 @@ def _cells(entries: cells_rollout.CellRollouts, forwards: Callable[..., None]) -
             shapes, by_load = (np.ascontiguousarray(each[..., cells]) for each in (inputs.shapes, inputs.by_load))
             part = inputs._replace(data=data[k], shapes=shapes, by_load=by_load)
             forwards(part, span, own, wanted, *found)
-            state[..., cells] = own.reshape(1, 1, 2, -1)
+            state[..., cells] = own.reshape(1, 1, size, -1)
             return found
 
         for found, change in threads.each(one, range(blocks)):
@@ -118,7 +119,13 @@ CELLS, TURNED_CELLS = (
     _cells(cells_rollout.ISOTROPIC, cells_sensitivities.ISOTROPIC),
     _cells(cells_rollout.TURNED, cells_sensitivities.TURNED),
 )
-"""`DistributedModel`, isotropic or with a friction metric."""
+"""`DistributedModel` of points, isotropic or with a friction metric."""
+
+DISCS, TURNED_DISCS = (
+    _cells(disc_passes.ROLLOUTS, disc_passes.SENSITIVITIES, 3),
+    _cells(disc_passes.TURNED_ROLLOUTS, disc_passes.TURNED_SENSITIVITIES, 3),
+)
+"""`DistributedModel` of discs."""
 
 
 class Packed(NamedTuple):
@@ -133,12 +140,14 @@ class Packed(NamedTuple):
     """Symmetric `[3, 3]`, or None: twists go in through it, wrenches come out."""
     cells: int = 0
     """Number of cells, each with a bristle; 0 for a model of three states a part."""
+    size: int = 2
+    """Components of the bristle of a cell."""
 
     @property
     def inner(self) -> tuple[int, ...]:
         """Shape of the state of one contact."""
         if self.cells:
-            return 2, self.cells
+            return self.size, self.cells
         return (3,) if len(self.rows) == 1 else (len(self.rows), 3)
 
     def turned(self, vectors: np.ndarray) -> np.ndarray:
@@ -191,7 +200,8 @@ def _family(model: Any) -> Family:
     if isinstance(model, ReducedModelPublished):
         return PUBLISHED
     if isinstance(model, DistributedModel) and not (is_rate_law(model.law) or model.patch.asymmetric):
-        return TURNED_CELLS if model.patch.anisotropic else CELLS
+        families = (DISCS, TURNED_DISCS) if model.patch.radii.any() else (CELLS, TURNED_CELLS)
+        return families[model.patch.anisotropic]
     given = "cells with a RateLaw or an asymmetry" if isinstance(model, DistributedModel) else type(model).__name__
     raise InvalidValueError("model", "be one that has compiled roll-outs", given)
 
@@ -231,7 +241,7 @@ def _packed(model: Any) -> Packed:
     if isinstance(model, DistributedModel):
         at_loads = model.compiled.at_loads
         shapes = at_loads if model.depends_on_load else at_loads(np.ones(1), False)
-        return Packed(family, np.array([law]), shapes, cells=model.state_shape[1])
+        return Packed(family, np.array([law]), shapes, cells=model.state_shape[1], size=model.state_shape[0])
     if not model.depends_on_load:
         return pack_parts(law, model.parts_at(1.0))
     row = [*law, *np.zeros(len(reduced_step.NAMES) - len(law))]
@@ -287,13 +297,16 @@ def pack_surface(
 
 
 def pack_cells(elasto_plastic: bool, positions: np.ndarray, weights: np.ndarray) -> Packed:
-    """Return a `DistributedModel` by its cells `[2, N]` (or levers `[5, N]`) and weights `[N]`; see `pack_maps`."""
+    """Return a `DistributedModel` by its cells and their weights `[N]`; see `pack_maps`.
+
+    `positions` are `[2, N]`, or levers `[5, N]`; of discs `[3, N]` or `[6, N]`, with `kappa a` behind them.
+    """
     levers, shares = np.asarray(positions, dtype=float), np.asarray(weights, dtype=float)[None]
-    family = CELLS if len(levers) == 2 else TURNED_CELLS
-    if family is TURNED_CELLS:
+    family = {2: CELLS, 3: DISCS, 5: TURNED_CELLS, 6: TURNED_DISCS}[len(levers)]
+    if len(levers) > 3:
         levers = np.vstack([levers, np.zeros((2, levers.shape[1]))])  # no asymmetry
-    cells = levers, shares
-    return Packed(family, np.array([_any_law(elasto_plastic)]), cells_by_load(*cells, None), cells=len(weights))
+    shapes, size = cells_by_load(levers, shares, None), 3 if family in (DISCS, TURNED_DISCS) else 2
+    return Packed(family, np.array([_any_law(elasto_plastic)]), shapes, cells=len(weights), size=size)
 
 
 def _any_law(elasto_plastic: bool) -> LawNumbers:

@@ -32,8 +32,8 @@ from planarfriction.export.c_values import (
     mapped,
     plain,
 )
-from planarfriction.export.trace import Number, Table, Trace, traced
-from planarfriction.export.twins import twin
+from planarfriction.kernels.trace import Number, Table, Trace, traced
+from planarfriction.kernels.twins import twin
 from planarfriction.kernels import surfaces
 from planarfriction.kernels.definitions import definition_of
 

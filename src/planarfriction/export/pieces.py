@@ -9,10 +9,11 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction.errors import InvalidValueError
-from planarfriction.export.trace import Block, Mathematics, Number, Table, Trace, traced
-from planarfriction.export.twins import twin
+from planarfriction.kernels.trace import Block, Mathematics, Number, Table, Trace, traced
+from planarfriction.kernels.twins import twin
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import cells, cells_rollout, distributed_step, moment_steps, published_step, reduced_step
+from planarfriction.kernels.derive import derive
 from planarfriction.kernels.law import grip
 from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, Root
 from planarfriction.kernels.reduced_contact import ReducedContact, ReducedPatch
@@ -154,7 +155,8 @@ def _distributed(model: DistributedModel) -> Pieces:
 
     def slopes(trace: Trace) -> Any:
         own = _vector(trace, *(f"{name}[k]" for name in names))
-        forth, back = twin(cells_rollout._WRITTEN.forth), twin(cells_rollout._WRITTEN.back)
+        written = derive(distributed_step.cell, cells_rollout.BY, ("z", "u"))
+        forth, back = twin(written.forth), twin(written.back)
         u, none, units = lever.seen(own, _vector(trace, *_TWIST)), (0.0, 0.0), np.eye(3).tolist()
         z, dt = _vector(trace, "z[k]", f"z[{n} + k]"), Number(trace, "dt")
         (new, traction), tape = forth(_law(trace, law), z, u, dt)

@@ -22,12 +22,12 @@ VECTOR = 8
 LANES = 64
 """Most cells of a block: several of the longest vectors of processors, so that constants are read once for all."""
 
-Z, WEIGHT, BY_LOAD, BAR, OUT = (LANES * n for n in (5, 7, 8, 9, 11))
+Z, WEIGHT, BY_LOAD, BAR, OUT = (LANES * n for n in (6, 9, 10, 11, 14))
 """Fields of a block behind the numbers of the levers: state, weights, their slopes by the load, cotangent or change of
-the state, and the wrench with its change, which add up over the cells. Blocks share nothing, so that each is seen to be
-free of dependences."""
+the state, and the wrench with its change, which add up over the cells; three fields for a state, of which points use
+two. Blocks share nothing, so that each is seen to be free of dependences."""
 
-BLOCK = LANES * 17
+BLOCK = LANES * 21
 """Numbers of a block: an odd number of fields, for if it were a power of two, blocks would drive each other out of the
 cache."""
 
@@ -58,17 +58,26 @@ def put_pair(block, field, i, a):
     block[field + i], block[field + LANES + i] = a
 
 
+class Kind(NamedTuple):
+    """Compiled functions of a kind of cells in blocks."""
+
+    lever: Any
+    size: int
+    """Components of a bristle."""
+    advance: Any
+    """`(lever, law, w, blocks, lanes, twist, dt)`: step the cells, and return their wrench."""
+    retreat: Any
+    """`(lever, law, block, lanes, held, pull, load)`: carry cotangents over a step (see `cell_slopes`)."""
+    pushed: Any
+    """`(law, z, u, dt, dz, du, changes of the law)`: step a cell and its change."""
+    vector: Any
+    """`(row, first, stride)`: return the components of a bristle."""
+
+
 @kernel
 def lever_at(lever, block, i):
     """Return the numbers of the lever of cell i."""
     return lever.of(Block(block, LANES), i)
-
-
-@kernel
-def clear(block, count):
-    """Write zeros."""
-    for i in range(count):
-        block[i] = 0.0
 
 
 @kernel

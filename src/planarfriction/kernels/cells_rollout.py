@@ -24,19 +24,17 @@ from planarfriction.kernels.cell_blocks import (
     OUT,
     WEIGHT,
     Z,
+    Kind,
     divided,
     lever_at,
-    pair,
-    put_pair,
     totals,
 )
 from planarfriction.kernels.cell_passes import advance
 from planarfriction.kernels.cell_slopes import retreat
-from planarfriction.kernels.derive import derive
 from planarfriction.kernels.forward import forward
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rollouts import row_of
-from planarfriction.kernels.vectors import add, plus, scatter, three, times
+from planarfriction.kernels.vectors import add, plus, reader_of, scatter, three, times
 
 PARAMETERS = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
 """Numbers of the law that derivatives are taken by."""
@@ -44,51 +42,57 @@ PARAMETERS = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "b
 COLUMNS = tuple(LawNumbers._fields.index(name) for name in PARAMETERS)
 """Their places in a row."""
 
-_BY = ("z", "u", *(f"law.{name}" for name in PARAMETERS))
-_WRITTEN = derive(distributed_step.cell, _BY, ("z", "u"))
-_pushed = forward(distributed_step.cell, _BY, ("z", "u"))
+BY = ("z", "u", *(f"law.{name}" for name in PARAMETERS))
+"""What steps of cells are differentiated by."""
+
+
+def pushed_of(step: Any) -> Any:
+    """Return `Kind.pushed` of the step of a cell."""
+    return forward(step, BY, ("z", "u"))
 
 
 # ---------------------------------------------------------------------- blocks
 
 
 @kernel
-def _lay(w, blocks, levers, size=BLOCK):
+def _lay(w, blocks, levers, numbers=BLOCK):
     """Write the numbers of the levers, states of zero and no cotangents."""
     per_block = levers.shape[0] // blocks
     for k in range(blocks):
-        block = at(w, k * size)
-        for i in range(size):
+        block = at(w, k * numbers)
+        for i in range(numbers):
             block[i] = 0.0
         for i in range(per_block):
             block[i] = levers[k * per_block + i]
 
 
 @kernel
-def _write(w, field, values, n, size=BLOCK):
-    """Write vectors [2 n] to a field of all blocks."""
+def _write(w, field, values, n, size, numbers=BLOCK):
+    """Write vectors [size n] to a field of all blocks, which have so many numbers."""
     blocks, lanes = divided(n)
     for k in range(blocks):
-        block, first = at(w, k * size + field), k * lanes
+        block, first = at(w, k * numbers + field), k * lanes
         for i in range(min(lanes, n - first)):
-            block[i], block[LANES + i] = values[first + i], values[n + first + i]
+            for m in range(size):
+                block[m * LANES + i] = values[m * n + first + i]
 
 
 @kernel
-def _read(w, field, values, n, size=BLOCK):
-    """Read vectors [2 n] from a field of all blocks."""
+def _read(w, field, values, n, size, numbers=BLOCK):
+    """Read vectors [size n] from a field of all blocks."""
     blocks, lanes = divided(n)
     for k in range(blocks):
-        block, first = at(w, k * size + field), k * lanes
+        block, first = at(w, k * numbers + field), k * lanes
         for i in range(min(lanes, n - first)):
-            values[first + i], values[n + first + i] = block[i], block[LANES + i]
+            for m in range(size):
+                values[m * n + first + i] = block[m * LANES + i]
 
 
 @kernel
-def _forget(w, blocks, field):
+def _forget(w, blocks, field, size):
     for k in range(blocks):
         block = at(w, k * BLOCK + field)
-        for i in range(2 * LANES):
+        for i in range(size * LANES):
             block[i] = 0.0
 
 
@@ -104,7 +108,7 @@ def _weigh(w, blocks, lanes, weights, by_load):
 
 
 @kernel
-def _roll(lever, law, inputs, b, n, w, wrench, states):
+def _roll(kind, law, inputs, b, n, w, wrench, states):
     twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
     which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shapes[0], -1
     (blocks, lanes), kept = divided(weights.shape[1]), states.shape[0] > 0
@@ -113,40 +117,40 @@ def _roll(lever, law, inputs, b, n, w, wrench, states):
             last = which[t]
             _weigh(w, blocks, lanes, weights[last], inputs.by_load[0, last])
         if kept:
-            _read(w, Z, states[t], n)
+            _read(w, Z, states[t], n, kind.size)
         load, twist, dt = loads[t], three(twists[t]), inputs.dt[t]
         if load == 0.0:
-            _forget(w, blocks, Z)
+            _forget(w, blocks, Z, kind.size)
         else:
-            add(wrench[t], times(load, advance(lever, law, w, blocks, lanes, twist, dt)))
+            add(wrench[t], times(load, kind.advance(kind.lever, law, w, blocks, lanes, twist, dt)))
 
 
 @kernel
-def _rollout(lever, inputs, span, z, wrench, states, scratch):
-    w, n, rows = pointer(scratch), z.shape[2] // 2, inputs.rows[0]
+def _rollout(kind, inputs, span, z, wrench, states, scratch):
+    w, n, rows = pointer(scratch), z.shape[2] // kind.size, inputs.rows[0]
     blocks, _ = divided(inputs.shapes.shape[2])
     for b in range(span[0], span[1]):
         law = law_of(rows[row_of(rows, b)])
         _lay(w, blocks, inputs.data)
-        _write(w, Z, z[0, b], n)
-        _roll(lever, law, inputs, b, n, w, wrench[b], states[0, b])
-        _read(w, Z, z[0, b], n)
+        _write(w, Z, z[0, b], n, kind.size)
+        _roll(kind, law, inputs, b, n, w, wrench[b], states[0, b])
+        _read(w, Z, z[0, b], n, kind.size)
 
 
-def rollout(lever, inputs, span, z, wrench, states):
-    """Step the contacts `span[0]` to `span[1]`: `z` [1, B, 2 n] in place, wrenches added to `wrench` [B, T, 3].
+def rollout(kind, inputs, span, z, wrench, states):
+    """Step the contacts `span[0]` to `span[1]`: `z` [1, B, size n] in place, wrenches added to `wrench` [B, T, 3].
 
-    The state before each step goes into `states` [1, B, T, 2 n], unless that is empty.
+    The state before each step goes into `states` [1, B, T, size n], unless that is empty.
     """
     scratch = np.empty(divided(inputs.shapes.shape[2])[0] * BLOCK)
-    _rollout(lever, inputs, span, z, wrench, states, scratch)
+    _rollout(kind, inputs, span, z, wrench, states, scratch)
 
 
 # ---------------------------------------------------------------------- the adjoint
 
 
 @kernel
-def _pull(lever, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
+def _pull(kind, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
     """Carry the cotangents of a roll-out back, and return that of the law."""
     twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
     which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shapes[0], -1
@@ -155,10 +159,10 @@ def _pull(lever, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
         if which[t] != last:
             last = which[t]
             _weigh(w, blocks, lanes, weights[last], inputs.by_load[0, last])
-        _write(w, Z, states[t], n)
+        _write(w, Z, states[t], n, kind.size)
         load, pull, held = loads[t], three(pulls[t]), (three(twists[t]), inputs.dt[t])
         for k in range(blocks):
-            bars = retreat(lever, law, at(w, k * BLOCK), lanes, held, pull, load)
+            bars = kind.retreat(kind.lever, law, at(w, k * BLOCK), lanes, held, pull, load)
             add(twist_bar[t], bars.twist)
             load_bar[t] += bars.load
             by_law = plus(by_law, 1.0, bars.law)
@@ -166,52 +170,53 @@ def _pull(lever, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
 
 
 @kernel
-def _gradient(lever, inputs, states, wrench_bar, span, bars, scratch):
-    w, n, rows = pointer(scratch), bars.state.shape[2] // 2, inputs.rows[0]
+def _gradient(kind, inputs, states, wrench_bar, span, bars, scratch):
+    w, n, rows = pointer(scratch), bars.state.shape[2] // kind.size, inputs.rows[0]
     blocks, _ = divided(inputs.shapes.shape[2])
     for b in range(span[0], span[1]):
         law, before, pulls = law_of(rows[row_of(rows, b)]), states[0], wrench_bar[row_of(wrench_bar, b)]
         before, row_bar = before[row_of(before, b)], bars.rows[0, b]
         _lay(w, blocks, inputs.data)
-        _write(w, BAR, bars.state[0, b], n)
-        by_law = _pull(lever, law, inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b])
-        _read(w, BAR, bars.state[0, b], n)
+        _write(w, BAR, bars.state[0, b], n, kind.size)
+        by_law = _pull(kind, law, inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b])
+        _read(w, BAR, bars.state[0, b], n, kind.size)
         for m in range(len(by_law)):
             row_bar[COLUMNS[m]] += by_law[m]
 
 
-def gradient(lever, inputs, states, wrench_bar, span, bars):
+def gradient(kind, inputs, states, wrench_bar, span, bars):
     """Add the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
     scratch = np.empty(divided(inputs.shapes.shape[2])[0] * BLOCK)
-    _gradient(lever, inputs, states, wrench_bar, span, bars, scratch)
+    _gradient(kind, inputs, states, wrench_bar, span, bars, scratch)
 
 
 # ---------------------------------------------------------------------- forwards
 
 
 @kernel
-def _push_one(lever, law, by, block, i, twist, turn, dt, load, push):
+def _push_one(kind, law, by, block, i, twist, turn, dt, load, push):
     """Step a cell and its change, for changes `by` of the law, `turn` of the twist and `push` of the load."""
-    one, weight = lever_at(lever, block, i), block[WEIGHT + i]
-    new, traction, d_new, d_traction = _pushed(
-        law, pair(block, Z, i), lever.seen(one, twist), dt, pair(block, BAR, i), lever.seen(one, turn), *by
+    lever, weight = kind.lever, block[WEIGHT + i]
+    one, z, change = lever_at(lever, block, i), kind.vector(block, Z + i, LANES), kind.vector(block, BAR + i, LANES)
+    new, traction, d_new, d_traction = kind.pushed(
+        law, z, lever.seen(one, twist), dt, change, lever.seen(one, turn), *by
     )
-    put_pair(block, Z, i, new)
-    put_pair(block, BAR, i, d_new)
+    scatter(block, Z + i, LANES, new)
+    scatter(block, BAR + i, LANES, d_new)
     heavier = (weight + load * block[BY_LOAD + i]) * push
     change = plus(times(load * weight, d_traction), heavier, traction)
     scatter(block, OUT + i, LANES, (times(weight, lever.wrench(one, traction)), lever.wrench(one, change)))
 
 
 @kernel
-def _push(lever, law, by, block, twist, turn, dt, load, push, lanes):
+def _push(kind, law, by, block, twist, turn, dt, load, push, lanes):
     for i in range(lanes):
-        _push_one(lever, law, by, block, i, twist, turn, dt, load, push)
+        _push_one(kind, law, by, block, i, twist, turn, dt, load, push)
 
 
 @kernel
-def _tangent(lever, inputs, span, z, changes, wrenches, slopes, scratch):
-    w, n, rows = pointer(scratch), z.shape[2] // 2, inputs.rows[0]
+def _tangent(kind, inputs, span, z, changes, wrenches, slopes, scratch):
+    w, n, rows = pointer(scratch), z.shape[2] // kind.size, inputs.rows[0]
     weights, all_by_load = inputs.shapes[0], inputs.by_load[0]
     blocks, lanes = divided(weights.shape[1])
     for b in range(span[0], span[1]):
@@ -221,38 +226,38 @@ def _tangent(lever, inputs, span, z, changes, wrenches, slopes, scratch):
         which, last = which[row_of(which, b)], -1
         by = (*d_law[:7], d_law.breakaway_ratio)
         _lay(w, blocks, inputs.data)
-        _write(w, Z, z[0, b], n)
-        _write(w, BAR, changes.state[0, b], n)
+        _write(w, Z, z[0, b], n, kind.size)
+        _write(w, BAR, changes.state[0, b], n, kind.size)
         for t in range(inputs.dt.shape[0]):
             if which[t] != last:
                 last = which[t]
                 _weigh(w, blocks, lanes, weights[last], all_by_load[last])
             load, twist, turn, dt = loads[t], three(twists[t]), three(turns[t]), inputs.dt[t]
             for k in range(blocks):
-                _push(lever, law, by, at(w, k * BLOCK), twist, turn, dt, load, pushes[t], lanes)
+                _push(kind, law, by, at(w, k * BLOCK), twist, turn, dt, load, pushes[t], lanes)
             add(wrenches[b, t], times(load, totals(w, blocks, OUT, lanes)))
             add(slopes[b, t], totals(w, blocks, OUT + 3 * LANES, lanes))
             if load == 0.0:
-                _forget(w, blocks, Z)
-                _forget(w, blocks, BAR)
-        _read(w, Z, z[0, b], n)
-        _read(w, BAR, changes.state[0, b], n)
+                _forget(w, blocks, Z, kind.size)
+                _forget(w, blocks, BAR, kind.size)
+        _read(w, Z, z[0, b], n, kind.size)
+        _read(w, BAR, changes.state[0, b], n, kind.size)
 
 
-def tangent(lever, inputs, span, z, changes, wrenches, slopes):
+def tangent(kind, inputs, span, z, changes, wrenches, slopes):
     """Run roll-outs with their change along given ones of the inputs, added to `wrenches` and `slopes` [B, T, 3].
 
     `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state in place.
     """
     scratch = np.empty(divided(inputs.shapes.shape[2])[0] * BLOCK)
-    _tangent(lever, inputs, span, z, changes, wrenches, slopes, scratch)
+    _tangent(kind, inputs, span, z, changes, wrenches, slopes, scratch)
 
 
-# ---------------------------------------------------------------------- bound to the levers
+# ---------------------------------------------------------------------- bound to kinds of cells
 
 
 class CellRollouts(NamedTuple):
-    """Entry points of cells with one kind of lever."""
+    """Entry points of a kind of cells."""
 
     rollout: Any
     gradient: Any
@@ -260,12 +265,16 @@ class CellRollouts(NamedTuple):
 
 
 class _Model(NamedTuple):
-    lever: Any
+    kind: Kind
 
 
-def _bound(lever: Any, name: str) -> CellRollouts:
-    return CellRollouts(*(bind(each, _Model(lever), f"{name}_{each.__name__}", jit) for each in TEMPLATES))
+def bound(kind: Kind, name: str) -> CellRollouts:
+    """Return the entry points of a kind of cells."""
+    return CellRollouts(*(bind(each, _Model(kind), f"{name}_{each.__name__}", jit) for each in TEMPLATES))
 
 
 TEMPLATES = rollout, gradient, tangent
-ISOTROPIC, TURNED = _bound(cells.POSITIONS, "isotropic"), _bound(cells.LEVERS, "turned")
+POINTS = Kind(cells.POSITIONS, 2, advance, retreat, pushed_of(distributed_step.cell), reader_of(2))
+"""Points without a metric."""
+TURNED_POINTS = POINTS._replace(lever=cells.LEVERS)
+ISOTROPIC, TURNED = bound(POINTS, "isotropic"), bound(TURNED_POINTS, "turned")

@@ -6,15 +6,17 @@ of `sigma_1` and `sigma_2` move no bristle.
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.calls import pointer
 from planarfriction.compiler.memory import at
-from planarfriction.kernels import cells, distributed_step
+from planarfriction.kernels import distributed_step
 from planarfriction.kernels.bind import bind
-from planarfriction.kernels.cell_blocks import BLOCK, LANES, WEIGHT, Z, divided, lever_at, pair, put_pair
-from planarfriction.kernels.cells_rollout import _lay, _Model, _read, _write
+from planarfriction.kernels.cell_blocks import BLOCK, LANES, WEIGHT, Z, Kind, divided, lever_at
+from planarfriction.kernels.cells_rollout import POINTS, TURNED_POINTS, _lay, _read, _write
 from planarfriction.kernels.forward import forwards
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rollouts import row_of
@@ -25,62 +27,62 @@ PARAMETERS = (*_MOVING, "sigma_1", "sigma_2")
 """Numbers of the law, those first that move bristles."""
 
 _BY = tuple((f"law.{name}", "z")[: 1 + (name in _MOVING)] for name in PARAMETERS)
-_pushed = forwards(distributed_step.cell, _BY, ("z", "u")).pushed
 
-_CHANGE, _PULL = BLOCK, BLOCK + 2 * LANES * len(_MOVING)
+_CHANGE, _PULL = BLOCK, BLOCK + 3 * LANES * len(_MOVING)
 """Fields behind those of a block: changes of the state, and traction with its changes."""
 
-_ALL = _PULL + 2 * LANES * (1 + len(PARAMETERS))
+_ALL = _PULL + 3 * LANES * (1 + len(PARAMETERS))
 _SIZE = _ALL + LANES * (1 - _ALL // LANES % 2)
 """Numbers of a block, an odd number of fields (see `cell_blocks`)."""
 
 
 @kernel
-def _change(block, n, i):
-    return pair(block, _CHANGE + 2 * n * LANES, i)
+def _change(kind, block, n, i):
+    return kind.vector(block, _CHANGE + kind.size * n * LANES + i, LANES)
 
 
 @kernel
-def _push_one(lever, law, block, i, twist, dt):
-    found = _pushed(
-        law, pair(block, Z, i), lever.seen(lever_at(lever, block, i), twist), dt, 1.0, _change(block, 0, i), 1.0,
-        _change(block, 1, i), 1.0, _change(block, 2, i), 1.0, _change(block, 3, i), 1.0, _change(block, 4, i), 1.0,
-        _change(block, 5, i), 1.0, 1.0
+def _push_one(kind, pushed, law, block, i, twist, dt):
+    z, u = kind.vector(block, Z + i, LANES), kind.lever.seen(lever_at(kind.lever, block, i), twist)
+    found = pushed(
+        law, z, u, dt, 1.0, _change(kind, block, 0, i), 1.0, _change(kind, block, 1, i), 1.0,
+        _change(kind, block, 2, i), 1.0, _change(kind, block, 3, i), 1.0, _change(kind, block, 4, i), 1.0,
+        _change(kind, block, 5, i), 1.0, 1.0
     )  # fmt: skip
-    put_pair(block, Z, i, found[0])
+    scatter(block, Z + i, LANES, found[0])
     scatter(block, _CHANGE + i, LANES, found[2:14:2])
     scatter(block, _PULL + i, LANES, found[1::2])
 
 
 @kernel
-def _push(lever, law, block, twist, dt, lanes):
+def _push(kind, pushed, law, block, twist, dt, lanes):
     for i in range(lanes):
-        _push_one(lever, law, block, i, twist, dt)
+        _push_one(kind, pushed, law, block, i, twist, dt)
 
 
 @kernel
-def _total(lever, block, lanes, load, n):
+def _total(kind, block, lanes, load, n):
     """Return the wrench of a block, n = 0, or its change with the number n - 1 of the law.
 
     The load is a factor inside the sum, so that what adds up blocks rounds alike in compiled code and outside.
     """
     total = (0.0, 0.0, 0.0)
     for i in range(lanes):
-        pull = pair(block, _PULL + 2 * n * LANES, i)
-        total = plus(total, load * block[WEIGHT + i], lever.wrench(lever_at(lever, block, i), pull))
+        pull = kind.vector(block, _PULL + kind.size * n * LANES + i, LANES)
+        total = plus(total, load * block[WEIGHT + i], kind.lever.wrench(lever_at(kind.lever, block, i), pull))
     return total
 
 
 @kernel
 def _forget(block):
-    for i in range(2 * LANES):
+    for i in range(3 * LANES):
         block[Z + i] = 0.0
     for i in range(_CHANGE, _PULL):
         block[i] = 0.0
 
 
 @kernel
-def _follow(lever, law, block, inputs, b, k, lanes, wanted, wrench, slopes):
+def _follow(kind, pushed, law, block, inputs, b, k, lanes, wanted, wrench, slopes):
     """Step block k of contact b through all steps: one block fits into the cache."""
     twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
     which, last = inputs.which[row_of(inputs.which, b)], -1
@@ -93,35 +95,47 @@ def _follow(lever, law, block, inputs, b, k, lanes, wanted, wrench, slopes):
         if load == 0.0:
             _forget(block)
             continue
-        _push(lever, law, block, three(twists[t]), inputs.dt[t], lanes)
-        add(wrench[t], _total(lever, block, lanes, load, 0))
+        _push(kind, pushed, law, block, three(twists[t]), inputs.dt[t], lanes)
+        add(wrench[t], _total(kind, block, lanes, load, 0))
         for d in range(wanted.shape[0]):
-            change = _total(lever, block, lanes, load, 1 + wanted[d])
+            change = _total(kind, block, lanes, load, 1 + wanted[d])
             for m in range(3):
                 slopes[t, m, d] += change[m]
 
 
 @kernel
-def _sensitivities(lever, inputs, span, z, wanted, wrenches, slopes, scratch):
-    w, n, rows = pointer(scratch), z.shape[2] // 2, inputs.rows[0]
+def _sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes, scratch):
+    w, n, rows = pointer(scratch), z.shape[2] // kind.size, inputs.rows[0]
     blocks, lanes = divided(inputs.shapes.shape[2])
     for b in range(span[0], span[1]):
         _lay(w, blocks, inputs.data, _SIZE)
-        _write(w, Z, z[0, b], n, _SIZE)
+        _write(w, Z, z[0, b], n, kind.size, _SIZE)
         law = law_of(rows[row_of(rows, b)])
         for k in range(blocks):
-            _follow(lever, law, at(w, k * _SIZE), inputs, b, k, lanes, wanted, wrenches[b], slopes[b])
-        _read(w, Z, z[0, b], n, _SIZE)
+            _follow(kind, pushed, law, at(w, k * _SIZE), inputs, b, k, lanes, wanted, wrenches[b], slopes[b])
+        _read(w, Z, z[0, b], n, kind.size, _SIZE)
 
 
-def sensitivities(lever, inputs, span, z, wanted, wrenches, slopes):
+def sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes):
     """Run roll-outs with their derivatives by the numbers `wanted` of `PARAMETERS`.
 
-    They are added to `wrenches` [B, T, 3] and `slopes` [B, T, 3, len(wanted)]; `z` [1, B, 2 n] in place.
+    They are added to `wrenches` [B, T, 3] and `slopes` [B, T, 3, len(wanted)]; `z` [1, B, size n] in place.
     """
     scratch = np.empty(divided(inputs.shapes.shape[2])[0] * _SIZE)
-    _sensitivities(lever, inputs, span, z, wanted, wrenches, slopes, scratch)
+    _sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes, scratch)
 
 
-ISOTROPIC = bind(sensitivities, _Model(cells.POSITIONS), "isotropic_sensitivities", jit)
-TURNED = bind(sensitivities, _Model(cells.LEVERS), "turned_sensitivities", jit)
+class _Model(NamedTuple):
+    kind: Kind
+    pushed: Any
+    """`(law, z, u, dt, changes)`: step a cell and its changes by each number of the law."""
+
+
+def bound(kind: Kind, step: Any, name: str) -> Any:
+    """Return the entry point of a kind of cells, with the step of one."""
+    pushed = forwards(step, _BY, ("z", "u")).pushed
+    return bind(sensitivities, _Model(kind, pushed), f"{name}_sensitivities", jit)
+
+
+ISOTROPIC = bound(POINTS, distributed_step.cell, "isotropic")
+TURNED = bound(TURNED_POINTS, distributed_step.cell, "turned")

@@ -118,13 +118,12 @@ def step_leaning(lean, z, u, dt):
 # ---------------------------------------------------------------------- bound to the levers
 
 BRISTLE = bristle(discs.evaluate, discs.step, 3)
-_LEANING = bristle(evaluate_leaning, step_leaning, 3)
-_MODELS = {
-    "discs": {"lever": POSITIONS, "bristle": BRISTLE, "read": cells.read},
-    "turned_discs": {"lever": LEVERS, "bristle": BRISTLE, "read": cells.read},
-    "leaning_discs": {"lever": LEVERS._replace(law=_leaning_law), "bristle": _LEANING, "read": cells.read},
+_LEANING = {
+    "lever": LEVERS._replace(law=_leaning_law),
+    "bristle": bristle(evaluate_leaning, step_leaning, 3),
+    "read": cells.read,
 }
-DISCS, TURNED_DISCS, LEANING_DISCS = (
-    (functions_of(name, RATES, **model), step_functions(name, STEPS, **model)) for name, model in _MODELS.items()
-)
-"""`ModelFunctions` and `StepFunctions` of discs, with a metric, and with asymmetric friction."""
+RATES_OF_DISCS = functions_of("discs", RATES, lever=POSITIONS, bristle=BRISTLE, read=cells.read)
+RATES_OF_TURNED_DISCS = functions_of("turned_discs", RATES, lever=LEVERS, bristle=BRISTLE, read=cells.read)
+RATES_OF_LEANING_DISCS = functions_of("leaning_discs", RATES, **_LEANING)
+STEPS_OF_LEANING_DISCS = step_functions("leaning_discs", STEPS, **_LEANING)

@@ -67,9 +67,9 @@ def _decay(law, deflection, along, spin_share, speed, q):
 
 
 @kernel
-def _rate(u, z, k, c_t, c_s):
-    """Return z'."""
-    k = k / (c_t * c_s)
+def _rate(u, z, k, c_t, c_s, per):
+    """Return z'; `per` is `1/(c_t c_s)`."""
+    k = k * per
     return u[0] - k * c_s * z[0], u[1] - k * c_s * z[1], u[2] - k * c_t * z[2]
 
 
@@ -79,7 +79,7 @@ def evaluate(law, z, u):
     c_t, c_s, speed, pull = sliding(u)
     q = grip(law, speed)
     deflection, along, share = _seen(z, pull, _per_h(speed, pull), q)
-    rate = _rate(u, z, _decay(law, deflection, along, share, speed, q), c_t, c_s)
+    rate = _rate(u, z, _decay(law, deflection, along, share, speed, q), c_t, c_s, 1.0 / (c_t * c_s))
     return rate, traction(law, z, rate, u)
 
 
@@ -94,8 +94,7 @@ def _ahead(z, u, k_dt, c_t, c_s, dt):
 
 @kernel
 def _relaxed(z, u, k_dt, c_t, c_s, dt):
-    """Return the bristle at the end of a step of mean k."""
-    k_dt = k_dt / (c_t * c_s)
+    """Return the bristle at the end of a step, `k_dt` being the mean of k dt over `c_t c_s`."""
     left_t, mean_t = formulas.relaxation(xp, k_dt * c_s)
     left_s, mean_s = formulas.relaxation(xp, k_dt * c_t)
     mean_t, mean_s = mean_t * dt, mean_s * dt
@@ -106,13 +105,13 @@ def _relaxed(z, u, k_dt, c_t, c_s, dt):
 def step(law, z, u, dt):
     """Return the bristle after dt and its traction, by the equations of `bristle_step`."""
     c_t, c_s, speed, pull = sliding(u)
-    q, per_h = grip(law, speed), _per_h(speed, pull)
+    q, per_h, per = grip(law, speed), _per_h(speed, pull), 1.0 / (c_t * c_s)
     deflection, along, share = _seen(z, pull, per_h, q)
     start = _decay(law, deflection, along, share, speed, q)
     far, along, share = _seen(_ahead(z, u, start * dt, c_t, c_s, dt), pull, per_h, q)
     end = _decay(law, far, along, share, speed, q)
-    free = _relaxed(z, u, formulas.mean_decay(start, end, dt) * dt, c_t, c_s, dt)
+    free = _relaxed(z, u, formulas.mean_decay(start, end, dt) * dt * per, c_t, c_s, dt)
     far, along, share = _seen(free, pull, per_h, q)
     new, far = capped(law, free, far, deflection)
-    rate = _rate(u, new, _decay(law, far, along, share, speed, q), c_t, c_s)
+    rate = _rate(u, new, _decay(law, far, along, share, speed, q), c_t, c_s, per)
     return new, traction(law, new, rate, u)

@@ -14,7 +14,6 @@ from planarfriction.kernels.cell_blocks import (
     LANES,
     WEIGHT,
     Z,
-    clear,
     divided,
     room,
 )
@@ -40,42 +39,47 @@ def _copy(count, of, to):
 
 
 @kernel
-def _fill(lever, own, z, first, count, block):
-    n = own.count
-    _copy(count, at(z, first), at(block, Z))
-    _copy(count, at(z, n + first), at(block, Z + LANES))
+def _fill(lever, size, own, z, first, count, lanes, block):
+    """Copy cells into a block, and fill its lanes up with cells without load at the origin."""
+    n, numbers = own.count, len(lever.of(own, first))
+    for i in range(count, lanes):
+        for m in range(numbers):
+            block[m * LANES + i] = 0.0
+        for m in range(size):
+            block[Z + m * LANES + i] = 0.0
+        block[WEIGHT + i] = 0.0
+    for m in range(size):
+        _copy(count, at(z, m * n + first), at(block, Z + m * LANES))
     _copy(count, at(own.weights, first), at(block, WEIGHT))
-    for m in range(len(lever.of(own, first))):
+    for m in range(numbers):
         _copy(count, at(own.cells, m * n + first), at(block, m * LANES))
 
 
 @kernel
-def _empty(block, first, count, n, new):
-    _copy(count, at(block, Z), at(new, first))
-    _copy(count, at(block, Z + LANES), at(new, n + first))
+def _empty(size, block, first, count, n, new):
+    for m in range(size):
+        _copy(count, at(block, Z + m * LANES), at(new, m * n + first))
 
 
 @kernel
-def _step(lever, law, own, z, twist, dt, new, out):
+def _step(lever, advance, size, law, own, z, twist, dt, new, out):
     n, all_of, block = own.count, (0.0, 0.0, 0.0), room(BLOCK)
     _, lanes = divided(n)
     for first in range(0, n, lanes):
         count = min(lanes, n - first)
-        if count < lanes:
-            clear(block, WEIGHT + LANES)
-        _fill(lever, own, z, first, count, block)
+        _fill(lever, size, own, z, first, count, lanes, block)
         all_of = plus(all_of, 1.0, advance(lever, law, block, 1, lanes, twist, dt))
-        _empty(block, first, count, n, new)
+        _empty(size, block, first, count, n, new)
     put(out, all_of)
 
 
-def step(lever, contact, z, v, dt, new, out):
+def step(lever, advance, size, contact, z, v, dt, new, out):
     """Advance the bristles by `dt` at a held twist (see `formulas.relaxation`), and write the wrench at the end."""
     own = cells.read(contact)
-    _step(lever, own.law, own, z, three(v), dt, new, out)
+    _step(lever, advance, size, own.law, own, z, three(v), dt, new, out)
 
 
 TEMPLATES = step, slopes
-_MODEL = {"bristle": bristle(None, cell), "read": cells.read}
+_MODEL = {"advance": advance, "size": 2, "bristle": bristle(None, cell), "read": cells.read}
 ISOTROPIC = step_functions("isotropic", TEMPLATES, lever=cells.POSITIONS, **_MODEL)
 TURNED = step_functions("turned", TEMPLATES, lever=cells.LEVERS, **_MODEL)

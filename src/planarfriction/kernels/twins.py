@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction.compiler import compiled_math, memory
-from planarfriction.export.trace import CompiledMathematics, Mathematics, Number, Table, flat
+from planarfriction.kernels.trace import CompiledMathematics, Mathematics, Number, Table, flat
 from planarfriction.kernels import hermite, published_contact, reduced_contact, vectors
 
 

@@ -1,0 +1,236 @@
+"""Loops over the cells of a block, written from a straight-line function of one cell.
+
+The step of a cell is a chain of hundreds of operations of which each waits for the one before. Cut into passes over all
+cells, each a few operations long, it leaves the processor many cells to work on at a time. The function is traced (see
+`trace`); the operations of each pass become the body of a loop, and what passes hand on lies in rows of scratch memory,
+which share their places if they do not live at the same time. Sums and products of two or three numbers, and
+comparisons, are done again where they are needed.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import kernel
+from planarfriction.kernels.cell_blocks import LANES
+from planarfriction.kernels.derive import run_source, text_of
+from planarfriction.kernels.law import squared
+from planarfriction.kernels.trace import Block, Operation
+from planarfriction.kernels.vectors import plus
+
+COSTS = {"exp(": 16, "sin(": 14, "cos(": 14, "log(": 16, "pow(": 30, "sqrt(": 8, " / ": 8}
+"""Costs of operations, in sums and products."""
+
+ARGUMENTS = "law, v, given, block, work"
+
+
+class Passes(NamedTuple):
+    """Loops over the cells of a block, as one function."""
+
+    run: Any
+    """`(law, v, given, block, work, lanes)`: run the passes, and return the sums over the cells."""
+    rows: int
+    """Rows [LANES] of scratch `work`."""
+    source: str
+
+
+class Part(NamedTuple):
+    """Operations of one pass, in order."""
+
+    operations: list[Operation]
+    reads: set[str]
+    """Numbers of the cell, numbers that all cells share, and results of earlier passes."""
+    sums: list[int]
+    """Sums over the cells that the pass makes."""
+
+
+def passes(
+    name: str, block: Block, inputs: Mapping[str, str], stores: Sequence[str], *, count: int, short: int
+) -> Passes:
+    """Write a traced function of a cell as about `count` passes, which do again what takes up to `short` operations.
+
+    `inputs` are the sources of its arguments by their names in the trace: those of a cell are read at `[... + i]`, all
+    cells share the others. The first results go to the places `stores`, the others are summed up over the cells.
+    """
+    parts = _parts(block, inputs, len(stores), count, short)
+    places, rows = _places(parts)
+    texts, calls = [], []
+    for k, part in enumerate(parts):
+        lines = [f"{_name(each)} = {places.get(each) or inputs[each]}" for each in sorted(part.reads)]
+        for each in part.operations:
+            lines.append(f"{each.name} = {_text(each)}")
+            if each.name in places:
+                lines.append(f"{places[each.name]} = {each.name}")
+        if k == len(parts) - 1:
+            lines += [f"{place} = {_name(each)}" for place, each in zip(stores, block.results, strict=False)]
+        total = "".join(f"{_name(block.results[len(stores) + each])}, " for each in part.sums)
+        texts += _loop(k, [*lines, f"return ({total})" if total else "return"], len(part.sums))
+        calls += _call(k, part.sums, any("pow(" in each.text for each in part.operations))
+    sums = "".join(f"sum_{each}, " for each in range(len(block.results) - len(stores)))
+    texts.append(text_of(f"run({ARGUMENTS}, lanes)", [*calls, f"return ({sums})" if sums else "return"]))
+    source = "\n\n".join(texts)
+    return Passes(_compiled(name, source, len(parts)), rows, source)
+
+
+def _loop(k: int, body: list[str], sums: int) -> list[str]:
+    """Return the source of a pass; its body apart, kernel later, leaves the compiler a loop that it can count."""
+    call = f"body_{k}({ARGUMENTS}, i)"
+    if sums:
+        lines = [f"total = ({'0.0, ' * sums})", "for i in range(lanes):", f"    total = plus(total, 1.0, {call})"]
+        lines.append("return total")
+    else:
+        lines = ["for i in range(lanes):", f"    {call}"]
+    return [text_of(f"body_{k}({ARGUMENTS}, i)", body), text_of(f"pass_{k}({ARGUMENTS}, lanes)", lines)]
+
+
+def _call(k: int, sums: list[int], power: bool) -> list[str]:
+    """Return the lines that call a pass; one that raises to the exponent of the law knows if that is 2."""
+    take = "".join(f"sum_{each}, " for each in sums) + "= " if sums else ""
+    call = f"{take}pass_{k}({ARGUMENTS}, lanes)"
+    if not power:
+        return [call]
+    return ["if law.gamma == 2.0:", f"    {call.replace('(law', '(squared(law)')}", "else:", f"    {call}"]
+
+
+def _compiled(name: str, source: str, count: int) -> Any:
+    space = run_source(name, source, {"xp": xp, "math": math, "inf": math.inf, "plus": plus, "squared": squared})
+    for k in range(count):
+        space[f"body_{k}"], space[f"pass_{k}"] = kernel(space[f"body_{k}"]), kernel(space[f"pass_{k}"])
+    return kernel(space["run"])
+
+
+# ---------------------------------------------------------------------- division among passes
+
+
+def _parts(block: Block, inputs: Mapping[str, str], stored: int, count: int, short: int) -> list[Part]:
+    """Divide the operations of a function among passes."""
+    operations = _used(block)
+    again = _done_again(operations, inputs, short)
+    own = [each for each in operations if each.name not in again]
+    cuts = _cuts(own, again, block, count)
+    part_of = {each.name: k for k, span in enumerate(zip(cuts, cuts[1:], strict=False)) for each in own[slice(*span)]}
+    last = len(cuts) - 2
+    found: list[Part] = []
+    sums = [max((part_of.get(name, 0) for name in _needed([each], again)), default=0) for each in block.results[stored:]]
+    for k in range(last + 1):
+        here = own[cuts[k] : cuts[k + 1]]
+        made = [i for i, part in enumerate(sums) if part == k]
+        ends = [block.results[stored + i] for i in made] + list(block.results[:stored] if k == last else ())
+        names = _names_needed([*here, *_as_operations(ends)], again)
+        inside = {each.name for each in here} | (names & again.keys())
+        ordered = [each for each in operations if each.name in inside]
+        found.append(Part(ordered, names - inside, made))
+    return found
+
+
+def _as_operations(results: Sequence[Any]) -> list[Operation]:
+    return [Operation("", "real", "{0}", (each,)) for each in results]
+
+
+def _used(block: Block) -> list[Operation]:
+    """Return the operations that the results of a block depend on."""
+    used, found = {each for each in block.results if isinstance(each, str)}, []
+    for each in reversed(block.operations):
+        if each.name in used:
+            used.update(_arguments(each))
+            found.append(each)
+    return found[::-1]
+
+
+def _arguments(operation: Operation) -> Iterator[str]:
+    return (each for each in operation.arguments if isinstance(each, str))
+
+
+def _done_again(operations: Sequence[Operation], inputs: Mapping[str, str], short: int) -> dict[str, Operation]:
+    """Return the operations that passes do again: short ones, comparisons, and those of numbers that all cells share."""
+    steps = dict.fromkeys(inputs, 0)
+    alike = {name for name, source in inputs.items() if not source.endswith("+ i]")}
+    found = {}
+    for each in operations:
+        names = list(_arguments(each))
+        if alike.issuperset(names):
+            alike.add(each.name)
+            steps[each.name] = 0
+        elif each.kind == "bool" or not re.fullmatch(r"\{0\} [-+*] \{1\}|-\{0\}", each.text):
+            steps[each.name] = short + (each.kind != "bool")
+        else:
+            steps[each.name] = 1 + sum(steps[name] for name in names)
+        if steps[each.name] <= short:
+            found[each.name] = each
+        else:
+            steps[each.name] = 0  # read by those that follow
+    return found
+
+
+def _needed(names: Sequence[Any], again: Mapping[str, Operation]) -> set[str]:
+    """Return the names that others follow from, through operations that are done again."""
+    found, left = set(), [each for each in names if isinstance(each, str)]
+    while left:
+        name = left.pop()
+        if name not in found:
+            found.add(name)
+            left += _arguments(again[name]) if name in again else ()
+    return found
+
+
+def _names_needed(operations: Sequence[Operation], again: Mapping[str, Operation]) -> set[str]:
+    return _needed([name for each in operations for name in _arguments(each)], again)
+
+
+def _cuts(own: Sequence[Operation], again: Mapping[str, Operation], block: Block, count: int) -> list[int]:
+    """Return where passes begin: about evenly by cost, where few numbers are handed on."""
+    costs = [next((cost for text, cost in COSTS.items() if text in each.text), 1) for each in own]
+    reached = [sum(costs[:k]) / sum(costs) * count for k in range(len(own))]
+    made = [each.name for each in own]
+
+    def handed(end: int) -> int:
+        return len(_names_needed([*own[end:], *_as_operations(block.results)], again).intersection(made[:end]))
+
+    ends = set()
+    for middle in range(1, count):
+        near = [k for k in range(1, len(own)) if abs(reached[k] - middle) < 0.25]
+        ends.add(min(near or [1], key=handed))
+    return [0, *sorted(ends), len(own)]
+
+
+def _places(parts: Sequence[Part]) -> tuple[dict[str, str], int]:
+    """Return the places of the numbers that passes hand on, and the number of rows of scratch that they take."""
+    last = {name: k for k, part in enumerate(parts) for name in part.reads}
+    places: dict[str, str] = {}
+    free: list[int] = []
+    rows = 0
+    ends: list[list[int]] = [[] for _ in parts]
+    kept = set().union(*(part.reads for part in parts))
+    for k, part in enumerate(parts):
+        for each in part.operations:
+            if each.name not in kept or each.name in places or last[each.name] <= k:
+                continue
+            if not free:
+                free.append(rows)
+                rows += 1
+            row = free.pop()
+            places[each.name] = f"work[{row * LANES} + i]"
+            ends[last[each.name]].append(row)
+        free += ends[k]
+    return places, rows
+
+
+# ---------------------------------------------------------------------- source
+
+
+def _name(atom: Any) -> str:
+    """Return a name of the trace as one of Python, or a constant."""
+    return re.sub(r"\W", "_", atom) if isinstance(atom, str) else repr(atom)
+
+
+def _text(operation: Operation) -> str:
+    text = operation.text.format(*map(_name, operation.arguments))
+    if " ? " in text:
+        condition, _, rest = text.partition(" ? ")
+        text = f"xp.where({condition}, {', '.join(rest.split(' : '))})"
+    text = text.replace("&&", "and").replace("||", "or").replace("$sqrt", "math.sqrt").replace("$fabs", "abs")
+    return re.sub(r"[$@]", "xp.", text).replace("xp.pow(", "xp.power(")
