@@ -188,16 +188,6 @@ def test_decay_by_breakaway_is_the_slope(ratio):
     assert formulas.bristle_decay_by_breakaway(np, 1e-16, 1e6, ratio) == 0.0  # beyond full deflection nothing moves
 
 
-@pytest.mark.parametrize("least", [0.2, 1.0])
-def test_floor_slopes_are_the_slopes(least):
-    value = np.linspace(-1.0, 3.0, 41) * least + 1e-2
-    by_value = slope(lambda v: formulas.floored(np, v, least), value, 1e-4)
-    by_least = slope(lambda e: formulas.floored(np, value, e), least, 1e-4)
-    # Quadratic: rounding of 1e-16/1e-4.
-    assert formulas.floored_slope(np, value, least) == pytest.approx(by_value, abs=1e-11)
-    assert formulas.floored_by_least(np, value, least) == pytest.approx(by_least, abs=1e-11)
-
-
 def test_relaxation_slope_is_the_slope():
     x = 10.0 ** np.linspace(-5.0, 2.0, 300)
     got = formulas.relaxation_slope(np, x, *formulas.relaxation(np, x))
