@@ -40,8 +40,8 @@ def drive(model, seed: int = 0):
 
 
 def bars(model, seed: int = 1):
-    random = np.random.default_rng(seed)
-    return random.normal(size=(T, 3)) * [1.0, 1.0, 150.0], random.normal(size=model.state_shape) * ([1e6, 1e6, 1e8] if model.state_shape == (3,) else 1e6)
+    random, sizes_of_state = np.random.default_rng(seed), [1e6, 1e6, 1e8] if model.state_shape == (3,) else 1e6
+    return random.normal(size=(T, 3)) * [1.0, 1.0, 150.0], random.normal(size=model.state_shape) * sizes_of_state
 
 
 @pytest.mark.torch

@@ -282,8 +282,9 @@ def test_no_steps_and_one_load_for_all_steps(name):
     model, (state, twists, _) = case.model, drive(case)
     end, wrenches = derivatives.rollout(model, state, np.empty((0, 3)), LOAD, DT)
     assert wrenches.shape == (0, 3) and np.array_equal(end, state)
-    nothing = derivatives.rollout_vjp(model, state, np.empty((0, 3)), LOAD, DT, np.empty((0, 3)), np.ones(model.state_shape))
-    assert np.array_equal(nothing.state, np.ones(model.state_shape)) and not nothing.parameters.any() and nothing.normal_force == 0.0
+    ones, none = np.ones(model.state_shape), np.empty((0, 3))
+    nothing = derivatives.rollout_vjp(model, state, none, LOAD, DT, none, ones)
+    assert np.array_equal(nothing.state, ones) and not nothing.parameters.any() and nothing.normal_force == 0.0
     whole, each = (
         derivatives.rollout_vjp(model, state, twists, f, DT, np.ones((T, 3))) for f in (1.3, np.full(T, 1.3))
     )

@@ -1,4 +1,4 @@
-"""Derivatives of the steps of bristles, cells and the published model against 60 digits, also where the cap and rounding meet."""
+"""Derivatives of steps of bristles, cells and the published model against 60 digits, also where cap and rounding meet."""
 
 from __future__ import annotations
 
