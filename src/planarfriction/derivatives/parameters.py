@@ -13,9 +13,10 @@ from planarfriction.compiler import threads
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
-from planarfriction.kernels import cells_rollout, cells_sensitivities, published_rollouts, published_step
+from planarfriction.kernels import cells_rollout, cells_sensitivities, published_step
 from planarfriction.kernels.cell_blocks import divided
 from planarfriction.kernels.law import LAW
+from planarfriction.kernels.published_rollouts import gradient, rollout
 from planarfriction.kernels.rollouts import Inputs
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModelPublished
@@ -62,8 +63,8 @@ class Family(NamedTuple):
 PUBLISHED = Family(
     PARAMETERS,
     np.array([published_step.NAMES.index(name) for name in PARAMETERS]),
-    published_rollouts.rollout,
-    published_rollouts.gradient,
+    rollout,
+    gradient,
     published_step.sensitivities,
     published_step.tangent,
 )
@@ -224,16 +225,12 @@ def pack_surface(
 
 
 def pack_cells(elasto_plastic: bool, positions: np.ndarray, weights: np.ndarray) -> Packed:
-    """Return a `DistributedModel` by its cells `[2, N]` (or levers `[5, N]`) and weights `[N]`.
-
-    Roll-outs are at given parameters, which take the place of those here.
-    """
+    """Return a `DistributedModel` by its cells `[2, N]` (or levers `[5, N]`) and weights `[N]`, for roll-outs at given parameters."""
     levers, shares = np.asarray(positions, dtype=float), np.asarray(weights, dtype=float)[None]
     family = CELLS if len(levers) == 2 else TURNED_CELLS
     if family is TURNED_CELLS:
         levers = np.vstack([levers, np.zeros((2, levers.shape[1]))])  # no asymmetry
-    row, cells = np.array(_any_law(elasto_plastic)), cells_by_load(levers, shares, None)
-    return Packed(family, row, cells, inner=(2, len(weights)))
+    return Packed(family, np.array(_any_law(elasto_plastic)), cells_by_load(levers, shares, None), inner=(2, len(weights)))
 
 
 def _any_law(elasto_plastic: bool) -> LawNumbers:
