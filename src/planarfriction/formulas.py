@@ -68,15 +68,6 @@ def stribeck_at(effect, law):
     return law.mu_c + (law.mu_s - law.mu_c) * effect
 
 
-def stribeck_slope(xp, speed, law):
-    """Derivative `dg/d|v|` [s/m]; at rest the right-hand limit, finite for `gamma >= 1` (zero where it has none)."""
-    ratio = speed * (1.0 / law.v_s)
-    safe = xp.where(ratio > 0.0, ratio, 1.0)
-    at_rest = xp.where(law.gamma == 1.0, 1.0, 0.0)
-    steepness = xp.where(ratio > 0.0, xp.power(safe, law.gamma) / safe, at_rest)
-    return -(law.mu_s - law.mu_c) * law.gamma * (1.0 / law.v_s) * steepness * xp.exp(-xp.power(ratio, law.gamma))
-
-
 def slip_fraction(xp, deflection, breakaway_ratio):
     """Elasto-plastic `alpha` [-] of the relative deflection `|z|/z_max`: 0 below breakaway, 1 at full deflection.
 

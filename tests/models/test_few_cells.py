@@ -160,8 +160,8 @@ def test_wrong_settings_are_one_line():
     for options, message in (
         ({"cells": 8}, "cells must be an integer >= 9, got 8"),
         ({"cells": 4.5}, "cells must be an integer >= 9, got 4.5"),
-        ({"parts": 0}, "parts must be an integer >= 1"),
-        ({"segments": 1000}, "segments must be at most 256"),
+        ({"parts": 4}, "parts must be left out: write cells=, the number of cells that have bristles, got 4"),
+        ({"load_error": 0.0}, "load_error must be left out: write cells="),
     ):
         with pytest.raises(InvalidValueError, match=message):
             pf.ReducedModel(DISC, LAW, **options)

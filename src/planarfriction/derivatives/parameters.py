@@ -16,6 +16,7 @@ from planarfriction.geometry import transformed
 from planarfriction.kernels import cells_rollout, cells_sensitivities, disc_passes, published_step
 from planarfriction.kernels.cell_blocks import divided
 from planarfriction.kernels.law import LAW
+from planarfriction.kernels.published_rollouts import gradient, rollout
 from planarfriction.kernels.rollouts import Inputs
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModelPublished
@@ -62,8 +63,8 @@ class Family(NamedTuple):
 PUBLISHED = Family(
     PARAMETERS,
     np.array([published_step.NAMES.index(name) for name in PARAMETERS]),
-    published_step.rollout,
-    published_step.gradient,
+    rollout,
+    gradient,
     published_step.sensitivities,
     published_step.tangent,
 )
