@@ -219,7 +219,7 @@ def _clusters(places: np.ndarray, weights: np.ndarray, squares: np.ndarray, n: i
 def _frame(places: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Return the mean of points, their principal axes as columns, and their radius of gyration.
 
-    Where the axes are not determined, those of the coordinates; they point to the side of larger third moments.
+    Where the axes are not determined, those of the coordinates; they point to the side with the farther load.
     """
     middle = weights @ places
     offset = places - middle
@@ -230,7 +230,8 @@ def _frame(places: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndar
     axes = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     if yy - xx > SAME and angle == 0.0:
         axes = axes[:, ::-1]
-    lean = weights @ (offset @ axes / scale) ** 3
+    turned = offset @ axes / scale
+    lean = weights @ (turned * (x**2 + y**2)[:, None] + turned**3)
     return middle, axes * np.where(lean < -SAME, -1.0, 1.0), scale
 
 
