@@ -80,8 +80,10 @@ class Pieces(NamedTuple):
     """Number of loads, the table `rungs`, that `share` [rungs, count] is for; 0 for a fixed shape."""
 
 
-def pieces_of(model: Any, *, fixed: bool = True) -> Pieces:
+def pieces_of(model: Any, *, fixed: bool = True, count: int = 0) -> Pieces:
     """Take a model apart; only one of a `fixed` shape, or also cells whose pressure follows the load.
+
+    If it has fewer cells than `count`, others without load follow.
 
     Raises InvalidValueError for models without straight-line source: laws of the user's own, other patches whose shape
     depends on the load, friction that differs from cell to cell in other ways than by a metric.
@@ -92,7 +94,7 @@ def pieces_of(model: Any, *, fixed: bool = True) -> Pieces:
             if whole.patch.depends_on_load and (fixed or kind is not DistributedModel):
                 rule = "have a patch whose shape does not depend on the load" + ("" if fixed else ", or cells")
                 raise InvalidValueError("model", rule, model.patch.name or "a patch that does")
-            return taken_apart(whole)
+            return taken_apart(whole, count)
     names = ", ".join(kind.__name__ for kind in (*_KINDS, ReducedModel))
     given = f"{type(model).__name__}, {type(law).__name__}"
     raise InvalidValueError("model", f"be one of {names} with a law of LuGre bristles", given)
@@ -127,10 +129,12 @@ _TWIST = "v[0]", "v[1]", "v[2]"
 # ---------------------------------------------------------------------- kinds of models
 
 
-def _distributed(model: DistributedModel) -> Pieces:
+def _distributed(model: DistributedModel, count: int) -> Pieces:
     if model.patch.asymmetry is not None:
         raise InvalidValueError("model", "have no asymmetry", model.patch.asymmetry)
-    numbers, n, law, size = model.compiled.numbers(), model.patch.cells, model.law.numbers, model.compiled.size
+    numbers, law, size = model.compiled.numbers(), model.law.numbers, model.compiled.size
+    more = max(count - model.patch.cells, 0)
+    n = model.patch.cells + more
     kind, cell = (disc_cells, discs.step) if size == 3 else (cells, distributed_step.cell)
     lever = twin(kind.LEVERS if model.patch.anisotropic else kind.POSITIONS)
     names = (
@@ -164,17 +168,17 @@ def _distributed(model: DistributedModel) -> Pieces:
         rows = tuple((by_z, lever.wrench(own, by_u), *(by_law[i] for i in kept)) for by_z, by_u, *by_law in bars)
         return new, lever.wrench(own, traction), rows
 
-    tables, rungs = dict(zip(names, numbers, strict=False)), 0
+    tables, rungs = dict(zip(names, np.pad(numbers, [(0, 0), (0, more)], mode="edge"), strict=False)), 0
     if model.patch.depends_on_load:
         ladder = ladder_of(model.patch)
         tables |= {"share": ladder.shares, "rungs": ladder.rungs}
         rungs = len(ladder.rungs)
     else:
-        tables["share"] = model.patch.weights()
+        tables["share"] = np.pad(model.patch.weights(), (0, more))
     return Pieces(n, size, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes), rungs)
 
 
-def _published(model: ReducedModelPublished) -> Pieces:
+def _published(model: ReducedModelPublished, _: int) -> Pieces:
     """Trace `moment_steps` of the record of the contact."""
     (part,), law = next(iter(model.compiled.shapes.at([None]))), model.law.numbers
     surface, root, shape = part.shape.surface.numbers, part.shape.root, PublishedPatch(*part.shape.numbers)
