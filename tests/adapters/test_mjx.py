@@ -56,7 +56,7 @@ def test_patches_that_follow_their_contact_do_so_as_in_mujoco():
         <site name="under" pos="0 0 -0.02"/><inertial pos="0.012 0 -0.01" mass="0.3" diaginertia="1e-4 3e-4 3e-4"/>
         <geom name="box" type="box" size="0.05 0.03 0.02"/></body></worldbody></mujoco>""")
     law = pf.LuGre(mu_c=0.4, mu_s=0.4, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
-    face = pf.ReducedModel(pf.ContactPatch.rectangle(0.1, 0.06, cells=9), law, parts=1)
+    face = pf.ReducedModel(pf.ContactPatch.rectangle(0.1, 0.06, cells=9), law)
     patches = [PatchContact(face, site="under", geoms=("table", "box"), centre="contact", pressure="fixed")]
     prepare(spec, patches)
     m = spec.compile()

@@ -20,8 +20,7 @@ GROOVED = PATCH.with_friction_metric([[2.0, 0.3], [0.3, 1.0]])
 KINDS = {
     "distributed": (PATCH, "DistributedModel", {}),
     "few cells with a metric": (GROOVED, "ReducedModel", {}),
-    "one part": (PATCH, "ReducedModel", {"parts": 1}),
-    "four parts with a metric": (GROOVED, "ReducedModel", {"parts": 4}),
+    "few cells": (PATCH, "ReducedModel", {"cells": 30}),
     "published": (PATCH, "ReducedModelPublished", {}),
 }
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.tensors import distributed, published, reduced, steps
+from planarfriction.tensors import distributed, published, steps
 from planarfriction.tensors.namespace import Namespace
-from planarfriction.tensors.steps import LAW, Part
+from planarfriction.tensors.steps import LAW, Contact
 
 PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 LAW_OF_TEST = pf.LuGre(mu_s=1.2, sigma_1=30.0, gamma=1.7, elasto_plastic=0.7)
@@ -26,33 +26,28 @@ NUMPY = Namespace(
 )
 
 
-def parts_of_model(kind: str):
-    """Return the equations of a model, its parts over NumPy, and the model itself."""
+def contact_of(kind: str):
+    """Return the equations of a model, its contact over NumPy, and the model itself."""
     numbers = LAW_OF_TEST.numbers
     if kind == "distributed":
         cells = distributed.cells_of(PATCH, None, "numpy")
-        return distributed, (Part(numbers, cells),), pf.DistributedModel(PATCH, LAW_OF_TEST)
-    if kind == "published":
-        shape = published.shape_of(PATCH, LAW_OF_TEST, None)
-        values = {name: np.array([value]) for name, value in published.values_of(LAW_OF_TEST, shape).items()}
-        numeric = published.numbers_of(NUMPY, values, shape.surface.numbers, None)
-        return published, (Part(numbers, numeric),), pf.ReducedModelPublished(PATCH, LAW_OF_TEST)
-    count = 1 if kind == "reduced" else 2
-    found = reduced.parts_of(PATCH, LAW_OF_TEST, None, parts=count, segments=8, speeds=8)
-    parts = tuple(Part(numbers, shape, found.share[k]) for k, shape in enumerate(reduced.numbers_of(found)))
-    return reduced, parts, pf.ReducedModel(PATCH, LAW_OF_TEST, parts=count, segments=8, speeds=8)
+        return distributed, Contact(numbers, cells), pf.DistributedModel(PATCH, LAW_OF_TEST)
+    shape = published.shape_of(PATCH, LAW_OF_TEST, None)
+    values = {name: np.array([value]) for name, value in published.values_of(LAW_OF_TEST, shape).items()}
+    numeric = published.numbers_of(NUMPY, values, shape.surface.numbers, None)
+    return published, Contact(numbers, numeric), pf.ReducedModelPublished(PATCH, LAW_OF_TEST)
 
 
-@pytest.mark.parametrize("kind", ["distributed", "published", "reduced", "reduced of two parts"])
+@pytest.mark.parametrize("kind", ["distributed", "published"])
 def test_steps_over_numpy_are_those_of_the_compiled_models(kind):
-    equations, parts, model = parts_of_model(kind)
+    equations, contact, model = contact_of(kind)
     rng = np.random.default_rng(3)
     state = rng.normal(size=(40, *model.state_shape)) * (1e-9 if kind == "published" else 1e-6)
     twist, load = rng.normal(size=(40, 3)) * [1e-3, 1e-3, 0.2], rng.uniform(0.2, 3.0, 40)
     state[:4], load[4], twist[5:8] = 0.0, 0.0, 0.0
     found = [
-        *steps.evaluate(NUMPY, equations, parts, state, twist, load),
-        *steps.step(NUMPY, equations, parts, state, twist, load, np.array(1e-4)),
+        *steps.evaluate(NUMPY, equations, contact, state, twist, load),
+        *steps.step(NUMPY, equations, contact, state, twist, load, np.array(1e-4)),
     ]
     wanted = [model.rate(state, twist, load), model.wrench(state, twist, load), *model.step(state, twist, load, 1e-4)]
     for got, want in zip(found, wanted, strict=True):

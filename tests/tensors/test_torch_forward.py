@@ -24,7 +24,7 @@ every_model = pytest.mark.parametrize("kind", ["reduced", "published", "smooth t
 
 def module(kind: str):
     if kind == "reduced":
-        return ReducedModel(PATCH, LAW, segments=8, speeds=8, dtype=torch.float64, parts=1)
+        return ReducedModel(PATCH, LAW, cells=9, dtype=torch.float64)
     surface = pf.LimitSurfaceTable(PATCH) if kind == "smooth table" else None
     return ReducedModelPublished(PATCH, LAW, surface, dtype=torch.float64)
 
@@ -33,7 +33,8 @@ def inputs(model) -> tuple[torch.Tensor, ...]:
     """State, twists, loads and parameters."""
     t = 1e-4 * torch.arange(T, dtype=torch.float64)
     twists = torch.stack([2e-3 * torch.sin(900 * t) + 1e-4, 1e-3 * torch.cos(600 * t), 0.3 * torch.sin(450 * t)], -1)
-    state = torch.tensor([1e-7, 2e-7, 1e-9], dtype=torch.float64)
+    size = [[1e-7], [2e-7]] if len(model.state_shape) > 1 else [1e-7, 2e-7, 1e-9]
+    state = torch.tensor(size, dtype=torch.float64) * torch.ones(model.state_shape, dtype=torch.float64)
     return state, twists, 1.0 + torch.cos(500 * t), model.physical().detach()
 
 

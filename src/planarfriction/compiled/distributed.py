@@ -10,7 +10,7 @@ import numpy as np
 
 from planarfriction.compiled import packed
 from planarfriction.compiled.base import CompiledModel
-from planarfriction.compiled.packed import PackedModel, PackedParts
+from planarfriction.compiled.packed import PackedModel
 from planarfriction.compiled.rates import linearised
 from planarfriction.compiled.shapes_by_load import ShapesByLoad, cells_by_load
 from planarfriction.compiler.memory import places_of, rows_of, size_of
@@ -59,27 +59,27 @@ class CompiledDistributed(CompiledModel):
     # ------------------------------------------------------------------ at given loads
 
     @functools.cached_property
-    def fixed(self) -> PackedParts | None:
+    def fixed(self) -> PackedModel | None:
         """See `CompiledModel`."""
-        return None if self.patch.depends_on_load else self.packed_parts([None])
+        return None if self.patch.depends_on_load else self.with_all_states([None])
 
-    def at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, PackedParts]]:
+    def at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, PackedModel]]:
         """See `CompiledModel`; all rows at once, each with its own weights."""
-        yield slice(None), self.fixed or _alone(self._packed(self.patch.weights(load.reshape(-1))))
+        yield slice(None), self.fixed or self._packed(self.patch.weights(load.reshape(-1)))
 
     def points(self) -> tuple[np.ndarray, int]:
         """See `CompiledModel`."""
         return self.patch.positions, size_of(type(self.record(np.zeros((2, 1)), np.zeros(1))[0]))
 
-    def _following(self, load: np.ndarray, centre: np.ndarray) -> Iterator[tuple[Any, PackedParts, np.ndarray | None]]:
+    def _following(self, load: np.ndarray, centre: np.ndarray) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
         weights = tilted(self.patch.positions, self.patch.weights(load.reshape(-1)), centre)
-        yield slice(None), _alone(self._packed(weights)), None
+        yield slice(None), self._packed(weights), None
 
     def linearisation(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
         """Return linearisations `[..., L, N]` as `kernels.cells.LinearCells`, or those of `kernels.general_cells`."""
         ((_, contact),) = self.at_each_load(load)
         cells = state.shape[-1]
-        lin = linearised(contact.joined, state.reshape(load.size, self.size * cells), twist.reshape(-1, 3))
+        lin = linearised(contact, state.reshape(load.size, self.size * cells), twist.reshape(-1, 3))
         return lin.reshape(*load.shape, lin.shape[-1] // cells, cells)
 
     def slopes(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> Any:
@@ -118,9 +118,9 @@ class CompiledDistributed(CompiledModel):
         weights = self.patch.weights()
         return self._packed(weights[None, weights > 0.0], weights > 0.0)
 
-    def packed_parts(self, loads: Sequence[float | None]) -> PackedParts:
+    def with_all_states(self, loads: Sequence[float | None]) -> PackedModel:
         """See `CompiledModel`."""
-        return _alone(self._packed(np.array([self.patch.weights(load) for load in loads])))
+        return self._packed(np.array([self.patch.weights(load) for load in loads]))
 
     def at_loads(self, loads: np.ndarray, slopes: bool) -> ShapesByLoad:
         """Pack the cells at different loads > 0 `[L]` [N], with the `slopes` of their weights by the load or zeros.
@@ -145,7 +145,7 @@ class CompiledDistributed(CompiledModel):
             self.size * count,
             rows * count,
             np.full(self.size * count, self.law.largest_deflection),
-            float(np.hypot(np.hypot(*(positions - positions.mean(axis=0)).T), KAPPA * self.patch.radii[chosen]).mean()),
+            float(np.hypot(np.hypot(*(positions - positions.mean(axis=0)).T), KAPPA * self.patch.lever_radii[chosen]).mean()),
             (weights, numbers),
             chosen,
         )
@@ -167,7 +167,3 @@ class CompiledDistributed(CompiledModel):
     def lever(self) -> np.ndarray:
         """P `[3, d, N]`: the velocity of a cell (`u_i`) is `P' V`, the wrench of a force on it `P f`."""
         return np.ascontiguousarray(self.patch.levers().T)
-
-
-def _alone(part: PackedModel) -> PackedParts:
-    return PackedParts([part], np.ones((len(part.records), 1)))

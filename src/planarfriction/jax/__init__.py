@@ -16,11 +16,9 @@ from planarfriction.derivatives import Rollout
 from planarfriction.jax.models import (
     DistributedModel,
     LawParameters,
-    MomentModel,
     PublishedParameters,
     ReducedModel,
     ReducedModelPublished,
-    ReducedParameters,
     Surface,
 )
 from planarfriction.jax.rollouts import rate, rest, rollout, simulate_scene, step, wrench
@@ -29,11 +27,9 @@ from planarfriction.tensors.operations import SceneMotion
 __all__ = [
     "DistributedModel",
     "LawParameters",
-    "MomentModel",
     "PublishedParameters",
     "ReducedModel",
     "ReducedModelPublished",
-    "ReducedParameters",
     "Rollout",
     "SceneMotion",
     "Surface",

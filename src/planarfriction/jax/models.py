@@ -6,23 +6,21 @@ import functools
 from collections import namedtuple
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 
-from planarfriction.derivatives.parameters import PARAMETERS, Packed, pack_cells, pack_maps, pack_surface
+from planarfriction.derivatives.parameters import PARAMETERS, Packed, pack_cells, pack_surface
 from planarfriction.equality import ByValue, by_parts
-from planarfriction.formulas import LawNumbers
 from planarfriction.jax.base import FrictionPytree, record_of
 from planarfriction.jax.namespace import xp
 from planarfriction.laws import FrictionLaw
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models import ReducedModel as Reference
-from planarfriction.models.reduced_map import MapSizes
 from planarfriction.patch import ContactPatch
-from planarfriction.tensors import distributed, published, reduced
-from planarfriction.tensors.steps import LAW, Part
+from planarfriction.tensors import distributed, published
+from planarfriction.tensors.steps import LAW
 
 
 @by_parts
@@ -49,21 +47,21 @@ class DistributedModel(FrictionPytree):
 
     def __init__(self, patch: ContactPatch, law: FrictionLaw, normal_force: float | None = None) -> None:
         super().__init__(patch, law)
-        cells = distributed.cells_of(patch, normal_force, "jax")
+        cells = distributed.cells_of(patch, law, normal_force)
         self.parameters = record_of(LawParameters, law.numbers._asdict())
         self.positions, self.weights = map(jnp.asarray, cells)
 
     @property
     def state_shape(self) -> tuple[int, ...]:
-        """Shape of the state of one contact, `(2, N)`."""
-        return 2, self.positions.shape[1]
+        """Shape of the state of one contact, `(2, N)` of points, `(3, N)` of discs."""
+        return distributed.KINDS[len(self.positions)].bristles, self.positions.shape[1]
 
     def compiled(self) -> Packed:
         """Return the model as compiled rollouts take it."""
         return pack_cells(self.elasto_plastic, self.positions, self.weights)  # pyright: ignore[reportArgumentType]
 
-    def _parts(self, law: LawNumbers, values: Mapping[str, jax.Array]) -> tuple[Part]:
-        return (Part(law, distributed.Cells(self.positions, self.weights)),)
+    def _shape(self, values: Mapping[str, jax.Array]) -> distributed.Cells:
+        return distributed.Cells(self.positions, self.weights)
 
 
 @by_parts
@@ -115,47 +113,16 @@ class ReducedModelPublished(FrictionPytree):
         s = self.surface
         return pack_surface(self.elasto_plastic, s.kind, s.size, s.data, s.root)  # pyright: ignore[reportArgumentType]
 
-    def _parts(self, law: LawNumbers, values: Mapping[str, jax.Array]) -> tuple[Part]:
-        return (Part(law, published.numbers_of(xp, values, self.surface, self.surface.root)),)
+    def _shape(self, values: Mapping[str, jax.Array]) -> published.PublishedNumbers:
+        return published.numbers_of(xp, values, self.surface, self.surface.root)
 
 
-class ReducedModel(FrictionPytree):
-    """The reduced model (`planarfriction.ReducedModel`) as a pytree, with its settings.
+class ReducedModel(DistributedModel):
+    """The reduced model (`planarfriction.ReducedModel`) as a pytree: distributed friction on few cells.
 
-    What is made is a `FewCells`, bristles on a few cells with the state `[2, n]` [m], or, with `parts`, a `MomentModel`
-    with `[3]` or `[P, 3]` [m]. If the shape of the patch depends on the load, that at `normal_force` [N] is kept.
+    All but `cells`, their number, is as in `DistributedModel`.
 
     Raises InvalidValueError for a parameter that breaks its rule.
-    """
-
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            patch: ContactPatch,
-            law: FrictionLaw,
-            normal_force: float | None = None,
-            *,
-            cells: int = 56,
-            parts: int | str | None = None,
-            segments: int = 24,
-            speeds: int = 16,
-        ) -> None: ...
-
-    def __new__(
-        cls, patch: Any = None, law: Any = None, normal_force: Any = None, *, parts: Any = None, **settings: Any
-    ) -> Self:
-        """Return a model of the member that the settings ask for."""
-        if cls is not ReducedModel:
-            return super().__new__(cls)
-
-        return super().__new__(FewCells if parts is None else MomentModel)  # pyright: ignore
-
-
-class FewCells(DistributedModel, ReducedModel):
-    """Distributed friction on the few cells of `planarfriction.ReducedModel`, which `ReducedModel` makes by default.
-
-    Raises InvalidValueError as that does.
     """
 
     def __init__(
@@ -165,75 +132,7 @@ class FewCells(DistributedModel, ReducedModel):
         normal_force: float | None = None,
         *,
         cells: int = Reference.cells,
-        segments: int = Reference.segments,
-        speeds: int = Reference.speeds,
-        parts: None = None,
+        **options: Any,
     ) -> None:
-        self.refuse(patch, law, "jax.ReducedModel")
-        few = Reference(patch, law, cells=cells, segments=segments, speeds=speeds).reduction.patch
-        super().__init__(few, law, normal_force)
-
-
-@by_parts
-class ReducedParameters(namedtuple("ReducedParameters", reduced.PARAMETERS)):
-    """Parameters of the law as scalars, as in `LuGre`, without gamma, on which the stored map depends."""
-
-
-@functools.partial(jax.tree_util.register_dataclass, data_fields=["share", "factor", "map"], meta_fields=["sizes"])
-@dataclass(frozen=True, eq=False)
-class Maps(ByValue):
-    """The parts of a patch and their maps of steady sliding."""
-
-    sizes: tuple[MapSizes, ...]
-    share: jax.Array
-    """Share of the load that each part carries, `[P]`."""
-    factor: jax.Array
-    """F of each part, `[P, 3, 3]`."""
-    map: jax.Array
-    """Steady sliding of the parts, one behind the other (see `planarfriction.kernels.steady`)."""
-
-
-class MomentModel(ReducedModel):
-    """The reduced model of bristle moments (`planarfriction.ReducedModel` in parts) as a pytree.
-
-    State `(z_x, z_y, z_theta)` [m], or `[P, 3]` for several parts. Leaves: the law's parameters, and the shape: F of
-    the parts and their maps of steady sliding. If the shape of the patch depends on the load, the shape at
-    `normal_force` [N] is kept; `parts`, `segments` and `speeds` as in `planarfriction.ReducedModel` in parts.
-
-    Raises InvalidValueError for a parameter that breaks its rule.
-    """
-
-    equations = reduced
-    leaves = ("parameters", "shape")
-    parameters: ReducedParameters
-    shape: Maps
-
-    def __init__(
-        self,
-        patch: ContactPatch,
-        law: FrictionLaw,
-        normal_force: float | None = None,
-        *,
-        cells: int = 56,
-        parts: int | str = 1,
-        segments: int = 24,
-        speeds: int = 16,
-    ) -> None:
-        super().__init__(patch, law)
-        self.parameters = record_of(ReducedParameters, law.numbers._asdict())
-        found = reduced.parts_of(patch, law, normal_force, parts=parts, segments=segments, speeds=speeds)
-        share, factor = (jnp.asarray(each, dtype=float) for each in found[1:3])
-        self.shape = Maps(found.sizes, share, factor, jnp.asarray(found.map))
-
-    @property
-    def state_shape(self) -> tuple[int, ...]:
-        """Shape of the state of one contact, `(3,)`, of P parts `(P, 3)`."""
-        return (3,) if len(self.shape.sizes) == 1 else (len(self.shape.sizes), 3)
-
-    def compiled(self) -> Packed:
-        """Return the model as compiled rollouts take it."""
-        s = self.shape
-        return pack_maps(self.elasto_plastic, s.sizes, s.share, s.factor, s.map)  # pyright: ignore[reportArgumentType]
-
-    def _parts(self, law: LawNumbers, values: Mapping[str, jax.Array]) -> tuple[Part, ...]:
-        return tuple(Part(law, shape, self.shape.share[k]) for k, shape in enumerate(reduced.numbers_of(self.shape)))
+        self.refuse(patch, law, "jax.ReducedModel", options)
+        super().__init__(Reference(patch, law, cells=cells).reduction.patch, law, normal_force, **options)

@@ -1,85 +1,117 @@
-"""The distributed model over `xp`: a bristle `[..., 2, N]` in every cell.
+"""The distributed model over `xp`: the bristles of `kernels`, in every cell of a patch of points or discs.
 
-Twists are `[..., 3]`; the law's parameters and time steps are `[..., 1, 1]`, or plain numbers.
+A state `[..., d, N]` has d bristles in each of N cells, two in points and three in discs. Twists are `[..., 3]`; the
+law's parameters and time steps are `[..., 1]`, or plain numbers.
 """
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from planarfriction import formulas
-from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
+from planarfriction.kernels import cells, disc_cells, discs, distributed_step, leaning_cells
+from planarfriction.kernels.contacts import traction
+from planarfriction.kernels.leaning_cells import Leaning
+from planarfriction.kernels.vectors import plus
+from planarfriction.models import DistributedModel
 from planarfriction.patch import ContactPatch
-from planarfriction.tensors import bristles
-from planarfriction.tensors.bristles import Drive
+from planarfriction.tensors.elements import over
 
-AXIS = -2
-"""Axis of the components of a bristle, the first axis of a state."""
 
-LEVER = (0, 0), (0, 1), (1, 1), (0, 2), (1, 2)
-"""Entries of the lever B `[2, 3]` of a cell with a friction metric (see `ContactPatch.levers`) that are kept."""
+def _point(law, z, u):
+    """Return z' and the traction of a point that moves at u."""
+    rate = plus(u, -cells._decay(law, z, u), z)
+    return rate, traction(law, z, rate, u)
 
+
+class Kind(NamedTuple):
+    """Functions of a kind of cell, in numbers as `kernels` has them."""
+
+    bristles: int
+    lever: cells.Lever
+    evaluate: Any
+    step: Any
+
+
+KINDS = {
+    2: Kind(2, cells.POSITIONS, _point, distributed_step.cell),
+    3: Kind(3, disc_cells.POSITIONS, discs.evaluate, discs.step),
+    5: Kind(2, cells.LEVERS, _point, distributed_step.cell),
+    6: Kind(3, disc_cells.LEVERS, discs.evaluate, discs.step),
+    7: Kind(2, cells.LEVERS, leaning_cells.evaluate, leaning_cells.step),
+    8: Kind(3, disc_cells.LEVERS, disc_cells.evaluate_leaning, disc_cells.step_leaning),
+}
+"""Kinds of cells by how many numbers each has: points, discs, both with a friction metric, and with asymmetry too.
+
+Numbers are those of the lever, with the asymmetry behind them.
+"""
 
 class Cells(NamedTuple):
     """A patch as arrays."""
 
     levers: Any
-    """Positions, x then y [m], `[2, N]`; with a friction metric the entries `LEVER` of the levers, `[5, N]`."""
+    """Numbers of the cells as their levers read them: see `kernels.cells.Lever`, `[numbers, N]`."""
     weights: Any
     """Share of the load that each cell carries [-], `[N]`."""
 
 
-def cells_of(patch: ContactPatch, normal_force: float | None, front: str) -> Cells:
-    """Return the cells of a patch at a load [N] as NumPy arrays; `front` names the front end in messages."""
-    if patch.asymmetric:
-        by = f"{front}.DistributedModel (ReducedModel in parts takes any)"
-        raise InvalidValueError("patch", f"have the same friction forwards and backwards for {by}", "an asymmetry")
-    if not patch.anisotropic:
-        return Cells(np.ascontiguousarray(patch.positions.T), patch.weights(normal_force))
-    maps = patch.levers()
-    return Cells(np.array([maps[:, i, j] for i, j in LEVER]), patch.weights(normal_force))
+def cells_of(patch: ContactPatch, law: Any, normal_force: float | None) -> Cells:
+    """Return the cells of a patch at a load [N] as NumPy arrays."""
+    numbers = DistributedModel(patch, law).compiled.numbers()
+    if patch.anisotropic and not patch.asymmetric:
+        numbers = numbers[:-2]
+    return Cells(numbers, patch.weights(normal_force))
 
 
-def positions_of(xp, cells: Cells):
+def positions_of(xp, shape: Cells):
     """Return the positions of the cells, x then y [m], `[2, N]`."""
-    if len(cells.levers) == 2:
-        return cells.levers
-    xx, xy, yy, x, y = (cells.levers[k] for k in range(len(LEVER)))
+    if len(shape.levers) < 5:
+        return shape.levers[:2]
+    xx, xy, yy, x, y = (shape.levers[k] for k in range(5))
     return xp.stack([xx * y - xy * x, xy * y - yy * x], 0) / (xx * yy - xy * xy)
 
 
-def drive(xp, law: LawNumbers, cells: Cells, twist) -> Drive:
-    """Return the drive of the bristles at a twist: the velocities of the cells."""
-    vx, vy, omega = twist[..., 0, None], twist[..., 1, None], twist[..., 2, None]
-    if len(cells.levers) == 2:
-        x, y = cells.levers[0], cells.levers[1]
-        velocity = xp.stack([vx - omega * y, vy + omega * x], -2)
-    else:
-        xx, xy, yy, x, y = (cells.levers[k] for k in range(len(LEVER)))
-        velocity = xp.stack([xx * vx + xy * vy + x * omega, xy * vx + yy * vy + y * omega], -2)
-    return bristles.drive(xp, law, velocity, xp.norm(velocity, AXIS), 1.0, velocity)
+def _lever(shape: Cells) -> tuple[Any, ...]:
+    count = len(shape.levers)
+    return tuple(shape.levers[k] for k in range(count if count < 7 else count - 2))
 
 
-def rate(xp, law: LawNumbers, cells: Cells, z, by: Drive):
-    """Return `zdot = v - k z`."""
-    return bristles.rate(xp, law, z, by, AXIS)
+def _law(law: LawNumbers, shape: Cells) -> Any:
+    """Return the law as the bristles of the cells read it."""
+    return Leaning(law, (shape.levers[-2], shape.levers[-1])) if len(shape.levers) > 6 else law
 
 
-def advance(xp, law: LawNumbers, cells: Cells, z, by: Drive, dt):
-    """Return the bristles after `dt` of a constant twist, and their rates."""
-    return bristles.step(xp, law, z, by, dt, AXIS)
+# ---------------------------------------------------------------------- steps
 
 
-def wrench(xp, law: LawNumbers, cells: Cells, z, zdot, by: Drive):
-    """Return the wrench about the origin per unit load `[..., 3]`: `sum w_i [t_i ; rho_i x t_i]`."""
-    force = cells.weights * formulas.traction(z, zdot, by.viscous, law)
-    fx, fy = force[..., 0, :], force[..., 1, :]
-    if len(cells.levers) == 2:
-        x, y = cells.levers[0], cells.levers[1]
-        return xp.stack([fx.sum(-1), fy.sum(-1), (x * fy - y * fx).sum(-1)], -1)
-    xx, xy, yy, x, y = (cells.levers[k] for k in range(len(LEVER)))
-    sums = xx * fx + xy * fy, xy * fx + yy * fy, x * fx + y * fy
-    return xp.stack([each.sum(-1) for each in sums], -1)
+def split(state) -> tuple[Any, ...]:
+    """Return the bristles of a state as a vector of arrays `[..., N]`."""
+    return tuple(state[..., k, :] for k in range(state.shape[-2]))
+
+
+def joined(xp, z):
+    """Return a state of a vector of arrays."""
+    return xp.stack(xp.broadcast_arrays(*z), -2)
+
+
+def drive(xp, law: LawNumbers, shape: Cells, twist) -> tuple[Any, ...]:
+    """Return the velocities that the cells see at a twist."""
+    twist = tuple(twist[..., k, None] for k in range(3))
+    return over(xp)(KINDS[len(shape.levers)].lever.seen)(_lever(shape), twist)
+
+
+def evaluate(xp, law: LawNumbers, shape: Cells, z, u):
+    """Return the rates of the bristles, and the tractions per unit load."""
+    return over(xp)(KINDS[len(shape.levers)].evaluate)(_law(law, shape), z, u)
+
+
+def advance(xp, law: LawNumbers, shape: Cells, z, u, dt):
+    """Return the bristles after `dt` of a constant twist, and the tractions per unit load."""
+    return over(xp)(KINDS[len(shape.levers)].step)(_law(law, shape), z, u, dt)
+
+
+def wrench(xp, shape: Cells, pull):
+    """Return the wrench about the origin per unit load `[..., 3]`."""
+    pull = tuple(shape.weights * each for each in pull)
+    found = over(xp)(KINDS[len(shape.levers)].lever.wrench)(_lever(shape), pull)
+    return xp.stack([each.sum(-1) for each in found], -1)

@@ -6,7 +6,6 @@ whose derivatives are those of the rule: cells that are about to lift press with
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from planarfriction.kernels.tilt import FARTHEST, NARROW, REACH, SOFTNESS
@@ -61,12 +60,12 @@ def tilted(xp: Any, positions: Any, weights: Any, centre: Any) -> Any:
 class Pressed(NamedTuple):
     """A model whose pressure has followed its load."""
 
-    parts: tuple[Any, ...]
+    contact: Any
     moved: Any
-    """Displacement of parts besides `[..., 2]` [m]; None of cells."""
+    """Displacement of the patch `[..., 2]` [m]; None of cells, which share the load in another way."""
 
     def seen(self, xp: Any, twist: Any) -> Any:
-        """Return the twist that the parts see."""
+        """Return the twist that the patch sees."""
         if self.moved is None:
             return twist
         spin = twist[..., 2]
@@ -74,7 +73,7 @@ class Pressed(NamedTuple):
         return xp.stack(xp.broadcast_arrays(vx, vy, spin), -1)
 
     def pull(self, xp: Any, wrench: Any) -> Any:
-        """Return their wrench about the origin."""
+        """Return its wrench about the origin."""
         if self.moved is None:
             return wrench
         fx, fy = wrench[..., 0], wrench[..., 1]
@@ -82,18 +81,10 @@ class Pressed(NamedTuple):
         return xp.stack(xp.broadcast_arrays(fx, fy, tau), -1)
 
 
-def follow(xp: Any, equations: Any, parts: Sequence[Any], centre: Any) -> Pressed:
-    """Return parts with their pressure about `centre` `[..., 2]` [m].
-
-    Cells follow by themselves; parts share the load as if they were cells, and move where that does not reach.
-    """
-    if isinstance(parts[0].shape, Cells):
-        part = parts[0]
-        weights = tilted(xp, positions_of(xp, part.shape), part.shape.weights, centre)[..., None, :]
-        return Pressed((part._replace(shape=part.shape._replace(weights=weights)),), None)
-    x, y = (xp.stack(each, -1) for each in zip(*(equations.centre(part.shape) for part in parts), strict=True))
-    if len(parts) == 1:
-        return Pressed(tuple(parts), centre - xp.concatenate([x, y], -1))
-    shares = tilted(xp, (x, y), xp.stack([part.share for part in parts], -1), centre)
-    shared = tuple(part._replace(share=shares[..., k, None]) for k, part in enumerate(parts))
-    return Pressed(shared, centre - xp.stack([(shares * x).sum(-1), (shares * y).sum(-1)], -1))
+def follow(xp: Any, equations: Any, contact: Any, centre: Any) -> Pressed:
+    """Return a model with its pressure about `centre` `[..., 2]` [m]: cells share the load, another patch moves."""
+    shape = contact.shape
+    if isinstance(shape, Cells):
+        weights = tilted(xp, positions_of(xp, shape), shape.weights, centre)
+        return Pressed(contact._replace(shape=shape._replace(weights=weights)), None)
+    return Pressed(contact, centre - xp.stack(equations.centre(shape), -1))

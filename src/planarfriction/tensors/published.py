@@ -1,4 +1,4 @@
-"""The published reduced model over `xp`: a bristle `[..., 3]`.
+"""The published reduced model over `xp`: a bristle `[..., 3]`, as `kernels.published_step` steps it.
 
 State and twist are `[..., 3]`; the parameters of law and shape and time steps are `[..., 1]`, or plain numbers.
 """
@@ -9,17 +9,17 @@ import functools
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from planarfriction import formulas, models
+from planarfriction import models
 from planarfriction.formulas import LawNumbers
+from planarfriction.kernels import published_contact, published_step
+from planarfriction.kernels.contacts import traction
+from planarfriction.kernels.vectors import plus
 from planarfriction.laws import FrictionLaw
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models.reduced_published import PublishedShape
 from planarfriction.patch import ContactPatch
-from planarfriction.tensors import bristles, surfaces
-from planarfriction.tensors.bristles import Drive
-
-AXIS = -1
-"""Axis of the components of the bristle, the only axis of a state."""
+from planarfriction.tensors import surfaces
+from planarfriction.tensors.elements import over
 
 
 class PublishedNumbers(NamedTuple):
@@ -36,6 +36,20 @@ class PublishedNumbers(NamedTuple):
     """`u = h(V) |V_S|` of the scaled twist `[..., 3]` and its norm `[..., 1]`."""
     root: Any = None
     """Symmetric root of the friction metric `[2, 2]`, or None: velocities go in through it, forces come out."""
+
+
+class Drive(NamedTuple):
+    """A twist, and what the limit surface makes of it; components `[..., 1]`."""
+
+    x: Any
+    """`V_S`"""
+    y: Any
+    s: Any
+    omega: Any
+    u_x: Any
+    """`h(V) |V_S|`"""
+    u_y: Any
+    u_s: Any
 
 
 def shape_of(patch: ContactPatch, law: FrictionLaw, surface: LimitSurface | None) -> PublishedShape:
@@ -73,45 +87,53 @@ def centre(shape: PublishedNumbers) -> tuple[Any, Any]:
 
 
 def scale(xp, shape: PublishedNumbers):
-    """Return `S = diag(1, 1, r)` as a vector `[..., 3]`: bristles are scaled by 1/S for a step, their rates by S."""
+    """Return `S = diag(1, 1, r)` as a vector `[..., 3]`."""
     one = xp.ones_like(shape.contact_radius)
-    return _joined(xp, one, one, shape.contact_radius)
+    return joined(xp, (one, one, shape.contact_radius))
+
+
+# ---------------------------------------------------------------------- steps
+
+
+def split(state) -> tuple[Any, ...]:
+    """Return a state as a vector of arrays `[..., 1]`."""
+    return tuple(state[..., k, None] for k in range(3))
+
+
+def joined(xp, z):
+    """Return a state, or a twist, of a vector of arrays."""
+    return xp.concatenate(xp.broadcast_arrays(*z), -1)
 
 
 def drive(xp, law: LawNumbers, shape: PublishedNumbers, twist) -> Drive:
-    """Return the drive of the scaled bristle at a twist: `u = h(V) v_n`."""
-    vx, vy, omega = twist[..., 0:1], twist[..., 1:2], twist[..., 2:3]
-    vx, vy = _through(shape.root, vx, vy)
-    vx, vy = vx - omega * shape.centre_y, vy + omega * shape.centre_x
-    scaled = _joined(xp, vx, vy, shape.contact_radius * omega)
-    speed = xp.norm(scaled, AXIS)
-    u = shape.surface(scaled, speed)
-    u_norm = xp.norm(u, AXIS)
-    slides = u_norm > 0.0
-    size = xp.where(slides, u_norm / xp.where(slides, speed, 1.0), 1.0)
-    return bristles.drive(xp, law, u, speed, size, _joined(xp, vx, vy, shape.second_moment * omega))
+    """Return the drive of the bristle at a twist."""
+    vx, vy, omega = split(twist)
+    twist = (*_through(shape.root, vx, vy), omega)
+    scaled = joined(xp, over(xp)(published_step.scaled_twist)(shape, twist))
+    u = shape.surface(scaled, xp.norm(scaled, -1))
+    return Drive(*split(scaled), omega, *split(u))
 
 
-def rate(xp, law: LawNumbers, shape: PublishedNumbers, z, by: Drive):
-    """Return `zdot = S u - k z`."""
-    s = scale(xp, shape)
-    return s * bristles.rate(xp, law, z / s, by, AXIS)
+def _evaluate(law, shape, twist, omega, u, z):
+    """Return the rate of the state and the wrench at V_S = `twist`, where the limit surface gives u."""
+    r = shape.contact_radius
+    scaled = z[0], z[1], z[2] / r
+    rate = plus(u, -published_contact._decay(law, scaled, u, twist), scaled)
+    fx, fy, fs = traction(law, scaled, rate, (twist[0], twist[1], shape.second_moment * omega / r))
+    return (rate[0], rate[1], r * rate[2]), (fx, fy, r * fs + shape.centre_x * fy - shape.centre_y * fx)
+
+
+def evaluate(xp, law: LawNumbers, shape: PublishedNumbers, z, by: Drive):
+    """Return the rate of the bristle, and the wrench per unit load."""
+    return over(xp)(_evaluate)(law, shape, by[:3], by.omega, by[4:], z)
 
 
 def advance(xp, law: LawNumbers, shape: PublishedNumbers, z, by: Drive, dt):
-    """Return the bristle after `dt` of a constant twist, and its rate."""
-    s = scale(xp, shape)
-    new, zdot = bristles.step(xp, law, z / s, by, dt, AXIS)
-    return s * new, s * zdot
+    """Return the bristle after `dt` of a constant twist, and the wrench per unit load."""
+    return over(xp)(published_step._step)(law, shape, by[:3], by.omega, by[4:], z, dt)
 
 
-def wrench(xp, law: LawNumbers, shape: PublishedNumbers, z, zdot, by: Drive):
+def wrench(xp, shape: PublishedNumbers, pull):
     """Return the wrench about the origin per unit load `[..., 3]`."""
-    force = formulas.traction(z, zdot, by.viscous, law)
-    fx, fy, tau = force[..., 0:1], force[..., 1:2], force[..., 2:3]
-    return _joined(xp, *_through(shape.root, fx, fy), tau + shape.centre_x * fy - shape.centre_y * fx)
-
-
-def _joined(xp, x, y, s):
-    """Return components `[..., 1]`, which broadcast, as a vector `[..., 3]`."""
-    return xp.concatenate(xp.broadcast_arrays(x, y, s), -1)
+    fx, fy, tau = pull
+    return joined(xp, (*_through(shape.root, fx, fy), tau))

@@ -1,14 +1,14 @@
-"""Evaluations and steps of a model over `xp`: sums over its parts, and the interface of every tensor model."""
+"""Evaluations and steps of a model over `xp`, and the interface of every tensor model."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
 
 from planarfriction import validation
 from planarfriction.derivatives.parameters import PARAMETERS
+from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import refuse_creep, refuse_rate_law
@@ -16,66 +16,44 @@ from planarfriction.patch import ContactPatch
 from planarfriction.tensors.namespace import Namespace, broadcast, finite, non_negative, shaped
 from planarfriction.tensors.pressure import Pressed, centre_of, follow
 
+_REPLACED = "parts", "segments", "speeds", "load_error"
+"""Options that `ReducedModel` had."""
+
 LAW = PARAMETERS[:8]
 """Parameters of the friction law; the others describe the shape of the patch."""
 
 
-class Part(NamedTuple):
-    """A part of a model, ready for one evaluation or for all steps of a rollout."""
+class Contact(NamedTuple):
+    """A law and a patch, ready for one evaluation or for all steps of a rollout."""
 
     law: LawNumbers
-    """Broadcasts with the lengths of bristles."""
+    """Broadcasts with the components of bristles."""
     shape: Any
     """Numbers of the patch as the model's equations know them."""
-    share: Any = 1.0
-    """Share of the load that the part carries; most models have one part, which carries all of it."""
 
 
-def evaluate(xp: Any, equations: Any, parts: tuple[Part, ...], state: Any, twist: Any, load: Any) -> tuple[Any, Any]:
+def evaluate(xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, load: Any) -> tuple[Any, Any]:
     """Return the rate of the state, and the wrench `[..., 3]`."""
-
-    def one(part: Part, z: Any) -> tuple[Any, Any]:
-        by = equations.drive(xp, part.law, part.shape, twist)
-        rate = equations.rate(xp, part.law, part.shape, z, by)
-        return rate, equations.wrench(xp, part.law, part.shape, z, rate, by)
-
-    rate, unit = sum_parts(xp, parts, state, one)
-    return rate, load[..., None] * unit
+    by = equations.drive(xp, *contact, twist)
+    rate, pull = equations.evaluate(xp, *contact, equations.split(state), by)
+    return equations.joined(xp, rate), load[..., None] * equations.wrench(xp, contact.shape, pull)
 
 
 def step(
-    xp: Any, equations: Any, parts: tuple[Part, ...], state: Any, twist: Any, load: Any, dt: Any
+    xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, load: Any, dt: Any
 ) -> tuple[Any, Any]:
     """Return the state after `dt` [s] of a constant twist, and the wrench at the end; without load bristles relax."""
-    given, dt = (parts[0].law.sigma_0, state, twist), inner(equations, dt)
-    state, twist = xp.widened(state), xp.widened(twist)
-
-    def one(part: Part, z: Any) -> tuple[Any, Any]:
-        by = equations.drive(xp, part.law, part.shape, twist)
-        new, rate = equations.advance(xp, part.law, part.shape, z, by, dt)
-        return relaxed(xp, equations, new, load), equations.wrench(xp, part.law, part.shape, new, rate, by)
-
-    new, unit = sum_parts(xp, parts, state, one)
-    return xp.narrowed(new, *given), xp.narrowed(load[..., None] * unit, *given)
+    given, state = (contact.law.sigma_0, state, twist), equations.split(xp.widened(state))
+    by = equations.drive(xp, *contact, xp.widened(twist))
+    new, pull = equations.advance(xp, *contact, state, by, dt[..., None])
+    new = equations.joined(xp, relaxed(xp, new, load))
+    return xp.narrowed(new, *given), xp.narrowed(load[..., None] * equations.wrench(xp, contact.shape, pull), *given)
 
 
-def sum_parts(xp: Any, parts: tuple[Part, ...], state: Any, one: Callable[..., Any]) -> tuple[Any, Any]:
-    """Return the states that `one(part, state)` gives for each part, side by side, and the sum of the wrenches."""
-    if len(parts) == 1:
-        return one(parts[0], state)
-    found = [one(part, state[..., k, :]) for k, part in enumerate(parts)]
-    wrenches = (part.share * wrench for part, (_, wrench) in zip(parts, found, strict=True))
-    return xp.stack([new for new, _ in found], -2), sum(wrenches)
-
-
-def relaxed(xp: Any, equations: Any, state: Any, load: Any) -> Any:
-    """Return the states of contacts with load, and zeros for those without."""
-    return xp.where(inner(equations, load > 0.0), state, 0.0)
-
-
-def inner(equations: Any, value: Any) -> Any:
-    """Return one value for each contact `[...]` with axes of length 1 for those of a part's state."""
-    return value.reshape(value.shape + (1,) * -equations.AXIS)
+def relaxed(xp: Any, z: Any, load: Any) -> tuple[Any, ...]:
+    """Return the bristles of contacts with load, and zeros for those without."""
+    loaded = load[..., None] > 0.0
+    return tuple(xp.where(loaded, each, 0.0) for each in z)
 
 
 class TensorModel:
@@ -92,12 +70,15 @@ class TensorModel:
 
     xp: ClassVar[Namespace]
     equations: ClassVar[ModuleType]
-    """Module of the model's `drive`, `rate`, `advance` and `wrench`."""
+    """Module of the model's `drive`, `evaluate`, `advance` and `wrench`."""
     elasto_plastic: bool
 
     @staticmethod
-    def refuse(patch: ContactPatch, law: FrictionLaw, name: str) -> None:
-        """Raise InvalidValueError unless patch and law are ones that the model `name` can be made of."""
+    def refuse(patch: ContactPatch, law: FrictionLaw, name: str, options: Iterable[str] = ()) -> None:
+        """Raise InvalidValueError unless patch, law and names of options are such that `name` can be made of them."""
+        for option in options:
+            if option in _REPLACED:
+                raise InvalidValueError(option, "be replaced by cells=n, the number of cells with bristles", "it")
         validation.instance("patch", patch, ContactPatch, "a ContactPatch")
         refuse_rate_law(law, name)
         refuse_creep(law, name)
@@ -132,11 +113,11 @@ class TensorModel:
 
     def pressed(self, centre: Any, parameters: Any = None) -> Pressed:
         """Return the model with its pressure about `centre` `[..., 2]` [m], for any number of steps."""
-        return follow(self.xp, self.equations, self._parts_at(parameters), centre)
+        return follow(self.xp, self.equations, self._contact_at(parameters), centre)
 
     def step_pressed(self, pressed: Pressed, state: Any, twist: Any, load: Any, dt: Any) -> tuple[Any, Any]:
         """Return state and wrench after a step of the model that `pressed` has returned, with inputs as arrays."""
-        new, wrench = step(self.xp, self.equations, pressed.parts, state, pressed.seen(self.xp, twist), load, dt)
+        new, wrench = step(self.xp, self.equations, pressed.contact, state, pressed.seen(self.xp, twist), load, dt)
         return new, pressed.pull(self.xp, wrench)
 
     def rollout(self, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None) -> Any:
@@ -150,28 +131,27 @@ class TensorModel:
         """Return physical values by name, from `parameters` or, if None, the model's own."""
         raise NotImplementedError
 
-    def _parts(self, law: LawNumbers, values: Mapping[str, Any]) -> tuple[Part, ...]:
-        """Return the parts of the model; law and physical values broadcast with the lengths of bristles."""
+    def _shape(self, values: Mapping[str, Any]) -> Any:
+        """Return the numbers of the patch; physical values broadcast with the components of bristles."""
         raise NotImplementedError
 
     def _number(self, name: str, value: Any) -> Any:
         return self.xp.real(name, value)
 
-    def _parts_at(self, parameters: Any) -> tuple[Part, ...]:
+    def _contact_at(self, parameters: Any) -> Contact:
         return self._prepared(self._values(parameters))
 
-    def _prepared(self, values: Mapping[str, Any]) -> tuple[Part, ...]:
-        """Return the parts of the model at physical values `[...]`."""
-        wide = {name: inner(self.equations, value) for name, value in values.items()}
-        # a map of steady sliding, not the law, contains the exponent of a model without gamma
-        law = {name: wide.get(name, math.nan) for name in LAW}
-        return self._parts(LawNumbers(**law, elasto_plastic=float(self.elasto_plastic)), wide)
+    def _prepared(self, values: Mapping[str, Any]) -> Contact:
+        """Return the model at physical values `[...]`."""
+        wide = {name: value[..., None] for name, value in values.items()}
+        law = LawNumbers(**{name: wide[name] for name in LAW}, elasto_plastic=float(self.elasto_plastic))
+        return Contact(law, self._shape(wide))
 
     def _evaluated(
         self, state: Any, twist: Any, normal_force: Any, parameters: Any, moments: Any = None
     ) -> tuple[Any, Any]:
         (z, v, load), pressed = self._inputs_pressed(state, twist, normal_force, parameters, moments)
-        rate, wrench = evaluate(self.xp, self.equations, pressed.parts, z, pressed.seen(self.xp, v), load)
+        rate, wrench = evaluate(self.xp, self.equations, pressed.contact, z, pressed.seen(self.xp, v), load)
         return rate, pressed.pull(self.xp, wrench)
 
     def _inputs_pressed(
@@ -180,7 +160,7 @@ class TensorModel:
         """Return checked inputs, whose twists have the axes of moments too, and the model under these."""
         z, v, load = self._inputs(state, twist, normal_force)
         if moments is None:
-            return (z, v, load), Pressed(self._parts_at(parameters), None)
+            return (z, v, load), Pressed(self._contact_at(parameters), None)
         held = finite(self.xp, "moments", shaped("moments", self._number("moments", moments), (2,)))
         shapes = {"twist": v.shape[:-1], "normal_force": load.shape, "moments": held.shape[:-1]}
         batch = broadcast(self.xp, "batch axes", "broadcast", shapes)

@@ -12,13 +12,12 @@ except ImportError:
 
 from planarfriction.derivatives import Rollout
 from planarfriction.tensors.operations import SceneMotion
-from planarfriction.torch.models import DistributedModel, MomentModel, ReducedModel, ReducedModelPublished
+from planarfriction.torch.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.torch.reduced_planar import ReducedPlanarLuGre
 from planarfriction.torch.rollout import rollout, simulate_scene, tracking_loss
 
 __all__ = [
     "DistributedModel",
-    "MomentModel",
     "ReducedModel",
     "ReducedModelPublished",
     "ReducedPlanarLuGre",

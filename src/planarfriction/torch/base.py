@@ -14,7 +14,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.laws import ElastoPlastic, FrictionLaw, LuGre
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import steps
-from planarfriction.tensors.steps import LAW, Part, TensorModel
+from planarfriction.tensors.steps import LAW, TensorModel
 from planarfriction.torch.namespace import xp
 from planarfriction.torch.parameters import PhysicalParameters
 
@@ -26,7 +26,7 @@ class Compiled(NamedTuple):
     """A model as compiled rollouts take it."""
 
     pack: Callable[..., Packed]
-    """Function that makes the parts of the model from the `buffers` as NumPy arrays."""
+    """Function that makes the model from the `buffers` as NumPy arrays."""
     buffers: tuple[Tensor, ...]
     """The model's own numbers of the patch."""
 
@@ -127,25 +127,18 @@ class FrictionModule(TensorModel, nn.Module):
         tensors that have been checked.
         """
         equations, vector = self.equations, self._vector(parameters)
-        once, parts = (self._prepared(self._named(values)) for values in (vector, vector[..., None, :]))
-        of_step = dict(zip(map(id, parts), once, strict=True))
-        z, v, dt = xp.widened(state), xp.widened(twist), steps.inner(equations, dt)
-
-        def roll(part: Part, z: Tensor) -> tuple[Tensor, Tensor]:
-            by, step = equations.drive(xp, part.law, part.shape, v), of_step[id(part)]
-            drives = zip(*(_each_step(value, v.shape[-2], equations.AXIS) for value in by), strict=True)
-            states, rates = [], []
-            for drive, now in zip(drives, normal_force.unbind(-1), strict=True):
-                new, rate = equations.advance(xp, step.law, step.shape, z, type(by)(*drive), dt)
-                states.append(new)
-                rates.append(rate)
-                z = steps.relaxed(xp, equations, new, now)
-            states, rates = (torch.stack(each, equations.AXIS - 1) for each in (states, rates))
-            return z, equations.wrench(xp, part.law, part.shape, states, rates, by)
-
-        end, unit = steps.sum_parts(xp, parts, z, roll)
+        of_step, contact = (self._prepared(self._named(values)) for values in (vector, vector[..., None, :]))
+        z, v, dt = equations.split(xp.widened(state)), xp.widened(twist), dt[..., None]
+        by = equations.drive(xp, *contact, v)
+        drives, pulls = zip(*(value.unbind(-2) for value in by), strict=True), []
+        for drive, now in zip(drives, normal_force.unbind(-1), strict=True):
+            new, pull = equations.advance(xp, *of_step, z, _like(by, drive), dt)
+            pulls.append(pull)
+            z = steps.relaxed(xp, new, now)
+        pull = tuple(torch.stack(each, -2) for each in zip(*pulls, strict=True))
+        wrenches = normal_force[..., None] * equations.wrench(xp, contact.shape, pull)
         given = vector, state, twist
-        return xp.narrowed(end, *given), xp.narrowed(normal_force[..., None] * unit, *given)
+        return xp.narrowed(equations.joined(xp, z), *given), xp.narrowed(wrenches, *given)
 
     # ------------------------------------------------------------------ inputs
 
@@ -167,6 +160,6 @@ class FrictionModule(TensorModel, nn.Module):
         return parameters
 
 
-def _each_step(value: Any, steps: int, axis: int) -> Iterable[Any]:
-    """Return the value of each step, whose axis lies in front of `axis`; a plain number is the same for all steps."""
-    return value.unbind(value.ndim + axis - 1) if isinstance(value, Tensor) else [value] * steps
+def _like(by: Any, values: Any) -> Any:
+    """Return values as a record, or a tuple, like `by`."""
+    return type(by)(*values) if hasattr(by, "_fields") else values

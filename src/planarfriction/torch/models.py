@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any
 
 import torch
 from torch import Tensor, nn
 
-from planarfriction.derivatives.parameters import PARAMETERS, pack_cells, pack_maps, pack_surface
+from planarfriction.derivatives.parameters import PARAMETERS, pack_cells, pack_surface
 from planarfriction.errors import InvalidValueError
-from planarfriction.formulas import LawNumbers
 from planarfriction.laws import FrictionLaw
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models import ReducedModel as Reference
-from planarfriction.models.reduced_map import maps_of, sizes_of, slip_factor
 from planarfriction.patch import ContactPatch
-from planarfriction.tensors import distributed, published, reduced
-from planarfriction.tensors.steps import LAW, Part
+from planarfriction.tensors import distributed, published
+from planarfriction.tensors.steps import LAW
 from planarfriction.torch.base import TRAINABLE, Compiled, FrictionModule
 from planarfriction.torch.namespace import xp
 
@@ -53,7 +51,7 @@ class DistributedModel(FrictionModule):
         device: torch.device | str | None = None,
     ):
         super().__init__(patch, law)
-        cells = distributed.cells_of(patch, normal_force, "torch")
+        cells = distributed.cells_of(patch, law, normal_force)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         numbers, chosen = law.numbers._asdict(), tuple(trainable)
         lever = float(patch.contact_radius(normal_force))
@@ -73,15 +71,15 @@ class DistributedModel(FrictionModule):
 
     @property
     def state_shape(self) -> tuple[int, ...]:
-        """Shape of the state of one contact, `(2, N)`."""
-        return 2, self.positions.shape[1]
+        """Shape of the state of one contact, `(2, N)` of points, `(3, N)` of discs."""
+        return distributed.KINDS[len(self.positions)].bristles, self.positions.shape[1]
 
     def compiled(self) -> Compiled:
         """Return the model as compiled rollouts take it."""
         return Compiled(functools.partial(pack_cells, self.elasto_plastic), (self.positions, self.weights))
 
-    def _parts(self, law: LawNumbers, values: Mapping[str, Tensor]) -> tuple[Part]:
-        return (Part(law, distributed.Cells(self.positions, self.weights)),)
+    def _shape(self, values: Mapping[str, Tensor]) -> distributed.Cells:
+        return distributed.Cells(self.positions, self.weights)
 
 
 class SurfaceBuffers(nn.Module):
@@ -148,51 +146,16 @@ class ReducedModelPublished(FrictionModule):
         pack = functools.partial(pack_surface, self.elasto_plastic, self.surface.kind, self.surface.size)
         return Compiled(pack, (self.surface.data,) if self.root is None else (self.surface.data, self.root))
 
-    def _parts(self, law: LawNumbers, values: Mapping[str, Tensor]) -> tuple[Part]:
-        return (Part(law, published.numbers_of(xp, values, self.surface, self.root)),)
+    def _shape(self, values: Mapping[str, Tensor]) -> published.PublishedNumbers:
+        return published.numbers_of(xp, values, self.surface, self.root)
 
 
-class ReducedModel(FrictionModule):
-    """Reduced LuGre friction, differentiable: bristles on a few cells, or with `parts` the moments of each part.
+class ReducedModel(DistributedModel):
+    """Reduced LuGre friction, differentiable: distributed friction on the few cells that stand for the patch.
 
-    The equations and the numbers of `planarfriction.ReducedModel`, with its settings. What is made is a `FewCells` with
-    the state `[2, n]` [m] or, with `parts`, a `MomentModel` with `[3]` or `[P, 3]` [m]. `trainable` names the
-    parameters of the law that are `nn.Parameter`s. A shape that depends on the load is that at `normal_force` [N].
+    The equations, the settings and the numbers of `planarfriction.ReducedModel`; all else as in `DistributedModel`.
 
     Raises InvalidValueError for a parameter that breaks its rule.
-    """
-
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            patch: ContactPatch,
-            law: FrictionLaw,
-            normal_force: float | None = None,
-            *,
-            cells: int = 56,
-            parts: int | str | None = None,
-            segments: int = 24,
-            speeds: int = 16,
-            trainable: Iterable[str] = TRAINABLE,
-            dtype: torch.dtype | None = None,
-            device: torch.device | str | None = None,
-        ): ...
-
-    def __new__(
-        cls, patch: Any = None, law: Any = None, normal_force: Any = None, *, parts: Any = None, **settings: Any
-    ) -> Self:
-        """Return a module of the member that the settings ask for."""
-        if cls is not ReducedModel:
-            return super().__new__(cls)
-
-        return super().__new__(FewCells if parts is None else MomentModel)  # pyright: ignore
-
-
-class FewCells(DistributedModel, ReducedModel):
-    """Distributed friction on the few cells of `planarfriction.ReducedModel`, which `ReducedModel` makes by default.
-
-    Raises InvalidValueError as that does.
     """
 
     def __init__(
@@ -202,91 +165,8 @@ class FewCells(DistributedModel, ReducedModel):
         normal_force: float | None = None,
         *,
         cells: int = Reference.cells,
-        segments: int = Reference.segments,
-        speeds: int = Reference.speeds,
-        parts: None = None,
-        **more: Any,
+        **options: Any,
     ):
-        self.refuse(patch, law, "torch.ReducedModel")
-        few = Reference(patch, law, cells=cells, segments=segments, speeds=speeds).reduction.patch
-        super().__init__(few, law, normal_force, **more)
+        self.refuse(patch, law, "torch.ReducedModel", options)
+        super().__init__(Reference(patch, law, cells=cells).reduction.patch, law, normal_force, **options)
         self.patch = patch
-
-
-class MomentModel(ReducedModel):
-    """Reduced LuGre friction of bristle moments, differentiable: three states `(z_x, z_y, z_theta)` [m] per part.
-
-    The equations and the numbers of `planarfriction.ReducedModel` in parts; the state of several has shape `[..., P,
-    3]`. The patch, with its maps of steady sliding, is stored in buffers. `trainable` names the parameters of the law
-    that are `nn.Parameter`s; `gamma` cannot be one, because the maps depend on it. A shape that depends on the load is
-    that at `normal_force` [N]; `parts`, `segments` and `speeds` as there.
-
-    Raises InvalidValueError if `trainable` names gamma, or something that is not a parameter of the law.
-    """
-
-    equations = reduced
-    share: Tensor
-    """Share of the load that each part carries, `[P]`."""
-    factor: Tensor
-    """F of each part, `[P, 3, 3]`."""
-    map: Tensor
-    """Steady sliding of all parts, one after the other; in single precision, as compiled roll-outs read it."""
-    gamma: Tensor
-    """Stribeck exponent for which the maps were made [-]."""
-
-    def __init__(
-        self,
-        patch: ContactPatch,
-        law: FrictionLaw,
-        normal_force: float | None = None,
-        *,
-        cells: int = 56,
-        parts: int | str = 1,
-        segments: int = 24,
-        speeds: int = 16,
-        trainable: Iterable[str] = reduced.PARAMETERS[:-1],
-        dtype: torch.dtype | None = None,
-        device: torch.device | str | None = None,
-    ):
-        super().__init__(patch, law)
-        trainable = tuple(trainable)
-        if "gamma" in trainable:
-            rule = "not contain gamma: the map of steady sliding depends on it"
-            raise InvalidValueError("trainable", rule, trainable)
-        kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
-        found = reduced.parts_of(patch, law, normal_force, parts=parts, segments=segments, speeds=speeds)
-        self.sizes = found.sizes
-        self.register_buffer("share", torch.tensor(found.share, **kind))
-        self.register_buffer("factor", torch.tensor(found.factor, **kind))
-        self.register_buffer("map", torch.tensor(found.map, device=device))
-        numbers = law.numbers._asdict()
-        self.register_buffer("gamma", torch.tensor(numbers["gamma"], **kind))
-        lever = float(slip_factor(patch, normal_force)[2, 2])
-        self._adopt({name: numbers[name] for name in reduced.PARAMETERS}, trainable, lever, **kind)
-
-    def _load_from_state_dict(self, state_dict: dict[str, Any], prefix: str, *rest: Any) -> None:
-        shares, maps = (state_dict.get(f"{prefix}{name}") for name in ("share", "map"))
-        if shares is not None and len(shares) != len(self.sizes):
-            raise InvalidValueError("state_dict", f"hold as many parts as the model, {len(self.sizes)}", len(shares))
-        if maps is not None:
-            for one, own in zip(maps_of(maps, self.sizes), self.sizes, strict=True):
-                if (other := sizes_of(one)) != own:
-                    rule = f"hold maps of the same sizes as the model (faces, segments, ...), {tuple(own)}"
-                    raise InvalidValueError("state_dict", rule, tuple(other))
-        super()._load_from_state_dict(state_dict, prefix, *rest)
-
-    @property
-    def state_shape(self) -> tuple[int, ...]:
-        """Shape of the state of one contact, `(3,)`, of P parts `(P, 3)`."""
-        return (3,) if len(self.sizes) == 1 else (len(self.sizes), 3)
-
-    def compiled(self) -> Compiled:
-        """Return the model as compiled rollouts take it."""
-        pack = functools.partial(pack_maps, self.elasto_plastic, self.sizes)
-        return Compiled(pack, (self.share, self.factor, self.map))
-
-    def _law_values(self) -> dict[str, float]:
-        return super()._law_values() | {"gamma": float(self.gamma)}
-
-    def _parts(self, law: LawNumbers, values: Mapping[str, Tensor]) -> tuple[Part, ...]:
-        return tuple(Part(law, shape, self.share[k]) for k, shape in enumerate(reduced.numbers_of(self)))

@@ -118,7 +118,7 @@ class ReducedPlanarLuGre(ReducedModelPublished):
 
         Raises InvalidValueError for what is not a tensor of numbers.
         """
-        law, speed = self._parts_at(None)[0].law, self._number("speed", speed)
+        law, speed = self._contact_at(None).law, self._number("speed", speed)
         return formulas.stribeck(xp, speed[..., None].abs(), law)[..., 0]
 
     def steady_state_z(self, v_scaled: Tensor) -> Tensor:
@@ -129,7 +129,7 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         Raises InvalidValueError for what is not a tensor `[..., 3]`.
         """
         v_scaled = self._number("v_scaled", v_scaled)
-        (law, shape, _), speed = self._parts_at(None)[0], xp.norm(v_scaled, -1)
+        (law, shape), speed = self._contact_at(None), xp.norm(v_scaled, -1)
         h = shape.surface(v_scaled, speed) / torch.where(speed > 0.0, speed, 1.0)  # zero at rest
         return published.scale(xp, shape) * h * formulas.stribeck(xp, speed, law) / law.sigma_0
 
@@ -142,7 +142,7 @@ class ReducedPlanarLuGre(ReducedModelPublished):
 
         Raises InvalidValueError for tensors whose shapes do not fit.
         """
-        law, shape, _ = self._parts_at(None)[0]
+        law, shape = self._contact_at(None)
         z, v, load = self._inputs(z, v, f_n)
         by = published.drive(xp, law, shape, v)
         return load[..., None] * published.wrench(xp, law, shape, z, self._number("z_dot", z_dot), by)

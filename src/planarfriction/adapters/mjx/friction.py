@@ -28,7 +28,7 @@ from planarfriction.adapters.mujoco.patches import (
 from planarfriction.coupling import ITERATIONS, TOLERANCE
 from planarfriction.environments import SHAPE, check, defaults
 from planarfriction.errors import InvalidValueError
-from planarfriction.jax import DistributedModel, MomentModel, ReducedModelPublished
+from planarfriction.jax import DistributedModel, ReducedModelPublished
 from planarfriction.jax.base import FrictionPytree
 from planarfriction.tensors.steps import LAW
 
@@ -377,8 +377,6 @@ def _in_jax(model: models.FrictionModel) -> FrictionPytree:
         rule = "have a shape that does not change with the load: models of JAX keep theirs"
         raise InvalidValueError("model", rule, type(model).__name__)
     model = model.reduction
-    if isinstance(model, models.MomentModel):
-        return MomentModel(model.patch, model.law, parts=model.parts, segments=model.segments, speeds=model.speeds)
     if isinstance(model, models.ReducedModelPublished):
         return ReducedModelPublished(model.patch, model.law, model.surface)
     if isinstance(model, models.DistributedModel):

@@ -1,0 +1,98 @@
+"""Compiled functions over arrays: the source of a straight-line kernel, run on tensors.
+
+What is written once for a cell, of numbers, `kernels.discs` say, is also what a tensor library needs for all cells at
+once: vectors are tuples of arrays then, and `xp` is the library. Only functions that are not straight lines, or whose
+slopes at a kink have a rule of their own (see `kernels.rules`), have forms for arrays here.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from types import FunctionType, ModuleType, SimpleNamespace
+from typing import Any
+
+from planarfriction import formulas
+from planarfriction.compiler import compiled_math
+from planarfriction.kernels import bristle_step, rules, vectors
+
+ROUNDING = 256.0
+"""Excess of a deflection over its cap, in units of the rounding error, that counts as rounding: see `bristle_step`."""
+
+
+class _OverArrays(SimpleNamespace):
+    """A module, or the functions that a function names, over arrays."""
+
+    def __init__(self, module: ModuleType, of: Callable[[Any], Any]) -> None:
+        super().__init__(module=module, of=of)
+
+    def __getattr__(self, name: str) -> Any:
+        return self.of(getattr(self.module, name))
+
+
+@functools.cache
+def over(xp: Any) -> Callable[[Any], Any]:
+    """Return `of(function)`, which returns a function of numbers and tuples as one of arrays of `xp`."""
+    known = {id(value): twin for value, twin in _twins(xp)}
+
+    @functools.cache
+    def of(value: Any) -> Any:
+        if id(value) in known:
+            return known[id(value)]
+        if isinstance(value, ModuleType):
+            return _OverArrays(value, of)
+        own = getattr(value, "py_func", value)
+        if not isinstance(own, FunctionType) or own.__closure__:
+            return value
+        names = {"__builtins__": own.__globals__["__builtins__"]}
+        found = known[id(value)] = FunctionType(own.__code__, names, own.__name__, own.__defaults__)
+        for name in own.__code__.co_names:
+            if name in own.__globals__:
+                given = own.__globals__[name]
+                names[name] = of(given) if callable(given) or isinstance(given, ModuleType) else given
+        return found
+
+    return of
+
+
+def _twins(xp: Any) -> list[tuple[Any, Any]]:
+    """Return functions that arrays take in another form, and these forms."""
+
+    def plus(a: Any, c: Any, b: Any) -> Any:
+        return tuple(x + c * y for x, y in zip(a, b, strict=True))
+
+    def dot(a: Any, b: Any) -> Any:
+        first, *others = (x * y for x, y in zip(a, b, strict=True))
+        return sum(others, first)
+
+    def per(x: Any) -> Any:
+        some = x > 0.0
+        return xp.where(some, 1.0 / xp.where(some, x, 1.0), 0.0)
+
+    def ratio(x: Any, y: Any) -> Any:
+        some = y > 0.0
+        return xp.where(some, x / xp.where(some, y, 1.0), 0.0)
+
+    def beyond(deflection: Any, largest: Any) -> Any:
+        """Return the deflection where it is larger by more than rounding, else 0."""
+        return xp.where(deflection > (1.0 + ROUNDING * xp.epsilon(deflection)) * largest, deflection, 0.0)
+
+    def disc_friction(_: Any, slide: Any, spin: Any, rest: float) -> Any:
+        """Return `formulas.disc_friction` in a unit of speed that keeps squares and their slopes in range."""
+        per = 1.0 / xp.stop_gradient(slide + spin + math.sqrt(rest))
+        return formulas.disc_friction(xp, per * slide, per * spin, rest * per * per)
+
+    return [
+        (compiled_math, xp),
+        (math, SimpleNamespace(sqrt=xp.root, inf=math.inf, pi=math.pi)),
+        (vectors.plus, plus),
+        (vectors.times, lambda c, a: tuple(c * x for x in a)),
+        (vectors.dot, dot),
+        (vectors.square, lambda a: dot(a, a)),
+        (formulas.disc_friction, disc_friction),
+        (rules.per, per),
+        (rules.ratio, ratio),
+        (bristle_step.cap, lambda deflection, most: formulas.cap(xp, beyond(deflection, most), most)),
+        (bristle_step.reachable, lambda deflection, law: formulas.reachable_deflection(xp, beyond(deflection, 1.0), law)),
+    ]
