@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -21,13 +22,18 @@ from planarfriction.kernels.twins import twin
 from planarfriction.kernels.vectors import norm, times
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
-from planarfriction.models.reduced import loads_of_change
 from planarfriction.patch import ContactPatch
 
 ERROR = 2e-3
 """Largest share of the load that stands on other cells than it should, halfway between two rungs [-]."""
 
 MOST_RUNGS = 512
+
+PROBED = np.geomspace(1e-6, 1e6, 1001)
+"""Loads [N] at which a patch is looked at to find where its shape changes."""
+
+MOVED = 0.1
+"""Share of the load that moves between cells from one rung to the next, to begin with."""
 
 
 class Ladder(NamedTuple):
@@ -39,12 +45,24 @@ class Ladder(NamedTuple):
     """Shares of the cells [L, N]."""
 
 
+def _loads_of_change(patch: ContactPatch) -> np.ndarray:
+    """Return loads [N] from the lowest to the highest at which the shape changes, by equal changes of the shape."""
+    moved = 0.5 * np.abs(np.diff(patch.weights(PROBED), axis=0)).sum(axis=1)
+    changes = np.flatnonzero(moved > 0.0)
+    if len(changes) == 0:  # the shape stays, or changes at loads beyond all that exist
+        return PROBED[[0, -1]]
+    span = slice(changes[0], changes[-1] + 2)
+    total = np.r_[0.0, np.cumsum(moved[changes[0] : changes[-1] + 1])]
+    wanted = np.linspace(0.0, total[-1], max(2, math.ceil(total[-1] / MOVED)) + 1)
+    return np.exp(np.interp(wanted, total, np.log(PROBED[span])))
+
+
 def ladder_of(patch: ContactPatch) -> Ladder:
     """Return rungs so close that shares between them err by `ERROR` at most.
 
     Raises InvalidValueError if more than `MOST_RUNGS` are needed.
     """
-    rungs = np.union1d(loads_of_change(patch), getattr(patch.pressure, "loads", ()))
+    rungs = np.union1d(_loads_of_change(patch), getattr(patch.pressure, "loads", ()))
     while True:
         shares, between = patch.weights(rungs), 0.5 * (rungs[1:] + rungs[:-1])
         off = 0.5 * np.abs(patch.weights(between) - 0.5 * (shares[1:] + shares[:-1])).sum(axis=1)
@@ -180,10 +198,10 @@ def _distributed(model: DistributedModel, count: int) -> Pieces:
 
 def _published(model: ReducedModelPublished, _: int) -> Pieces:
     """Trace `moment_steps` of the record of the contact."""
-    (part,), law = next(iter(model.compiled.shapes.at([None]))), model.law.numbers
-    surface, root, shape = part.shape.surface.numbers, part.shape.root, PublishedPatch(*part.shape.numbers)
+    found, law = model.compiled.shapes.shape_at(None), model.law.numbers
+    surface, root, shape = found.surface.numbers, found.root, PublishedPatch(*found.numbers)
     if surface.kind == CELLS:
-        raise InvalidValueError("surface", "be an ellipsoid or a table", type(part.shape.surface).__name__)
+        raise InvalidValueError("surface", "be an ellipsoid or a table", type(found.surface).__name__)
     root = Root(float(root[0, 0]), float(root[0, 1]), float(root[1, 1]))
     steps = published_step
     frame, hold, taped_step = (twin(each) for each in (steps._FRAME, steps.MODEL.hold, steps.MODEL.taped_step))
