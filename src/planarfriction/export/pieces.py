@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction import formulas
+from planarfriction.compiler import compiled_math as xp
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import cells, cells_rollout, disc_cells, discs, distributed_step, moment_steps, published_step
@@ -98,10 +100,11 @@ class Pieces(NamedTuple):
     """Number of loads, the table `rungs`, that `share` [rungs, count] is for; 0 for a fixed shape."""
 
 
-def pieces_of(model: Any, *, fixed: bool = True, count: int = 0) -> Pieces:
-    """Take a model apart; only one of a `fixed` shape, or also cells whose pressure follows the load.
+def pieces_of(model: Any, precision: str = "double", *, fixed: bool = True, count: int = 0) -> Pieces:
+    """Take a model apart for a `precision` of `library.PRECISIONS`.
 
-    If it has fewer cells than `count`, others without load follow.
+    Only one of a `fixed` shape, or also cells whose pressure follows the load. If it has fewer cells than `count`,
+    others without load follow.
 
     Raises InvalidValueError for models without straight-line source: laws of the user's own, other patches whose shape
     depends on the load, friction that differs from cell to cell in other ways than by a metric.
@@ -112,7 +115,7 @@ def pieces_of(model: Any, *, fixed: bool = True, count: int = 0) -> Pieces:
             if whole.patch.depends_on_load and (fixed or kind is not DistributedModel):
                 rule = "have a patch whose shape does not depend on the load" + ("" if fixed else ", or cells")
                 raise InvalidValueError("model", rule, model.patch.name or "a patch that does")
-            return taken_apart(whole, count)
+            return taken_apart(whole, precision, count)
     names = ", ".join(kind.__name__ for kind in (*_KINDS, ReducedModel))
     given = f"{type(model).__name__}, {type(law).__name__}"
     raise InvalidValueError("model", f"be one of {names} with a law of LuGre bristles", given)
@@ -147,13 +150,37 @@ _TWIST = "v[0]", "v[1]", "v[2]"
 # ---------------------------------------------------------------------- kinds of models
 
 
-def _distributed(model: DistributedModel, count: int) -> Pieces:
+def _sliding(u: Any) -> Any:
+    """Return what `discs.sliding` does, of a point."""
+    return 1.0, 1.0, norm(u), u
+
+
+def _sliding_of_disc(u: Any) -> Any:
+    """Return what `discs.sliding` does, from the direction of u: fourth powers of speeds leave single precision."""
+    spin = math.sqrt(2.0) * u[2]
+    size = norm((u[0], u[1], spin))
+    turned = ratio(spin, size)
+    turned = turned * turned
+    c_t, c_s, m = formulas.disc_friction(xp, 1.0 - turned, turned)
+    return c_t, c_s, size * math.sqrt(1.0 - turned + m * turned), (c_t * u[0], c_t * u[1], c_s * u[2])
+
+
+def _with(function: Any, **others: Any) -> Any:
+    """Return a function that calls others in place of those of its module."""
+    own = function.py_func
+    return FunctionType(own.__code__, own.__globals__ | others, own.__name__)
+
+
+def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     if model.patch.asymmetry is not None:
         raise InvalidValueError("model", "have no asymmetry", model.patch.asymmetry)
     numbers, law, size = model.compiled.numbers(), model.law.numbers, model.compiled.size
     more = max(count - model.patch.cells, 0)
     n = model.patch.cells + more
-    kind, cell = (disc_cells, discs.step) if size == 3 else (cells, distributed_step.cell)
+    kind, cell, sliding = cells, distributed_step.cell, _sliding
+    if size == 3:
+        kind, sliding = disc_cells, discs.sliding if precision == "double" else _sliding_of_disc
+        cell = _with(discs.step, sliding=sliding)
     lever = twin(kind.LEVERS if model.patch.anisotropic else kind.POSITIONS)
     names = (
         ["lever_xx", "lever_xy", "lever_yy", "lever_x", "lever_y"]
@@ -170,7 +197,7 @@ def _distributed(model: DistributedModel, count: int) -> Pieces:
     def steady(trace: Trace) -> Any:
         own, given = _vector(trace, *(f"{name}[k]" for name in names)), _law(trace, law)
         u = lever.seen(own, _vector(trace, *_TWIST))
-        speed, pull = twin(discs.sliding)(u)[2:] if size == 3 else (twin(norm)(u), u)
+        speed, pull = twin(sliding)(u)[2:]
         z = twin(times)(twin(ratio)(1.0, speed * twin(grip)(given, speed)), pull)
         return lever.wrench(own, twin(cell)(given, z, u, 0.0)[1])
 
@@ -196,7 +223,7 @@ def _distributed(model: DistributedModel, count: int) -> Pieces:
     return Pieces(n, size, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes), rungs)
 
 
-def _published(model: ReducedModelPublished, _: int) -> Pieces:
+def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
     """Trace `moment_steps` of the record of the contact."""
     found, law = model.compiled.shapes.shape_at(None), model.law.numbers
     surface, root, shape = found.surface.numbers, found.root, PublishedPatch(*found.numbers)

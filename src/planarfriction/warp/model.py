@@ -65,9 +65,9 @@ class Model:
         self.contacts = validation.count("contacts", contacts, at_most=2**31 - 1)
         self.device, self.dtype = wp.get_device(device), dtype
         kinds = self._indices(which, len(models))
-        most = max((each.state_shape for each in models), key=math.prod)
-        pieces = [described(each, most[-1] if len(most) > 1 else 0) for each in models]
-        sources = [source_of(each, arrays.precision_of(dtype)) for each in pieces]
+        precision, most = arrays.precision_of(dtype), max((each.state_shape for each in models), key=math.prod)
+        pieces = [described(each, precision, most[-1] if len(most) > 1 else 0) for each in models]
+        sources = [source_of(each, precision) for each in pieces]
         if any(each.text != sources[0].text for each in sources):
             raise InvalidValueError("model", "have one source, as all of `ReducedModel(patch, law)` do", "several")
         numbers = [{**each.pieces.parameters, "scale": 1.0} for each in pieces]
