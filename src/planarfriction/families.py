@@ -131,6 +131,7 @@ PRESSURES = Family(
         "linear_gradient": ("linear over the patch", "patch.pressure:LinearGradient"),
         "soft_finger": ("a soft fingertip that grows with the load", "patch.pressure:SoftFinger"),
         "pressure_maps": ("maps measured at several loads", "patch.pressure_maps:PressureMaps"),
+        "shared": ("that of the cells of another patch", "patch.shared:SharedPressure"),
     },
 )
 

@@ -274,18 +274,21 @@ class ContactPatch(Moments):
 
         return finer(self, parts)
 
-    def compressed(
-        self, degree: int = 5, *, cells: int | None = None, error: float | None = None, loads: Any = None
-    ) -> ContactPatch:
-        """Return a patch of a few of the cells, with the same moments up to `degree` and nearly the same limit surface.
+    def discs(self, n: int | None = None) -> ContactPatch:
+        """Return the patch as `n` small discs that stand for its cells; None: each cell is a disc of its own.
 
-        At most `cells` (default: 45, the number of moments up to `degree + 3`); if the patch has no more, it is
-        returned unchanged. `error` raises the degree until the relative error of every dissipation is below it. Shapes
-        that depend on the load need `loads`, (lowest, highest) [N]; see `patch.compressed`.
+        The disc of a cell has its second moment, `a^2/2 = (s_x^2 + s_y^2)/12` (length only on lines; points stay
+        points), and so has the disc of many cells: load, centre of pressure and second moment of the patch are kept.
+        Symmetric patches have symmetric discs, n or a few less; cells of different friction metric or asymmetry never
+        share a disc, so that there are at least as many as kinds of them. Raises InvalidValueError for n below 1.
         """
-        from planarfriction.patch.compressed import compressed
+        from planarfriction.patch.discs import discs
 
-        return compressed(self, degree, cells=cells, error=error, loads=loads)
+        return discs(self, n)
+
+    def compressed(self, *_: Any, **__: Any) -> ContactPatch:
+        """Raise an error that says what to write instead."""
+        raise InvalidValueError("compressed", "be replaced by discs(n): a patch of n small discs", "compressed()")
 
     def grid_error(self, normal_force: float | None = None, *, refined: int = 1) -> GridError:
         """Return the errors of `refined(refined)` against the continuous patch: of force, torque and breakaway.
