@@ -305,7 +305,7 @@ def pack_cells(elasto_plastic: bool, positions: np.ndarray, weights: np.ndarray)
     family = {2: CELLS, 3: DISCS, 5: TURNED_CELLS, 6: TURNED_DISCS}[len(levers)]
     if len(levers) > 3:
         levers = np.vstack([levers, np.zeros((2, levers.shape[1]))])  # no asymmetry
-    shapes, size = cells_by_load(levers, shares, None), 3 if family in (DISCS, TURNED_DISCS) else 2
+    shapes, size = cells_by_load(levers, shares, None), 3 if len(positions) in (3, 6) else 2
     return Packed(family, np.array([_any_law(elasto_plastic)]), shapes, cells=len(weights), size=size)
 
 
