@@ -160,16 +160,16 @@ DISC_REST = 1e-37
 ellipsoid with `m = 1/4`. Even in single precision it leaves nothing to divide by zero."""
 
 
-def disc_friction(xp, slide, spin):
+def disc_friction(xp, slide, spin, rest):
     """Sliding friction of a disc, `c_t`, `c_s` and `m` [-], from `p = |u|^2` of its centre and `o = (a omega)^2`.
 
-    The mean speed of the disc is `S = sqrt(p + m o)`, with `m = 1/4 + 7/36 (e_1 + A e_2)` and `(e_1, e_2, e_3) = (o^2,
-    p o, p^2)/(o^2 + B p o + C p^2)`. Force and scaled torque of sliding are `W/S` with `W = (c_t u, c_s kappa a omega)`,
-    the gradient of S: `c_t = 1 + h e_1`, `c_s = 2 (m - h e_2)`, and `h = 7/36 ((A - B) e_1 - 2 C e_2 - A C e_3)`. Within
-    0.0085 of the exact disc. ("Discs")
+    `rest` is `DISC_REST` in the unit of p and o. The mean speed of the disc is `S = sqrt(p + m o)`, with `m = 1/4 +
+    7/36 (e_1 + A e_2)` and `(e_1, e_2, e_3) = (o^2, p o, p^2)/(o^2 + B p o + C p^2)`. Force and scaled torque of
+    sliding are `W/S` with `W = (c_t u, c_s kappa a omega)`, the gradient of S: `c_t = 1 + h e_1`, `c_s = 2 (m - h
+    e_2)`, and `h = 7/36 ((A - B) e_1 - 2 C e_2 - A C e_3)`. Within 0.0085 of the exact disc. ("Discs")
     """
     pp, po, oo = slide * slide, slide * spin, spin * spin
-    per = 1.0 / (oo + (DISC_B * po + DISC_C * pp) + DISC_REST)
+    per = 1.0 / (oo + (DISC_B * po + DISC_C * pp) + rest)
     e_1, e_2, e_3 = oo * per, po * per, pp * per
     h = (7.0 / 36.0 * (DISC_A - DISC_B)) * e_1 - (7.0 / 18.0 * DISC_C) * e_2 - (7.0 / 36.0 * DISC_A * DISC_C) * e_3
     m = 0.25 + 7.0 / 36.0 * e_1 + (7.0 / 36.0 * DISC_A) * e_2
