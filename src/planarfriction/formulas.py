@@ -160,7 +160,7 @@ DISC_REST = 1e-37
 ellipsoid with `m = 1/4`. Even in single precision it leaves nothing to divide by zero."""
 
 
-def disc_friction(xp, slide, spin, rest):
+def disc_friction(xp, slide, spin, rest=DISC_REST):
     """Sliding friction of a disc, `c_t`, `c_s` and `m` [-], from `p = |u|^2` of its centre and `o = (a omega)^2`.
 
     `rest` is `DISC_REST` in the unit of p and o. The mean speed of the disc is `S = sqrt(p + m o)`, with `m = 1/4 +
