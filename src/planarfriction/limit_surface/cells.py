@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers
+from planarfriction.limit_surface.base import SurfaceNumbers
 from planarfriction.limit_surface.compiled import CompiledLimitSurface
 from planarfriction.limit_surface.loops.cell_twists import cell_twists
 from planarfriction.limit_surface.stored import cell_slopes, cell_sums, stored_potential
@@ -50,13 +50,12 @@ class LimitSurfaceCells(CompiledLimitSurface):
         return self._one_metric and not self.patch.has_discs
 
     @functools.cached_property
-    def _cell_rows(self) -> tuple[np.ndarray, np.ndarray]:
-        """Levers `[2, 3, n]` and weights `[n]` for compiled loops."""
+    def _cell_rows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Levers `[2, 3, n]`, what discs see of a spin `[n]`, and weights `[n]` for compiled loops."""
         levers, weights = self._scaled_levers
-        return np.ascontiguousarray(np.moveaxis(levers, 0, -1)), weights
+        spins = np.ascontiguousarray(levers[:, 2, 2]) if self.patch.has_discs else np.zeros(len(weights))
+        return np.ascontiguousarray(np.moveaxis(levers[:, :2], 0, -1)), spins, weights
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
         """Find twists; the minimum often lies on a kink: inside a flat facet the body turns about a cell."""
-        if self.patch.has_discs:
-            return LimitSurface._find_twists(self, wrenches, found)
         return cell_twists(*self._cell_rows, self._scaling, wrenches, found)
