@@ -27,12 +27,17 @@ from planarfriction.kernels.vectors import norm
 KAPPA = math.sqrt(0.5)
 """Radius of gyration of a disc, over its radius."""
 
+REST = formulas.DISC_REST
+
+STILL = 1e-100
+"""Speed [m/s] up to which the ratio of two speeds counts as that at rest: its slopes leave the range of numbers."""
+
 
 @kernel
 def sliding(u):
     """Return `c_t`, `c_s`, the mean speed S, and W."""
     slide, spin = u[0] * u[0] + u[1] * u[1], 2.0 * u[2] * u[2]
-    c_t, c_s, m = formulas.disc_friction(xp, slide, spin)
+    c_t, c_s, m = formulas.disc_friction(xp, slide, spin, REST)
     return c_t, c_s, math.sqrt(slide + m * spin), (c_t * u[0], c_t * u[1], c_s * u[2])
 
 
@@ -47,7 +52,8 @@ def mean_speed(u):
 def _per_h(speed, pull):
     """Return `S/|W|`; 1 at rest, which is about its value near it."""
     size = norm(pull)
-    return xp.where(size > 0.0, speed, 1.0) / xp.where(size > 0.0, size, 1.0)
+    moves = size > STILL
+    return xp.where(moves, speed, 1.0) / xp.where(moves, size, 1.0)
 
 
 @kernel

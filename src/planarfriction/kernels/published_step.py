@@ -139,8 +139,6 @@ def pull_back(contact, step, slopes, new, wrench):
 
 
 MODEL = StepModel(shape_of, hold, hold_slopes, taped_step, pull_back)
-rollout = bind(rollouts.rollout, MODEL, "published_rollout", jit)
-gradient = bind(rollouts.gradient, MODEL, "published_gradient", jit)
 sensitivities = bind(rollouts.sensitivities, MODEL, "published_sensitivities", jit)
 tangent = bind(rollouts.tangent, MODEL, "published_tangent", jit)
 

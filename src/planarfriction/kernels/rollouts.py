@@ -1,4 +1,4 @@
-"""Roll-outs of a model of three states, their discrete adjoint and their derivatives, one contact after another.
+"""Inputs of roll-outs, and derivatives of those of a model of three states forward in time, contact by contact.
 
 `bind` makes each loop an entry point of a model, whose functions (`moment_steps.StepModel`) are compiled into it.
 
@@ -68,59 +68,6 @@ def _contact(shape_of, inputs, row):
 def row_of(values, b):
     """Return the row of `values` for contact b: its own, or the one that all share."""
     return b if values.shape[0] > 1 else 0
-
-
-# ---------------------------------------------------------------------- roll-outs
-
-
-@kernel
-def _rollout(shape_of, hold, taped_step, inputs, span, z, wrench, states):
-    kept = states.shape[1] > 0
-    for b in range(span[0], span[1]):
-        twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-        contact, state = _contact(shape_of, inputs, inputs.rows[row_of(inputs.rows, b)]), three(z[b])
-        for t in range(inputs.dt.shape[0]):
-            if kept:
-                put(states[b, t], state)
-            load, step = loads[t], taped_step(contact, hold(contact, three(twists[t])), state, inputs.dt[t])
-            state = step.new if load != 0.0 else (0.0, 0.0, 0.0)
-            add(wrench[b, t], times(load, step.wrench) if load != 0.0 else (0.0, 0.0, 0.0))
-        put(z[b], state)
-
-
-def rollout(shape_of, hold, taped_step, inputs, span, z, wrench, states):
-    """Step the contacts `span[0]` to `span[1]`: `z` [B, 3] in place, wrenches added to `wrench` [B, T, 3].
-
-    The state before each step goes into `states` [B, T, 3], unless that is empty.
-    """
-    _rollout(shape_of, hold, taped_step, inputs, span, z, wrench, states)
-
-
-@kernel
-def _gradient(shape_of, hold_slopes, taped_step, pull_back, inputs, states, wrench_bar, span, bars, work):
-    for b in range(span[0], span[1]):
-        twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-        before, pulls = states[row_of(states, b)], wrench_bar[row_of(wrench_bar, b)]
-        contact, back = _contact(shape_of, inputs, inputs.rows[row_of(inputs.rows, b)]), three(bars.state[b])
-        for t in range(inputs.dt.shape[0] - 1, -1, -1):
-            load, pull = loads[t], three(pulls[t])
-            held, known = hold_slopes(contact, three(twists[t]), work)
-            step = taped_step(contact, held, three(before[t]), inputs.dt[t])
-            bar = pull_back(contact, step, known, times(0.0 if load == 0.0 else 1.0, back), times(load, pull))
-            back = bar.state
-            add(bars.twist[b, t], bar.twist)
-            bars.load[b, t] += dot(pull, step.wrench)
-            accumulate(bars.rows[b], 0, 1, (bar.law, bar.shape))
-        put(bars.state[b], back)
-
-
-def gradient(shape_of, hold_slopes, taped_step, pull_back, inputs, states, wrench_bar, span, bars):
-    """Add the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
-    work = np.empty(SCRATCH)
-    _gradient(shape_of, hold_slopes, taped_step, pull_back, inputs, states, wrench_bar, span, bars, work)
-
-
-# ---------------------------------------------------------------------- derivatives
 
 
 @kernel

@@ -63,6 +63,11 @@ def cells_of(patch: ContactPatch, law: Any, normal_force: float | None) -> Cells
     return Cells(numbers, patch.weights(normal_force))
 
 
+def obstacle(levers) -> str:
+    """Return the reason why compiled rollouts do not take cells of such numbers, or an empty text."""
+    return "for friction that is not the same forwards and backwards" if len(levers) > 6 else ""
+
+
 def positions_of(xp, shape: Cells):
     """Return the positions of the cells, x then y [m], `[2, N]`."""
     if len(shape.levers) < 5:

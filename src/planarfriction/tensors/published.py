@@ -108,24 +108,29 @@ def joined(xp, z):
 def drive(xp, law: LawNumbers, shape: PublishedNumbers, twist) -> Drive:
     """Return the drive of the bristle at a twist."""
     vx, vy, omega = split(twist)
-    twist = (*_through(shape.root, vx, vy), omega)
-    scaled = joined(xp, over(xp)(published_step.scaled_twist)(shape, twist))
-    u = shape.surface(scaled, xp.norm(scaled, -1))
-    return Drive(*split(scaled), omega, *split(u))
+    vx, vy = _through(shape.root, vx, vy)
+    scaled = joined(xp, (vx - omega * shape.centre_y, vy + omega * shape.centre_x, shape.contact_radius * omega))
+    return Drive(*split(scaled), omega, *split(shape.surface(scaled, xp.norm(scaled, -1))))
 
 
-def _evaluate(law, shape, twist, omega, u, z):
-    """Return the rate of the state and the wrench at V_S = `twist`, where the limit surface gives u."""
+def _rate(law, shape, twist, u, z):
+    """Return the rate of the state at V_S = `twist`, where the limit surface gives u."""
     r = shape.contact_radius
     scaled = z[0], z[1], z[2] / r
     rate = plus(u, -published_contact._decay(law, scaled, u, twist), scaled)
-    fx, fy, fs = traction(law, scaled, rate, (twist[0], twist[1], shape.second_moment * omega / r))
-    return (rate[0], rate[1], r * rate[2]), (fx, fy, r * fs + shape.centre_x * fy - shape.centre_y * fx)
+    return rate[0], rate[1], r * rate[2]
+
+
+def pull(xp, law: LawNumbers, shape: PublishedNumbers, z, rate, by: Drive):
+    """Return the wrench per unit load, in the axes of the metric."""
+    fx, fy, tau = over(xp)(traction)(law, z, rate, (by.x, by.y, shape.second_moment * by.omega))
+    return fx, fy, tau + shape.centre_x * fy - shape.centre_y * fx
 
 
 def evaluate(xp, law: LawNumbers, shape: PublishedNumbers, z, by: Drive):
     """Return the rate of the bristle, and the wrench per unit load."""
-    return over(xp)(_evaluate)(law, shape, by[:3], by.omega, by[4:], z)
+    rate = over(xp)(_rate)(law, shape, by[:3], by[4:], z)
+    return rate, pull(xp, law, shape, z, rate, by)
 
 
 def advance(xp, law: LawNumbers, shape: PublishedNumbers, z, by: Drive, dt):

@@ -88,6 +88,11 @@ class TensorModel:
         """Shape of the state of one contact."""
         return (3,)
 
+    @property
+    def obstacle(self) -> str:
+        """Reason why compiled rollouts do not take the model, or an empty text."""
+        return ""
+
     def rest(self, batch: int | Sequence[int] = ()) -> Any:
         """Return the state of a contact at rest, or of a `batch`: `[*batch, *state_shape]`."""
         raise NotImplementedError

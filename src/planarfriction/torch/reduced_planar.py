@@ -144,8 +144,9 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         """
         law, shape = self._contact_at(None)
         z, v, load = self._inputs(z, v, f_n)
-        by = published.drive(xp, law, shape, v)
-        return load[..., None] * published.wrench(xp, law, shape, z, self._number("z_dot", z_dot), by)
+        rate, by = published.split(self._number("z_dot", z_dot)), published.drive(xp, law, shape, v)
+        pull = published.pull(xp, law, shape, published.split(z), rate, by)
+        return load[..., None] * published.wrench(xp, shape, pull)
 
     def step(self, z: Tensor, v: Tensor, f_n: Tensor | float, dt: Tensor | float) -> tuple[Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the bristles after `dt` [s] of a constant twist, and the wrench at the end. Stable at any `dt`."""
