@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from planarfriction import formulas, validation
+from planarfriction import validation
+from planarfriction.patch.disc_friction import disc_friction
 from planarfriction.patch.outline import with_outline
 from planarfriction.patch.pressure import PerCell
 from planarfriction.patch.shared import SharedPressure, loads_of_change
@@ -372,9 +373,7 @@ def _pulls(places: np.ndarray, radii: np.ndarray, centres: np.ndarray) -> np.nda
     """Return friction `[K, n, 3]` per share of load against unit spins about K centres; a disc has its own torque."""
     x, y = places.T
     ux, uy = -(y - centres[:, 1:]), x - centres[:, :1]
-    slide, spin = ux**2 + uy**2, np.broadcast_to(radii**2, ux.shape)
-    c_t, c_s, m = formulas.disc_friction(np, slide, spin)
-    speed = np.sqrt(slide + m * spin)
+    c_t, c_s, speed = disc_friction(ux**2 + uy**2, radii**2)
     per_speed = np.divide(1.0, speed, out=np.zeros_like(speed), where=speed > 0.0)
     fx, fy = c_t * ux * per_speed, c_t * uy * per_speed
-    return np.stack([fx, fy, x * fy - y * fx + 0.5 * c_s * spin * per_speed], -1)
+    return np.stack([fx, fy, x * fy - y * fx + 0.5 * c_s * radii**2 * per_speed], -1)
