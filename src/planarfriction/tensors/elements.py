@@ -1,7 +1,8 @@
 """Compiled functions over arrays: the source of a straight-line kernel, run on tensors.
 
 What is written once for a cell, of numbers, `kernels.discs` say, is also what a tensor library needs for all cells at
-once: vectors are tuples of arrays then, and `xp` is the library. Only functions that are not straight lines, or whose
+once: a vector is a tuple of arrays then, or one array along
+its last axis, and `xp` is the library. Only functions that are not straight lines, or whose
 slopes at a kink have a rule of their own (see `kernels.rules`), have forms for arrays here.
 """
 
@@ -60,9 +61,14 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
     """Return functions that arrays take in another form, and these forms."""
 
     def plus(a: Any, c: Any, b: Any) -> Any:
-        return tuple(x + c * y for x, y in zip(a, b, strict=True))
+        return tuple(x + c * y for x, y in zip(a, b, strict=True)) if isinstance(a, tuple) else a + c * b
+
+    def times(c: Any, a: Any) -> Any:
+        return tuple(c * x for x in a) if isinstance(a, tuple) else c * a
 
     def dot(a: Any, b: Any) -> Any:
+        if not isinstance(a, tuple):
+            return xp.dot(a, b, -1)
         first, *others = (x * y for x, y in zip(a, b, strict=True))
         return sum(others, first)
 
@@ -87,7 +93,7 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
         (compiled_math, xp),
         (math, SimpleNamespace(sqrt=xp.root, inf=math.inf, pi=math.pi)),
         (vectors.plus, plus),
-        (vectors.times, lambda c, a: tuple(c * x for x in a)),
+        (vectors.times, times),
         (vectors.dot, dot),
         (vectors.square, lambda a: dot(a, a)),
         (formulas.disc_friction, disc_friction),

@@ -1,4 +1,4 @@
-"""The published reduced model over `xp`: a bristle `[..., 3]`, as `kernels.published_step` steps it.
+"""The published reduced model over `xp`: a bristle `[..., 3]` that steps as `kernels.bristle_step` says.
 
 State and twist are `[..., 3]`; the parameters of law and shape and time steps are `[..., 1]`, or plain numbers.
 """
@@ -9,11 +9,13 @@ import functools
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from planarfriction import models
+from planarfriction import formulas, models
+from planarfriction.compiler import compiled_math as xp
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import published_contact, published_step
-from planarfriction.kernels.contacts import traction
-from planarfriction.kernels.vectors import plus
+from planarfriction.kernels import bristle_step
+from planarfriction.kernels import law as law_numbers
+from planarfriction.kernels.bristle_step import seen
+from planarfriction.kernels.vectors import norm, plus
 from planarfriction.laws import FrictionLaw
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models.reduced_published import PublishedShape
@@ -39,17 +41,18 @@ class PublishedNumbers(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """A twist, and what the limit surface makes of it; components `[..., 1]`."""
+    """Velocities that drive the bristle in scaled coordinates, `[..., 3]`, and numbers `[..., 1]`."""
 
-    x: Any
-    """`V_S`"""
-    y: Any
-    s: Any
-    omega: Any
-    u_x: Any
-    """`h(V) |V_S|`"""
-    u_y: Any
-    u_s: Any
+    velocity: Any
+    """`u = h(V) v_n` [m/s]"""
+    speed: Any
+    """`v_n` [m/s]"""
+    per_h: Any
+    """`1/|h|` [-]"""
+    grip: Any
+    """`sigma_0/g(v_n)` [1/m]"""
+    viscous: Any
+    """`U V`: velocity that viscous friction opposes."""
 
 
 def shape_of(patch: ContactPatch, law: FrictionLaw, surface: LimitSurface | None) -> PublishedShape:
@@ -87,58 +90,70 @@ def centre(shape: PublishedNumbers) -> tuple[Any, Any]:
 
 
 def scale(xp, shape: PublishedNumbers):
-    """Return `S = diag(1, 1, r)` as a vector `[..., 3]`."""
+    """Return `S = diag(1, 1, r)` as a vector `[..., 3]`: bristles are scaled by 1/S for a step, their rates by S."""
     one = xp.ones_like(shape.contact_radius)
-    return joined(xp, (one, one, shape.contact_radius))
+    return _vector(xp, one, one, shape.contact_radius)
+
+
+def _vector(xp, x, y, s):
+    """Return components `[..., 1]`, which broadcast, as a vector `[..., 3]`."""
+    return xp.concatenate(xp.broadcast_arrays(x, y, s), -1)
 
 
 # ---------------------------------------------------------------------- steps
 
 
-def split(state) -> tuple[Any, ...]:
-    """Return a state as a vector of arrays `[..., 1]`."""
-    return tuple(state[..., k, None] for k in range(3))
+def split(state) -> tuple[Any]:
+    """Return a state as a tuple of arrays: one."""
+    return (state,)
 
 
-def joined(xp, z):
-    """Return a state, or a twist, of a vector of arrays."""
-    return xp.concatenate(xp.broadcast_arrays(*z), -1)
+def joined(xp, z: tuple[Any]):
+    """Return a state of a tuple of arrays."""
+    return z[0]
 
 
 def drive(xp, law: LawNumbers, shape: PublishedNumbers, twist) -> Drive:
     """Return the drive of the bristle at a twist."""
-    vx, vy, omega = split(twist)
+    vx, vy, omega = twist[..., 0:1], twist[..., 1:2], twist[..., 2:3]
     vx, vy = _through(shape.root, vx, vy)
-    scaled = joined(xp, (vx - omega * shape.centre_y, vy + omega * shape.centre_x, shape.contact_radius * omega))
-    return Drive(*split(scaled), omega, *split(shape.surface(scaled, xp.norm(scaled, -1))))
-
-
-def _rate(law, shape, twist, u, z):
-    """Return the rate of the state at V_S = `twist`, where the limit surface gives u."""
-    r = shape.contact_radius
-    scaled = z[0], z[1], z[2] / r
-    rate = plus(u, -published_contact._decay(law, scaled, u, twist), scaled)
-    return rate[0], rate[1], r * rate[2]
-
-
-def pull(xp, law: LawNumbers, shape: PublishedNumbers, z, rate, by: Drive):
-    """Return the wrench per unit load, in the axes of the metric."""
-    fx, fy, tau = over(xp)(traction)(law, z, rate, (by.x, by.y, shape.second_moment * by.omega))
-    return fx, fy, tau + shape.centre_x * fy - shape.centre_y * fx
+    vx, vy = vx - omega * shape.centre_y, vy + omega * shape.centre_x
+    scaled = _vector(xp, vx, vy, shape.contact_radius * omega)
+    speed = xp.norm(scaled, -1)
+    u = shape.surface(scaled, speed)
+    u_norm = xp.norm(u, -1)
+    slides = u_norm > 0.0
+    per_h = xp.where(slides, speed, 1.0) / xp.where(slides, u_norm, 1.0)
+    grip = over(xp)(law_numbers.grip)(law, speed)
+    return Drive(u, speed, per_h, grip, _vector(xp, vx, vy, shape.second_moment * omega))
 
 
 def evaluate(xp, law: LawNumbers, shape: PublishedNumbers, z, by: Drive):
     """Return the rate of the bristle, and the wrench per unit load."""
-    rate = over(xp)(_rate)(law, shape, by[:3], by[4:], z)
-    return rate, pull(xp, law, shape, z, rate, by)
+    s = scale(xp, shape)
+    rate = s * over(xp)(_rate)(law, z[0] / s, *by[:4])
+    return (rate,), pull(xp, law, z[0], rate, by)
+
+
+def _rate(law, z, u, speed, per_h, grip):
+    """Return z' of the scaled bristle."""
+    deflection, along = seen(z, norm(z), u, per_h, grip)
+    return plus(u, -formulas.bristle_decay(xp, deflection, along, speed, grip, law), z)
 
 
 def advance(xp, law: LawNumbers, shape: PublishedNumbers, z, by: Drive, dt):
     """Return the bristle after `dt` of a constant twist, and the wrench per unit load."""
-    return over(xp)(published_step._step)(law, shape, by[:3], by.omega, by[4:], z, dt)
+    s, (u, speed, per_h, grip, _) = scale(xp, shape), by
+    new, k = over(xp)(bristle_step.step)(law, z[0] / s, u, speed, per_h, grip, dt)
+    return (s * new,), pull(xp, law, s * new, s * (u - k * new), by)
+
+
+def pull(xp, law: LawNumbers, z, rate, by: Drive):
+    """Return the wrench per unit load about the centre of pressure, in the axes of the metric."""
+    return (formulas.traction(z, rate, by.viscous, law),)
 
 
 def wrench(xp, shape: PublishedNumbers, pull):
     """Return the wrench about the origin per unit load `[..., 3]`."""
-    fx, fy, tau = pull
-    return joined(xp, (*_through(shape.root, fx, fy), tau))
+    fx, fy, tau = (pull[0][..., k : k + 1] for k in range(3))
+    return _vector(xp, *_through(shape.root, fx, fy), tau + shape.centre_x * fy - shape.centre_y * fx)

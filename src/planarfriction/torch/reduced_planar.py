@@ -144,8 +144,7 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         """
         law, shape = self._contact_at(None)
         z, v, load = self._inputs(z, v, f_n)
-        rate, by = published.split(self._number("z_dot", z_dot)), published.drive(xp, law, shape, v)
-        pull = published.pull(xp, law, shape, published.split(z), rate, by)
+        pull = published.pull(xp, law, z, self._number("z_dot", z_dot), published.drive(xp, law, shape, v))
         return load[..., None] * published.wrench(xp, shape, pull)
 
     def step(self, z: Tensor, v: Tensor, f_n: Tensor | float, dt: Tensor | float) -> tuple[Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
