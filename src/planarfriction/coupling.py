@@ -8,7 +8,6 @@ they are those of the models at the twists and loads that they cause. This is st
 from __future__ import annotations
 
 import functools
-import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -18,9 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.compiled.packed import PackedParts
+from planarfriction.compiled.packed import PackedModel
 from planarfriction.compiler.calls import address_of
-from planarfriction.compiler.memory import row_of
+from planarfriction.compiler.memory import places_of, row_of
 from planarfriction.compiler.threads import share
 from planarfriction.equality import ByValue, by_parts
 from planarfriction.errors import InvalidValueError
@@ -45,6 +44,12 @@ _WORTH_A_THREAD = 200
 
 _INPUTS = ("state", "dt", "twist", "normal_force", "wrench", "twist_response", "load_response", "moments")
 _PLACES = ("state", "dt", "free_twist", "free_load", "guess", "response", "load_response", "moments")
+
+
+def lever_of(model: FrictionModel) -> float:
+    """Return the lever arm [m] at which spins of a patch count as speeds."""
+    patch = model.patch
+    return math.sqrt(float((patch.positions**2).sum(axis=1).mean() + 0.5 * (patch.radii**2).mean()))
 
 
 @by_parts
@@ -217,13 +222,13 @@ class CoupledPatches(ByValue):
         """Raise InvalidValueError for `patches`, all if None, whose pressure cannot follow moments."""
         for p in range(len(self.models)) if patches is None else patches:
             if self._packed.counts[p] == 0:
-                rule = "be None: parts of a patch that change with the load cannot follow it"
+                rule = "be None: a patch without cells cannot follow them while its shape follows the load"
                 raise InvalidValueError("moments", rule, f"model {p}: {type(self.models[p]).__name__}")
 
     def _solve(self, problems: np.ndarray) -> np.ndarray:
         """Solve all problems; the iterations that each took, negative for invalid ones."""
         packed, parts = self._packed, self._parts
-        problems.view(np.int64)[:, parts["records"]], problems[:, parts["shares"]] = packed.records, packed.shares
+        problems.view(np.int64)[:, parts["records"]] = packed.records
         if not packed.following:
             return self._once(problems)
         total, unsettled = np.zeros(len(problems), int), np.arange(len(problems))
@@ -250,17 +255,16 @@ class CoupledPatches(ByValue):
         share(len(problems), most, lambda first, last: kernels.solve_batch(row, problems, first, last))
         return problems[:, self._parts["iterations"].start].astype(int)
 
-    def _write_following(self, problems: np.ndarray, loads: np.ndarray) -> list[PackedParts]:
-        """Write the pieces of patches whose shapes follow their loads `[E, k]`; returns what has to be kept."""
-        records, shares = problems.view(np.int64)[:, self._parts["records"]], problems[:, self._parts["shares"]]
-        kept = []
-        for p, pieces in self._packed.following:
+    def _write_following(self, problems: np.ndarray, loads: np.ndarray) -> list[PackedModel]:
+        """Write the records of patches whose shapes follow their loads `[E, k]`; returns what has to be kept."""
+        records, kept = problems.view(np.int64)[:, self._parts["records"]], []
+        for p in self._packed.following:
             chosen = np.flatnonzero((loads[:, p] > 0.0) & (loads[:, p] <= LARGEST))
-            records[:, pieces] = 0
+            records[:, p] = 0
             if chosen.size:
-                steps = self.models[p].compiled.packed_parts(loads[chosen, p])
-                records[chosen, pieces], shares[chosen, pieces] = steps.addresses, steps.shares
-                kept.append(steps)
+                packed = self.models[p].compiled.with_all_states(loads[chosen, p])
+                records[chosen, p] = places_of(packed.records)
+                kept.append(packed)
         return kept
 
     def _result(self, problems: np.ndarray, counts: np.ndarray, batch: tuple[int, ...]) -> CoupledStep:
@@ -279,7 +283,7 @@ class CoupledPatches(ByValue):
         """
         self._check_follows([p for p, follow in enumerate(follows) if follow])
         row, parts = np.zeros((1, self._packed.words)), self._parts
-        row.view(np.int64)[:, parts["records"]], row[:, parts["shares"]] = self._packed.records, self._packed.shares
+        row.view(np.int64)[:, parts["records"]] = self._packed.records
         row[:, parts["tolerance"]], row[:, parts["most"]], row[:, parts["follows"]] = TOLERANCE, ITERATIONS, follows
         row[:, parts["again"]] = 1.0
         return row
@@ -313,63 +317,53 @@ class _PackedPatches(NamedTuple):
     words: int
     """Length of that."""
     records: np.ndarray
-    """Addresses of the pieces' records, int `[pieces]`; 0 of those that follow their loads."""
-    shares: np.ndarray
-    """`[pieces]`"""
-    following: list[tuple[int, slice]]
-    """Patches whose pieces follow their loads, and these pieces."""
+    """Addresses of the patches' records, int `[k]`; 0 of those that follow their loads."""
+    following: list[int]
+    """Patches whose shapes follow their loads."""
     counts: np.ndarray
     """Points of each patch that share its load; 0 of one that cannot follow moments, `[k]`."""
     sizes: np.ndarray
-    """Words of the pieces' records, int `[pieces]`; 0 of those that follow their loads."""
+    """Words of the patches' records, int `[k]`; 0 of those that follow their loads."""
     kept: list[Any]
     """Objects behind the addresses, which have to be kept alive."""
 
 
 def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatches:
-    counts = [model.compiled.parts for model in models]
-    ends = np.cumsum([0, *counts]).tolist()
-    pieces = [slice(*each) for each in itertools.pairwise(ends)]
-    steps, slopes, owners, firsts, sizes = np.zeros((5, ends[-1]), np.int64)
-    records, shares, known, following = np.zeros(ends[-1], np.int64), np.zeros(ends[-1]), {}, []
-    for p, (model, own) in enumerate(zip(models, pieces, strict=True)):
-        functions, owners[own] = model.compiled.functions, p
-        steps[own], slopes[own] = address_of(functions.step, WORDS), address_of(functions.slopes, WORDS)
-        firsts[own] = np.linspace(bounds[p], bounds[p + 1], counts[p], endpoint=False)
-        if model.depends_on_load:
-            following.append((p, own))
-            continue
-        packed = known.setdefault(id(model), None) or model.compiled.packed_parts([None])
-        known[id(model)] = packed
-        records[own], shares[own] = packed.addresses[0], packed.shares[0]
-        sizes[own] = [part.records.shape[1] for part in packed.parts]
+    functions = [model.compiled.functions for model in models]
+    steps = np.array([address_of(each.step, WORDS) for each in functions], np.int64)
+    slopes = np.array([address_of(each.slopes, WORDS) for each in functions], np.int64)
+    (records, sizes), known = np.zeros((2, len(models)), np.int64), {}
+    following = [p for p, model in enumerate(models) if model.depends_on_load]
+    for p, model in enumerate(models):
+        if p not in following:
+            packed = known.setdefault(id(model), None) or model.compiled.with_all_states([None])
+            known[id(model)] = packed
+            (records[p],), sizes[p] = places_of(packed.records), packed.records.shape[1]
     # all cells, whatever load they carry: a lever arm that does not follow the load
-    radius = np.array([np.sqrt((model.patch.positions**2).sum(1).mean()) for model in models])
-    followers = _followers(models, np.array(ends[:-1]))
-    rows = layout(len(models), ends[-1], int(bounds[-1]), len(followers.x), int(followers.words.sum()))
+    radius = np.array([lever_of(model) for model in models])
+    followers, firsts = _followers(models), bounds.astype(np.int64)
+    rows = layout(len(models), int(bounds[-1]), len(followers.x), int(followers.words.sum()))
     patches = Patches(
         count=len(models),
-        pieces=ends[-1],
         states=int(bounds[-1]),
         solve=kernels.solve_address(),
         steps=steps,
         slopes=slopes,
-        owners=owners,
         firsts=firsts,
         radius=radius,
         followers=followers,
         row=rows.offsets,
     )
-    kept, counts = [steps, slopes, owners, firsts, radius, *followers, *known.values()], np.diff(followers.firsts)
-    return _PackedPatches(row_of(patches), rows.slices, rows.size, records, shares, following, counts, sizes, kept)
+    kept, counts = [steps, slopes, firsts, radius, *followers, *known.values()], np.diff(followers.firsts)
+    return _PackedPatches(row_of(patches), rows.slices, rows.size, records, following, counts, sizes, kept)
 
 
-def _followers(models: Sequence[FrictionModel], pieces: np.ndarray) -> Followers:
-    """Return the points of the patches, of which `pieces` are the first pieces."""
+def _followers(models: Sequence[FrictionModel]) -> Followers:
+    """Return the points of the patches."""
     places, words = zip(*(model.compiled.points() for model in models), strict=True)
     x, y = (np.ascontiguousarray(each) for each in np.concatenate(places).T)
     firsts = np.cumsum([0, *map(len, places)])
-    return Followers(x, y, firsts, np.array(words, np.int64), pieces.astype(np.int64))
+    return Followers(x, y, firsts, np.array(words, np.int64))
 
 
 def follows(model: FrictionModel) -> bool:

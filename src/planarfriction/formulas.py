@@ -68,15 +68,6 @@ def stribeck_at(effect, law):
     return law.mu_c + (law.mu_s - law.mu_c) * effect
 
 
-def stribeck_slope(xp, speed, law):
-    """Derivative `dg/d|v|` [s/m]; at rest the right-hand limit, finite for `gamma >= 1` (zero where it has none)."""
-    ratio = speed * (1.0 / law.v_s)
-    safe = xp.where(ratio > 0.0, ratio, 1.0)
-    at_rest = xp.where(law.gamma == 1.0, 1.0, 0.0)
-    steepness = xp.where(ratio > 0.0, xp.power(safe, law.gamma) / safe, at_rest)
-    return -(law.mu_s - law.mu_c) * law.gamma * (1.0 / law.v_s) * steepness * xp.exp(-xp.power(ratio, law.gamma))
-
-
 def slip_fraction(xp, deflection, breakaway_ratio):
     """Elasto-plastic `alpha` [-] of the relative deflection `|z|/z_max`: 0 below breakaway, 1 at full deflection.
 
@@ -196,59 +187,6 @@ def disc_deflection(xp, deflection, spin_share, breakaway_ratio):
     uneven = 1.0 + UNEVEN * spin_share * (2.0 - (5.0 / 3.0) * spin_share)
     share = (deflection * uneven - breakaway_ratio) / (uneven - breakaway_ratio)
     return breakaway_ratio + (1.0 - breakaway_ratio) * share
-
-
-# ---------------------------------------------------------------------- moments of the bristles
-
-
-def stribeck_place(xp, speed, v_s, gamma, knee):
-    """Return the place of a speed > 0 in a map of the Stribeck effect: `p/(p + knee)`, `p = (v/v_s)^gamma` [-].
-
-    Its derivative with respect to `log v` is `gamma t (1 - t)`. ("Reduced model")
-    """
-    fast = speed > v_s
-    raised = xp.power(xp.where(fast, v_s, speed) / xp.where(fast, speed, v_s), gamma)  # stays finite
-    return xp.where(fast, 1.0, raised) / xp.where(fast, 1.0 + knee * raised, raised + knee)
-
-
-def evenness(square, fourth):
-    """Evenness e [-] of the bristles that the moments stand for: `<u^2>^2/<u^4>`, 1 where all are bent alike.
-
-    The bristle of a cell is taken as `u_i = B_i F^-1 z`, the only field that is a rigid motion of the cells and has the
-    moments z; `square = <u^2> = z.z`, `fourth = <u^4>`. ("Reduced model"; docs/reduced-model.md, "Breakaway")
-    """
-    return square * square / fourth
-
-
-def slip_share(xp, deflection, cosine, even, law):
-    """Closure `beta` [-] of the moment equation, from `|z|/|z_ss|` and the cosine of the angle between z and z_ss.
-
-    `alpha (1 + cos)/2` for elasto-plastic bristles, 1 for plain LuGre: that of a single bristle, but for an earlier
-    breakaway `s_ba even` (see `evenness`): the less even, the further some bristles are ahead of the mean and the
-    earlier they slip. ("Reduced model")
-    """
-    alpha = slip_fraction(xp, deflection, law.breakaway_ratio * even)
-    return xp.where(law.elasto_plastic > 0.0, 0.5 * alpha * (1.0 + cosine), 1.0)
-
-
-def floored(xp, value, least):
-    """`value` where it is at least `2 least`, and from there smoothly to `least`: `least (1 + (value/2 least)^2)`.
-
-    Keeps the dissipation of a stored steady state above zero. ("Reduced model")
-    """
-    share = xp.maximum(value, 0.0) * (0.5 / least)
-    return xp.where(share < 1.0, least * (1.0 + share * share), value)
-
-
-def floored_slope(xp, value, least):
-    """Derivative of `floored` with respect to `value`."""
-    return xp.minimum(xp.maximum(value, 0.0) * (0.5 / least), 1.0)
-
-
-def floored_by_least(xp, value, least):
-    """Derivative of `floored` with respect to `least`."""
-    slope = floored_slope(xp, value, least)
-    return 1.0 - slope * slope
 
 
 # ---------------------------------------------------------------------- derivatives of a step (docs/differentiable.md)

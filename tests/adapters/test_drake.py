@@ -31,10 +31,10 @@ from tests.support.drake_scenes import CONTACTS, bare, gripped, on_the_floor, ru
 pytestmark = pytest.mark.drake
 
 LAW = pf.LuGre(mu_s=1.0, sigma_2=0.0, elasto_plastic=0.9)
-PAD = pf.ReducedModel(pf.ContactPatch.disc(radius=0.01, cells=9), LAW, parts=1)
-BOX = pf.ReducedModel(pf.ContactPatch.rectangle(0.1, cells=9), LAW, parts=1)
+PAD = pf.ReducedModel(pf.ContactPatch.disc(radius=0.01, cells=9), LAW)
+BOX = pf.ReducedModel(pf.ContactPatch.rectangle(0.1, cells=9), LAW)
 COULOMB = pf.LuGre(mu_c=0.3, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
-DISC = pf.ReducedModel(pf.ContactPatch.disc(radius=0.1, cells=41), COULOMB, parts=1)
+DISC = pf.DistributedModel(pf.ContactPatch.disc(radius=0.1, cells=41), COULOMB)
 
 MISFIT = 1e-6
 """Twists [m/s] that are taken where they get no closer: Drake's own contact solver leaves 1e-8 to 1e-7 open."""

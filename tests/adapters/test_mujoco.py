@@ -25,7 +25,7 @@ from tests.support.mujoco_misfit import misfit, step_checked, twists_and_loads  
 pytestmark = pytest.mark.mujoco
 
 LAW = pf.LuGre(mu_c=0.5, mu_s=0.6, elasto_plastic=0.9)
-PAD = pf.ReducedModel(pf.ContactPatch.disc(radius=0.01, cells=9), LAW, parts=1)
+PAD = pf.ReducedModel(pf.ContactPatch.disc(radius=0.01, cells=9), LAW)
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
@@ -111,7 +111,7 @@ def test_other_contacts_keep_mujocos_own_friction(cone, solver):
     <body name="upper" pos="0.005 0 0.06"><freejoint/>
     <geom name="upper" type="box" size="0.03 0.03 0.02" mass="0.5" contype="0" conaffinity="1"/>
     <site name="upper" pos="0 0 -0.02"/></body></worldbody></mujoco>"""
-    face = pf.ReducedModel(pf.ContactPatch.rectangle(0.06, cells=9), LAW, parts=1)
+    face = pf.ReducedModel(pf.ContactPatch.rectangle(0.06, cells=9), LAW)
     _, d, friction = _made(text, [PatchContact(face, site="upper", geoms=("lower", "upper"))])
     slid = np.zeros(2)
     for _ in range(400):
@@ -142,7 +142,7 @@ def test_models_of_all_kinds_hold_and_pads_may_differ():
     patch = pf.ContactPatch.disc(radius=0.01, cells=9)
     law = pf.LuGre(mu_c=1.0, elasto_plastic=0.9)
     scene = mujoco_scenes.grip()
-    kinds = pf.DistributedModel(patch, law), pf.ReducedModelPublished(patch, law), pf.ReducedModel(patch, law, parts=3)
+    kinds = pf.DistributedModel(patch, law), pf.ReducedModelPublished(patch, law), pf.ReducedModel(patch, law)
     text = scene.text(mujoco_scenes.Native(solref=0.02), 2e-3, "Euler")
     for kind in kinds:
         models = PAD, kind
@@ -152,7 +152,8 @@ def test_models_of_all_kinds_hold_and_pads_may_differ():
         for _ in range(200):
             step_checked(friction, d, 1e-8)
         assert abs(d.qvel).max() < 1e-6
-        assert [each.size for each in friction.coupled.states(friction.state(d))] == [3, np.prod(kind.state_shape)]
+        states = friction.coupled.states(friction.state(d))
+        assert [each.shape for each in states] == [each.state_shape for each in models]
 
 
 def test_twists_and_wrenches_are_in_the_axes_of_the_site():
@@ -210,10 +211,10 @@ def test_other_models_are_left_alone_and_copies_are_not():
 
 def test_another_model_of_the_same_size_is_not_served():
     """It has the same joints and user data, and pads with other friction; a model prepared for the same is a copy."""
-    scene = mujoco_scenes.grip()
+    scene = dataclasses.replace(mujoco_scenes.grip(), model=PAD)
     friction = _held(scene)[2]
     law = dataclasses.replace(LAW, mu_c=0.4)
-    m, other, slippery = scene.ours(model=pf.ReducedModel(PAD.patch, law, parts=1))
+    m, other, slippery = scene.ours(model=pf.ReducedModel(PAD.patch, law))
     assert (m.nv, m.nuserdata) == (friction.m.nv, friction.m.nuserdata)
     with pytest.raises(pf.errors.InvalidValueError, match="d must be data of the model of the patches, or of a copy"):
         friction.step(other)
@@ -417,7 +418,7 @@ def test_unprepared_models_and_unknown_names_are_refused():
             "site must be on the body of one of the geoms",
         ),
         (
-            [PatchContact(pf.ReducedModel(soft, LAW, parts=1), "left", pads)],
+            [PatchContact(pf.ReducedModel(soft, LAW), "left", pads)],
             "model must have a shape that does not change with",
         ),
         ([PAD], "patches must be patches"),

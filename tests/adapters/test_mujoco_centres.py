@@ -17,9 +17,9 @@ pytestmark = pytest.mark.mujoco
 
 LAW = pf.LuGre(mu_c=0.3, mu_s=0.3, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
 DT, RADIUS, MASS = 2e-3, 0.05, 0.5
-SMALL = pf.ReducedModel(pf.ContactPatch.disc(radius=0.004, cells=9), LAW, parts=1)
-LINE = pf.ReducedModel(pf.ContactPatch.rectangle(0.0005, 0.08, cells=9), LAW, parts=1)
-FACE = pf.ReducedModel(pf.ContactPatch.rectangle(0.08, cells=9), LAW, parts=1)
+SMALL = pf.ReducedModel(pf.ContactPatch.disc(radius=0.004, cells=9), LAW)
+LINE = pf.ReducedModel(pf.ContactPatch.rectangle(0.0005, 0.08, cells=9), LAW)
+FACE = pf.ReducedModel(pf.ContactPatch.rectangle(0.08, cells=9), LAW)
 BOX = 'type="box" size="0.04 0.04 0.04"'
 
 

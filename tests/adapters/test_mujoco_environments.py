@@ -32,9 +32,9 @@ PLANE = '<geom name="under" type="plane" size="2 2 0.1"/>'
 EDGE = '<geom name="under" type="box" size="0.06 0.02 0.05" pos="0 0 -0.05"/>'
 
 KINDS = {
-    "reduced": lambda patch, law: pf.ReducedModel(patch, law, parts=1),
+    "reduced": pf.ReducedModel,
     "published": pf.ReducedModelPublished,
-    "parts that follow": lambda patch, law: pf.ReducedModel(patch, law, parts=3),
+    "cells that follow": pf.ReducedModel,
     "cells over an edge": pf.DistributedModel,
 }
 
@@ -151,7 +151,7 @@ def test_a_displaced_patch_of_another_size_that_rolls_along():
       <geom name="under" type="plane" size="2 2 0.1"/>
       <body name="roll" pos="0 0 0.05" euler="90 0 0"><freejoint/><site name="roll" pos="0 -0.05 0" zaxis="0 1 0"/>
       <geom name="roll" type="cylinder" size="0.05 0.03" mass="0.3"/></body></worldbody></mujoco>""")
-    model = pf.ReducedModel(pf.ContactPatch.rectangle(0.004, 0.06, cells=9), LAW, parts=1)
+    model = pf.ReducedModel(pf.ContactPatch.rectangle(0.004, 0.06, cells=9), LAW)
     patches = [PatchContact(model, site="roll", geoms=("under", "roll"))]
     prepare(spec, patches)
     friction = Friction(spec.compile(), patches)

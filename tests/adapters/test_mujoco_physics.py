@@ -59,19 +59,12 @@ def test_a_shaken_gripper_keeps_what_it_holds(integrator):
     assert np.ptp(places[-steps:], axis=0).max() <= 1e-6
 
 
-@pytest.mark.parametrize(
-    ("kind", "start"),
-    [
-        *((pf.models.MomentModel, start) for start in mujoco_scenes.STARTS),
-        (pf.DistributedModel, mujoco_scenes.STARTS[0]),
-        *(pytest.param(pf.DistributedModel, start, marks=SLOW) for start in mujoco_scenes.STARTS[1:]),
-    ],
-)
-def test_a_disc_slides_and_spins_to_rest_where_theory_says(kind, start):
+@pytest.mark.parametrize("start", mujoco_scenes.STARTS)
+def test_a_disc_slides_and_spins_to_rest_where_theory_says(start):
     """Less the stepper's own `v dt/2`; sliding and spinning end together."""
     dt, (speed, spin) = 2e-3, start
     scene = mujoco_scenes.disc(speed, spin)
-    m, d, friction = scene.ours(dt, model=kind(scene.model.patch, scene.model.law))
+    m, d, friction = scene.ours(dt, model=pf.DistributedModel(scene.model.patch, scene.model.law))
     velocities = []
 
     def step():
@@ -120,7 +113,7 @@ def test_the_published_plate_moves_in_the_hand_as_in_the_solver(load):
 @pytest.mark.parametrize("sigma_0", [1e4, 1e6])
 def test_grips_are_quiet_at_every_time_step_that_normal_contact_allows(sigma_0, sigma_1):
     law = pf.LuGre(mu_c=1.0, mu_s=1.0, sigma_0=sigma_0, sigma_1=sigma_1, sigma_2=0.0, elasto_plastic=0.9)
-    model = pf.ReducedModel(pf.ContactPatch.disc(radius=0.01, cells=9), law, parts=1)
+    model = pf.ReducedModel(pf.ContactPatch.disc(radius=0.01, cells=9), law)
     scene = dataclasses.replace(mujoco_scenes.grip(), time=0.8)
     for dt in (5e-4, 2e-3, 5e-3, 1e-2):
         m, d, friction = scene.ours(dt, model=model)

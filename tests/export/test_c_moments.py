@@ -11,7 +11,7 @@ from tests.support.c_libraries import library, samples
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
-NAMES = "few", "three", "distributed", "ellipsoid", "soft"
+NAMES = "few", "distributed", "ellipsoid", "soft"
 COUNT = 200
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
 import numpy as np
@@ -48,6 +49,7 @@ def patches(seed: int) -> list[pf.ContactPatch]:
         pf.ContactPatch.points(random.normal(0.0, 0.05, (5, 2)), random.random(5) + 0.01),
         grid.with_friction_metric(grains, random.uniform(-0.5, 0.5, (12, 2))),
         grid.with_friction_metric(None, lean),
+        dataclasses.replace(grid, radii=random.choice([0.0, 0.3, 1.0], 12) * sizes[0]),
     ]
 
 
@@ -75,7 +77,7 @@ def test_patches(seed):
 @checked
 def test_scenes_and_their_digests(seed):
     random = np.random.default_rng(seed)
-    patch = patches(seed)[seed % 13]
+    patch = patches(seed)[seed % 14]
     law = pf.LuGre(*(random.uniform(0.5, 1.0) * np.array([1.0, 1.3, 1e-3, 2.0, 1e6, 8e2, 0.2])))
     force = pf.Signal(np.cumsum(random.random(6)), random.normal(size=(6, 3)), random.choice(["previous", "linear"]))
     body = pf.Body(random.random() + 0.1, random.random() + 0.1, random.normal(size=2), random.normal())

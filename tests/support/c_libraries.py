@@ -14,18 +14,21 @@ import numpy as np
 import planarfriction as pf
 
 DISC = pf.ContactPatch.disc(0.01)
+FEW = pf.ContactPatch.disc(0.01, cells=5)
 METRIC = pf.ContactPatch.rectangle(0.02, 0.01).with_friction_metric([[1.0, 0.2], [0.2, 1.5]])
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
-SMALL = {"segments": 8, "speeds": 6}
 MODELS = {
     "few": lambda: pf.ReducedModel(DISC, LAW),
     "plain": lambda: pf.ReducedModel(DISC, pf.LuGre(mu_s=1.2)),
-    "one": lambda: pf.ReducedModel(DISC, LAW, parts=1, **SMALL),
-    "three": lambda: pf.ReducedModel(DISC, LAW, parts=3, **SMALL),
     "distributed": lambda: pf.DistributedModel(METRIC, LAW),
+    "discs": lambda: pf.DistributedModel(FEW.discs(), LAW),
+    "turned discs": lambda: pf.DistributedModel(FEW.with_friction_metric([[1.0, 0.2], [0.2, 1.5]]).discs(), LAW),
     "table": lambda: pf.ReducedModelPublished(DISC, LAW),
     "potential": lambda: pf.ReducedModelPublished(METRIC, LAW, surface=pf.LimitSurfaceTable(METRIC)),
     "ellipsoid": lambda: pf.ReducedModelPublished(DISC, LAW, surface=pf.LimitSurfaceEllipsoid(DISC)),
+    "plain ellipsoid": lambda: pf.ReducedModelPublished(
+        DISC, pf.LuGre(mu_s=1.2), surface=pf.LimitSurfaceEllipsoid(DISC)
+    ),
 }
 MAPS = {load: np.clip(np.add.outer(np.arange(-4, 5), load * np.arange(-4, 5)), 0.0, None) for load in (0.5, 1.0, 3.0)}
 FOLLOWING = {
@@ -107,7 +110,7 @@ def samples(model: Any, kind: type, count: int, seed: int = 0) -> list[np.ndarra
 
 def slopes_type(model: Any, kind: type) -> np.dtype:
     """Return the record of derivatives of a model."""
-    states, own = int(np.prod(model.state_shape)), 2 if model.state_shape[-1] != 3 else 3
+    states, own = int(np.prod(model.state_shape)), model.state_shape[0]
     count = 7 if model.law.elasto_plastic else 6
     shapes = {
         "wrench_state": (3, states), "wrench_twist": (3, 3), "wrench_load": (3,), "wrench_params": (3, count),

@@ -117,13 +117,15 @@ def test_many(dtype, seed):
 def test_lost():
     """A wedge that jams with no room for friction; what does not converge does no work that bristles do not give."""
     law = pf.LuGre(mu_s=1.2, sigma_0=1e8, elasto_plastic=0.9)
-    patches = CoupledPatches([pf.ReducedModel(pf.ContactPatch.disc(radius=0.01, cells=9), law, parts=1)] * 2)
+    model = pf.ReducedModel(pf.ContactPatch.disc(radius=0.01, cells=9), law, cells=9)
+    patches, weights = CoupledPatches([model] * 2), model.reduction.patch.weights()
     lost = 0
     for _, found, host, state, dt in compared(patches, wp.float32, both_runs(patches, 100, 10, height=0.6)):
         flat = found.wrench.reshape(len(state), -1)
         change = flat - host.wrench.reshape(flat.shape)
         twist = host.twist.reshape(flat.shape) + np.einsum("eij,ej->ei", host.twist_response, change)
-        squares = ((z.reshape(len(state), 2, 3).astype(float) ** 2).sum(axis=2) for z in (state, found.state))
+        bristles = (z.reshape(len(state), 2, -1, len(weights)).astype(float) for z in (state, found.state))
+        squares = ((z**2).sum(axis=2) @ weights for z in bristles)
         before, after = (0.5 * law.sigma_0 * (found.normal_force * each).sum(axis=1) for each in squares)
         work = dt * (twist * flat).sum(axis=1)
         excess = (work - (before - after)) / (np.abs(work) + before + after + 1e-300)
@@ -183,12 +185,12 @@ def test_moments():
     moments = np.array([[[0.003, -0.002]], [[0.0, 0.01]], [[0.0, 0.0]]]) * [[1.0], [-0.5]]
     given_ = {"worlds": 3, "parameters": {"scale": 1.5}, "dtype": wp.float64, "device": "cpu"}
     for follows in (None, [False, True]):
-        kernel = front.CoupledPatches([pf.ReducedModel(shape, LAW, parts=1), pf.ReducedModel(shape, LAW)],
+        kernel = front.CoupledPatches([pf.ReducedModel(shape, LAW), pf.ReducedModel(shape, LAW)],
                                       follows=follows, **given_)  # fmt: skip
         results, start = kernel.results(), np.zeros((3, *kernel.state_shape))
         kernel.step(array(wp.float64, start), given(wp.float64, host._replace(moments=moments)), 1e-3, results)
         kernel.check()
-        same = CoupledPatches([pf.ReducedModel(larger, LAW, parts=1), pf.ReducedModel(larger, LAW)])
+        same = CoupledPatches([pf.ReducedModel(larger, LAW), pf.ReducedModel(larger, LAW)])
         held = moments * [[follows is None], [True]]
         expected = same.step(start, host._replace(moments=held), 1e-3)
         assert results.wrench.numpy() == pytest.approx(expected.wrench, rel=1e-6)
@@ -197,8 +199,8 @@ def test_moments():
 
 def test_faint():
     """Squares of squares of faint states leave single precision: their steps are those of double precision."""
-    patches = CoupledPatches([pf.ReducedModel(SHAPES[0], LAW, parts=1)])
-    state = np.outer(10.0 ** -np.arange(7.0, 40.0), [1.0, 1e-6, 1e-9])
+    patches = CoupledPatches([pf.ReducedModel(SHAPES[0], LAW)])
+    state = np.outer(10.0 ** -np.arange(7.0, 40.0), np.geomspace(1.0, 1e-9, *patches.state_shape))
     twist, load, wrench, response = (np.repeat(each[:1], len(state), axis=0) for each in problem()[1][:4])
     host = HostStep(1e-3 * twist[:, :1], load[:, :1], wrench[:, :1], 300.0 * response[:, :3, :3])
     runs = [(state, host, np.full(len(state), 1e-3), None)]

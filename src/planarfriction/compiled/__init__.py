@@ -1,14 +1,14 @@
 """Machine forms of friction models: the numbers and addresses that compiled code reads, made once for each model.
 
 `model.compiled` is one cached object. Its `step_one` and `step_batch` are the fast doors of a step from Python;
-`packed` is read by the solver, `packed_parts` by `coupling`, `at_loads` by roll-outs. Addresses hold in one process:
+`packed` is read by the solver, `with_all_states` by `coupling`, `at_loads` by roll-outs. Addresses hold in one process:
 copies of a model make their own machine form.
 """
 
 from planarfriction.compiled.base import CompiledModel, StepJacobians
-from planarfriction.compiled.packed import PackedModel, PackedParts
+from planarfriction.compiled.packed import PackedModel
 
-__all__ = ["CompiledModel", "PackedModel", "PackedParts", "StepJacobians"]
+__all__ = ["CompiledModel", "PackedModel", "StepJacobians"]
 
 
 def __dir__() -> list[str]:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.compiled.packed import PackedModel, PackedParts
+from planarfriction.compiled.packed import PackedModel
 from planarfriction.compiled.rates import rates
 from planarfriction.equality import by_parts
 from planarfriction.geometry import twist_at, wrench_at
@@ -35,12 +35,11 @@ class StepJacobians(NamedTuple):
     """
 
     state_state: np.ndarray
-    """d new state / d state: distributed `[..., 2, 2, N]` (cell by cell), reduced `[..., 3, 3]`, of P parts
-    `[..., P, 3, 3]` (part by part)."""
+    """d new state / d state: distributed `[..., 2, 2, N]` (cell by cell), of three states `[..., 3, 3]`."""
     state_twist: np.ndarray
-    """d new state / d twist: distributed `[..., 2, N, 3]`, reduced `[..., 3, 3]`, of P parts `[..., P, 3, 3]`."""
+    """d new state / d twist: distributed `[..., 2, N, 3]`, of three states `[..., 3, 3]`."""
     wrench_state: np.ndarray
-    """d wrench / d state: distributed `[..., 3, 2, N]`, reduced `[..., 3, 3]`, of P parts `[..., 3, P, 3]`."""
+    """d wrench / d state: distributed `[..., 3, 2, N]`, of three states `[..., 3, 3]`."""
     wrench_twist: np.ndarray
     """d wrench / d twist, `[..., 3, 3]`; an implicit simulator adds this, times `dt`, to its mass matrix."""
     wrench_load: np.ndarray
@@ -48,7 +47,7 @@ class StepJacobians(NamedTuple):
 
 
 def _seen(twist: np.ndarray, moved: np.ndarray | None) -> np.ndarray:
-    """Return the twists that parts see which have moved, in C order."""
+    """Return the twists that patches see which have moved, in C order."""
     return twist if moved is None else np.ascontiguousarray(twist_at(twist, moved))
 
 
@@ -66,9 +65,9 @@ class CompiledModel:
     """
 
     def __init__(
-        self, functions: StepFunctions, state_shape: tuple[int, ...], square_shape: tuple[int, ...], parts: int = 1
+        self, functions: StepFunctions, state_shape: tuple[int, ...], square_shape: tuple[int, ...]
     ) -> None:
-        self.functions, self.state_shape, self.parts = functions, state_shape, parts
+        self.functions, self.state_shape = functions, state_shape
         self._size, self._square, self._flat = math.prod(state_shape), math.prod(square_shape), len(state_shape) == 1
         """Number of states, and numbers of d new state / d state, whose shape is `square_shape`."""
         n = self._size
@@ -79,16 +78,16 @@ class CompiledModel:
             (slice(*span), shape) for span, shape in zip(itertools.pairwise(ends), shapes, strict=True)
         ]
         """Places and shapes of `StepJacobians` in what `kernels.steps.jacobians` writes for a contact."""
-        self._per_contact, self._scratch = ends[-1], (7 * n + self._square) // parts + 12
+        self._per_contact, self._scratch = ends[-1], 7 * n + self._square + 12
 
     # ------------------------------------------------------------------ at given loads
 
     @functools.cached_property
-    def fixed(self) -> PackedParts | None:
+    def fixed(self) -> PackedModel | None:
         """The model at any load; None if that changes its shape."""
         raise NotImplementedError
 
-    def at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, PackedParts]]:
+    def at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, PackedModel]]:
         """Yield rows of the flat batch, and the model at the load of each of them or at the one load of all of them.
 
         Rows without load may be left out; their results are zero.
@@ -97,10 +96,10 @@ class CompiledModel:
 
     def pressed(
         self, load: np.ndarray, centre: np.ndarray | None
-    ) -> Iterator[tuple[Any, PackedParts, np.ndarray | None]]:
-        """Yield what `at_each_load` does with pressures about the centres `[..., 2]` [m], and how far parts have moved.
+    ) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
+        """Yield what `at_each_load` does, with pressures about the centres `[..., 2]` [m], and how far patches moved.
 
-        Those move `[rows, 2]` [m] whose pressure does not follow further; None if none does.
+        Patches move `[rows, 2]` [m] whose pressure keeps its shape; None if none does.
         """
         if centre is None:
             for rows, contact in self.at_each_load(load):
@@ -108,23 +107,23 @@ class CompiledModel:
             return
         yield from self._following(load, centre.reshape(-1, 2))
 
-    def _following(self, load: np.ndarray, centre: np.ndarray) -> Iterator[tuple[Any, PackedParts, np.ndarray | None]]:
+    def _following(self, load: np.ndarray, centre: np.ndarray) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
         raise NotImplementedError
 
     def points(self) -> tuple[np.ndarray, int]:
-        """Return the cells, or else the parts, that share the load, `[n, 2]` [m], and the words of the record of cells.
+        """Return the cells that share the load, `[n, 2]` [m], and the words of their record, or one point that has all.
 
-        The last of these is the address of their weights; there are none for parts. Parts that change with the load
-        cannot follow its moments in `coupling`: no points.
+        The last word is the address of the weights of cells; a point, which has none, moves as a whole. There is no
+        point where it would change with the load: such a patch cannot follow moments in `coupling`.
         """
         raise NotImplementedError
 
-    def step_table(self, contact: PackedParts) -> np.ndarray:
-        """Return the words of `kernels.steps.Parts` for steps; they hold as long as `contact` lives."""
-        return contact.table(self.functions.step, self._square // self.parts)
+    def step_table(self, contact: PackedModel) -> np.ndarray:
+        """Return the words of `kernels.steps.Stepped` for steps; they hold as long as `contact` lives."""
+        return contact.table(self.functions.step, self._square)
 
-    def _jacobian_table(self, contact: PackedParts) -> np.ndarray:
-        return contact.table(self.functions.jacobian, self._square // self.parts)
+    def _jacobian_table(self, contact: PackedModel) -> np.ndarray:
+        return contact.table(self.functions.jacobian, self._square)
 
     def _opened(self) -> np.ndarray | None:
         """Return the table of `step_one`, and keep it; None if there is no such door."""
@@ -228,7 +227,7 @@ class CompiledModel:
         z, v = state.reshape(-1, self._size), twist.reshape(-1, 3)
         rate, unit = np.zeros(z.shape), np.zeros(v.shape)
         for rows, contact, moved in self.pressed(load, centre):
-            rate[rows], pull = rates(contact.joined, z[rows], _seen(v[rows], moved))
+            rate[rows], pull = rates(contact, z[rows], _seen(v[rows], moved))
             unit[rows] = _pull(pull, moved)
         return rate.reshape(state.shape), unit.reshape(twist.shape)
 
@@ -272,7 +271,7 @@ class CompiledModel:
         return StepJacobians(*(found[:, place].reshape(*load.shape, *shape) for place, shape in self._derivatives))
 
     def _move(self, found: np.ndarray, rows: Any, moved: np.ndarray) -> None:
-        """Bring the derivatives of parts that have moved to the twist and the wrench about the origin, in place."""
+        """Bring the derivatives of patches that have moved to the twist and the wrench about the origin, in place."""
         at = np.tile(np.eye(3), (len(moved), 1, 1))
         at[:, 0, 2], at[:, 1, 2] = -moved[:, 1], moved[:, 0]
         back, (_, state_twist, wrench_state, wrench_twist, wrench_load) = at.mT, (p for p, _ in self._derivatives)
@@ -288,6 +287,6 @@ class CompiledModel:
         """Pack the model for the solver (see `FrictionModel.packed`)."""
         raise NotImplementedError
 
-    def packed_parts(self, loads: Sequence[float | None]) -> PackedParts:
+    def with_all_states(self, loads: Sequence[float | None]) -> PackedModel:
         """Pack the model at `loads` > 0 [N], with all of its states; `[None]` stands for any load if it ignores it."""
         raise NotImplementedError

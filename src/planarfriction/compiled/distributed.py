@@ -10,7 +10,7 @@ import numpy as np
 
 from planarfriction.compiled import packed
 from planarfriction.compiled.base import CompiledModel
-from planarfriction.compiled.packed import PackedModel, PackedParts
+from planarfriction.compiled.packed import PackedModel
 from planarfriction.compiled.rates import linearised
 from planarfriction.compiled.shapes_by_load import ShapesByLoad, cells_by_load
 from planarfriction.compiler.memory import places_of, rows_of, size_of
@@ -19,7 +19,7 @@ from planarfriction.kernels import disc_cells, disc_passes
 from planarfriction.kernels import distributed_step as steps
 from planarfriction.kernels.contacts import ModelFunctions
 from planarfriction.kernels.discs import KAPPA
-from planarfriction.kernels.general_cells import MATRICES
+from planarfriction.kernels.general_cells import LINEAR, MATRICES, A, C, E, F
 from planarfriction.kernels.leaning_cells import RATES_OF_LEANING, STEPS_OF_LEANING
 from planarfriction.kernels.steps import StepFunctions
 from planarfriction.patch.tilt import tilted
@@ -45,41 +45,41 @@ class CompiledDistributed(CompiledModel):
             if self.patch.asymmetric:
                 return disc_cells.RATES_OF_LEANING_DISCS, disc_cells.STEPS_OF_LEANING_DISCS
             if turned:
-                return disc_cells.RATES_OF_TURNED_DISCS, disc_passes.TURNED_STEPS
-            return disc_cells.RATES_OF_DISCS, disc_passes.STEPS
+                return disc_passes.TURNED_SOLVED, disc_passes.TURNED_STEPS
+            return disc_passes.SOLVED, disc_passes.STEPS
         if self.patch.asymmetric:
             return RATES_OF_LEANING, STEPS_OF_LEANING
         return (contacts.TURNED, steps.TURNED) if turned else (contacts.ISOTROPIC, steps.ISOTROPIC)
 
     def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         """Return the record of a contact, and how many numbers of a linearisation each cell has."""
-        rows = MATRICES * self.size**2 if self.size == 3 or self.patch.asymmetric else contacts.LINEAR_ROWS
+        rows = LINEAR * self.size**2 if self.size == 3 or self.patch.asymmetric else contacts.LINEAR_ROWS
         return contacts.CellsContact(self.law.numbers, numbers.shape[1], numbers, weights), rows
 
     # ------------------------------------------------------------------ at given loads
 
     @functools.cached_property
-    def fixed(self) -> PackedParts | None:
+    def fixed(self) -> PackedModel | None:
         """See `CompiledModel`."""
-        return None if self.patch.depends_on_load else self.packed_parts([None])
+        return None if self.patch.depends_on_load else self.with_all_states([None])
 
-    def at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, PackedParts]]:
+    def at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, PackedModel]]:
         """See `CompiledModel`; all rows at once, each with its own weights."""
-        yield slice(None), self.fixed or _alone(self._packed(self.patch.weights(load.reshape(-1))))
+        yield slice(None), self.fixed or self._packed(self.patch.weights(load.reshape(-1)))
 
     def points(self) -> tuple[np.ndarray, int]:
         """See `CompiledModel`."""
         return self.patch.positions, size_of(type(self.record(np.zeros((2, 1)), np.zeros(1))[0]))
 
-    def _following(self, load: np.ndarray, centre: np.ndarray) -> Iterator[tuple[Any, PackedParts, np.ndarray | None]]:
+    def _following(self, load: np.ndarray, centre: np.ndarray) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
         weights = tilted(self.patch.positions, self.patch.weights(load.reshape(-1)), centre)
-        yield slice(None), _alone(self._packed(weights)), None
+        yield slice(None), self._packed(weights), None
 
     def linearisation(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
         """Return linearisations `[..., L, N]` as `kernels.cells.LinearCells`, or those of `kernels.general_cells`."""
         ((_, contact),) = self.at_each_load(load)
         cells = state.shape[-1]
-        lin = linearised(contact.joined, state.reshape(load.size, self.size * cells), twist.reshape(-1, 3))
+        lin = linearised(contact, state.reshape(load.size, self.size * cells), twist.reshape(-1, 3))
         return lin.reshape(*load.shape, lin.shape[-1] // cells, cells)
 
     def slopes(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> Any:
@@ -87,14 +87,17 @@ class CompiledDistributed(CompiledModel):
 
         Four arrays `[..., d, d, N]` of d bristles a cell; the velocity is that which a cell sees.
         """
-        law, identity, lin = self.law.numbers, np.eye(2)[:, :, None], self.linearisation(state, twist, load)
-        d = self.size
-        if lin.shape[-2] == MATRICES * d * d:
-            four = lin[..., : 4 * d * d, :].reshape(*load.shape, 4, d, d, -1)
-            return np.moveaxis(four, -4, 0)
-        k, k_z, k_v = lin[..., :1, None, :], lin[..., None, 1:3, :], lin[..., None, 3:5, :]
-        by_state = -k * identity - state[..., :, None, :] * k_z
-        by_velocity = identity - state[..., :, None, :] * k_v
+        law, d, lin = self.law.numbers, self.size, self.linearisation(state, twist, load)
+        identity = np.eye(d)[:, :, None]
+        if lin.shape[-2] == contacts.LINEAR_ROWS:
+            k, k_z, k_v = lin[..., :1, None, :], lin[..., None, 1:3, :], lin[..., None, 3:5, :]
+            by_state = -k * identity - state[..., :, None, :] * k_z
+            by_velocity = identity - state[..., :, None, :] * k_v
+        else:
+            matrices = np.moveaxis(lin.reshape(*load.shape, -1, d, d, lin.shape[-1]), -4, 0)
+            by_state, by_velocity = matrices[A], matrices[F]
+            if len(matrices) == MATRICES:
+                return by_state, by_velocity, matrices[C], matrices[E]
         pull_state, pull_velocity = law.sigma_0 * identity + law.sigma_1 * by_state, law.sigma_2 * identity
         return by_state, by_velocity, -pull_state, -(pull_velocity + law.sigma_1 * by_velocity)
 
@@ -118,9 +121,9 @@ class CompiledDistributed(CompiledModel):
         weights = self.patch.weights()
         return self._packed(weights[None, weights > 0.0], weights > 0.0)
 
-    def packed_parts(self, loads: Sequence[float | None]) -> PackedParts:
+    def with_all_states(self, loads: Sequence[float | None]) -> PackedModel:
         """See `CompiledModel`."""
-        return _alone(self._packed(np.array([self.patch.weights(load) for load in loads])))
+        return self._packed(np.array([self.patch.weights(load) for load in loads]))
 
     def at_loads(self, loads: np.ndarray, slopes: bool) -> ShapesByLoad:
         """Pack the cells at different loads > 0 `[L]` [N], with the `slopes` of their weights by the load or zeros.
@@ -145,7 +148,7 @@ class CompiledDistributed(CompiledModel):
             self.size * count,
             rows * count,
             np.full(self.size * count, self.law.largest_deflection),
-            float(np.hypot(np.hypot(*(positions - positions.mean(axis=0)).T), KAPPA * self.patch.radii[chosen]).mean()),
+            float(np.hypot(np.hypot(*(positions - positions.mean(axis=0)).T), KAPPA * self.patch.lever_radii[chosen]).mean()),
             (weights, numbers),
             chosen,
         )
@@ -167,7 +170,3 @@ class CompiledDistributed(CompiledModel):
     def lever(self) -> np.ndarray:
         """P `[3, d, N]`: the velocity of a cell (`u_i`) is `P' V`, the wrench of a force on it `P f`."""
         return np.ascontiguousarray(self.patch.levers().T)
-
-
-def _alone(part: PackedModel) -> PackedParts:
-    return PackedParts([part], np.ones((len(part.records), 1)))

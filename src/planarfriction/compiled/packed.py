@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction.compiler.calls import address_of
-from planarfriction.compiler.memory import places_of, row_of, rows_of
+from planarfriction.compiler.memory import place_of, row_of
 from planarfriction.equality import by_parts
-from planarfriction.kernels.contacts import calls_of
-from planarfriction.kernels.parts import FUNCTIONS, PartsContact
-from planarfriction.kernels.steps import WORDS, Parts
+from planarfriction.kernels.steps import WORDS, Stepped
 
 MAX_PACK_BYTES = 64e6
 """Bytes of shapes that a model packs at a time, if that is more than one shape."""
@@ -53,41 +49,8 @@ class PackedModel(NamedTuple):
     noise, and a patch that just holds could give way, or the other way round.
     """
 
-
-class PackedParts:
-    """A model at R loads, in P parts that share the twist and the load."""
-
-    def __init__(self, parts: Sequence[PackedModel], shares: np.ndarray) -> None:
-        self.parts = tuple(parts)
-        self.shares = np.ascontiguousarray(shares)
-        """Share of the load that each part carries, `[R, P]`."""
-        self.addresses = np.stack([places_of(part.records) for part in parts], axis=1)
-        """Addresses of the records of the parts, `[R, P]`; they live as long as this object."""
-
     def table(self, function: Any, square: int) -> np.ndarray:
-        """Return the words of `kernels.steps.Parts`; `square` are the numbers of d new/dz of a part."""
-        (loads, count), states = self.addresses.shape, self.parts[0].states
+        """Return the words of `kernels.steps.Stepped`, which hold as long as the records; `square` as there."""
+        loads, words = self.records.shape
         address = address_of(function, WORDS)
-        return row_of(Parts(address, count, states, square, loads, self.addresses, self.shares))
-
-    @functools.cached_property
-    def joined(self) -> PackedModel:
-        """The parts as one contact, as the solver reads it."""
-        one, count = self.parts[0], len(self.parts)
-        if count == 1:
-            return one
-        calls = calls_of(one.functions, change=True)
-        record = PartsContact(count, one.states, one.workspace, calls, self.addresses, self.shares)
-        places = {"records": places_of(self.addresses), "shares": places_of(self.shares)}
-        return one._replace(
-            functions=FUNCTIONS,
-            records=rows_of(record, len(self.shares), **places),
-            states=count * one.states,
-            workspace=count * one.workspace,
-            state_scale=np.tile(one.state_scale, count),
-            keepalive=(calls, self.addresses, self.shares, *self._arrays()),
-        )
-
-    def _arrays(self) -> Iterator[np.ndarray]:
-        for part in self.parts:
-            yield from (part.records, *part.keepalive)
+        return row_of(Stepped(address, self.states, square, loads, place_of(self.records), words))

@@ -1,4 +1,4 @@
-"""Checked inputs of roll-outs, contact by contact and part by part, as compiled loops read them; and threads."""
+"""Checked inputs of roll-outs, contact by contact, as compiled loops read them; and threads."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class RolloutInputs(NamedTuple):
 
     model: Packed
     rows: np.ndarray
-    """Numbers of law and shape of each part, `[P, B or 1, N]`."""
+    """Numbers of law and shape, `[B or 1, N]`."""
     state: np.ndarray
-    """States before the first step `[P, B, S]`, S numbers of each part."""
+    """States before the first step, flat, `[B, S]`."""
     twist: np.ndarray
     """Twists `[B or 1, T, 3]`."""
     normal_force: np.ndarray
@@ -37,16 +37,15 @@ class RolloutInputs(NamedTuple):
     batch: tuple[int, ...]
 
     def shaped(self, values: np.ndarray, *inner: int) -> np.ndarray:
-        """Return values of parts `[P, B, *inner, S]` as `[*batch, *inner, *state_shape]`."""
-        each = values[0] if len(values) == 1 else np.moveaxis(values, 0, -2)
-        return each.reshape(*self.batch, *inner, *self.model.inner)
+        """Return flat states `[B, *inner, S]` as `[*batch, *inner, *state_shape]`."""
+        return values.reshape(*self.batch, *inner, *self.model.inner)
 
     def of_all(self, values: np.ndarray) -> np.ndarray:
         """Return values of each contact `[B, ...]` as `[*batch, ...]`."""
         return values.reshape(*self.batch, *values.shape[1:])
 
     def compiled(self, slopes: bool = False) -> Inputs:
-        """Return all parts as compiled loops take them, with the `slopes` of their shapes by the load."""
+        """Return the inputs as compiled loops take them, with the `slopes` of the weights of cells by the load."""
         shapes, which = self.model.shapes, np.zeros((1, len(self.dt)), dtype=int)
         if not isinstance(shapes, ShapesByLoad):
             loads, which = np.unique(self.normal_force, return_inverse=True)
@@ -56,7 +55,7 @@ class RolloutInputs(NamedTuple):
             shapes = shapes(loads if len(loads) else np.array([LIGHTEST]), slopes)
         return Inputs(
             self.rows, shapes.data, self.twist, self.normal_force, self.dt, which,
-            shapes.shares, shapes.surface, shapes.shapes, shapes.by_load,
+            shapes.surface, shapes.shapes, shapes.by_load,
         )  # fmt: skip
 
 
@@ -92,7 +91,7 @@ def checked(
     for name, value in {"normal_force": load, "dt": dt}.items():
         if value.min(initial=0.0) < 0.0:
             raise InvalidValueError(name, "be >= 0", float(value.min()))
-    axes = state.shape[: -len(inner)], twist.shape[:-2], load.shape[:-1], packed.rows.shape[1:-1], *more
+    axes = state.shape[: -len(inner)], twist.shape[:-2], load.shape[:-1], packed.rows.shape[:-1], *more
     try:
         batch = np.broadcast_shapes(*axes)
     except ValueError:
@@ -100,20 +99,13 @@ def checked(
     count = int(np.prod(batch))
     return RolloutInputs(
         packed,
-        np.array([rows_of("parameters", rows, rows.shape[-1:], batch) for rows in packed.rows]),
-        by_part(np.broadcast_to(state, (*batch, *inner)).reshape(count, *inner), packed),
+        rows_of("parameters", packed.rows, packed.rows.shape[-1:], batch),
+        np.ascontiguousarray(np.broadcast_to(state, (*batch, *inner)).reshape(count, math.prod(inner))),
         packed.turned(rows_of("twist", twist, (steps, 3), batch)),
         rows_of("normal_force", load, (steps,), batch),
         np.require(dt, float, ["C", "W", "A"]),
         batch,
     )
-
-
-def by_part(values: np.ndarray, packed: Packed) -> np.ndarray:
-    """Return states of contacts `[B, ..., *inner]` as those of each part, `[P, B, ..., S]`."""
-    parts, lead = len(packed.rows), values.shape[: values.ndim - len(packed.inner)]
-    flat = values.reshape(*lead, parts, math.prod(packed.inner) // parts)
-    return np.ascontiguousarray(np.moveaxis(flat, -2, 0))
 
 
 def rows_of(name: str, value: Any, inner: tuple[int, ...], batch: tuple[int, ...]) -> np.ndarray:

@@ -2,33 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.compiled.shapes_by_load import ShapesByLoad, cells_by_load, places_of
+from planarfriction.compiled.shapes_by_load import ShapesByLoad, cells_by_load
 from planarfriction.compiler import threads
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
-from planarfriction.kernels import (
-    cells_rollout,
-    cells_sensitivities,
-    disc_passes,
-    published_rollout,
-    published_step,
-    reduced_loads,
-    reduced_rollout,
-    reduced_step,
-)
+from planarfriction.kernels import cells_rollout, cells_sensitivities, disc_passes, published_step
 from planarfriction.kernels.cell_blocks import divided
 from planarfriction.kernels.law import LAW
+from planarfriction.kernels.published_rollouts import gradient, rollout
 from planarfriction.kernels.rollouts import Inputs
 from planarfriction.laws.base import is_rate_law
-from planarfriction.models import DistributedModel, MomentModel, ReducedModelPublished
-from planarfriction.models.reduced_map import MapSizes, ReducedShape, maps_of
+from planarfriction.models import DistributedModel, ReducedModelPublished
 from planarfriction.models.reduced_published import PublishedShape, axes_of
 
 PARAMETERS = (
@@ -69,21 +60,15 @@ class Family(NamedTuple):
     """Compiled loops (see `kernels.rollouts`), which add to what comes in but for the state."""
 
 
-def _family_of(names: tuple[str, ...], numbers: tuple[str, ...], many: Any, one: Any) -> Family:
-    columns = np.array([numbers.index(name) for name in names])
-    return Family(names, columns, many.rollout, many.gradient, one.sensitivities, one.tangent)
-
-
-PUBLISHED = _family_of(PARAMETERS, published_step.NAMES, published_rollout, published_step)
+PUBLISHED = Family(
+    PARAMETERS,
+    np.array([published_step.NAMES.index(name) for name in PARAMETERS]),
+    rollout,
+    gradient,
+    published_step.sensitivities,
+    published_step.tangent,
+)
 """`ReducedModelPublished`."""
-
-_OF_LAW = tuple(name for name in PARAMETERS[:8] if name != "gamma")
-
-REDUCED = _family_of(_OF_LAW, reduced_step.NAMES, reduced_rollout, reduced_loads)
-"""`ReducedModel` in parts; gamma and the shape are built into its stored map."""
-
-REDUCED_BY_LOAD = _family_of(_OF_LAW, reduced_step.NAMES, reduced_loads, reduced_loads)
-"""The same where the shape follows the load."""
 
 
 def _cells(entries: cells_rollout.CellRollouts, forwards: Callable[..., None], size: int = 2) -> Family:
@@ -92,19 +77,19 @@ def _cells(entries: cells_rollout.CellRollouts, forwards: Callable[..., None], s
     ) -> None:
         """Step the contacts; the blocks of a single one on several threads."""
         wanted = np.array([cells_sensitivities.PARAMETERS.index(LawNumbers._fields[i]) for i in columns], dtype=int)
-        blocks, lanes = divided.py_func(inputs.shapes.shape[2])
+        blocks, lanes = divided.py_func(inputs.shapes.shape[1])
         if blocks == 1 or len(wrenches) > 1:
             forwards(inputs, span, z, wanted, wrenches, slopes)
             return
-        state, data = z.reshape(1, 1, size, -1), inputs.data.reshape(blocks, -1)
+        state, data = z.reshape(1, size, -1), inputs.data.reshape(blocks, -1)
 
         def one(k: int) -> tuple[np.ndarray, np.ndarray]:
             cells = slice(k * lanes, (k + 1) * lanes)
-            own, found = state[..., cells].reshape(1, 1, -1), (np.zeros_like(wrenches), np.zeros_like(slopes))
+            own, found = state[..., cells].reshape(1, -1), (np.zeros_like(wrenches), np.zeros_like(slopes))
             shapes, by_load = (np.ascontiguousarray(each[..., cells]) for each in (inputs.shapes, inputs.by_load))
             part = inputs._replace(data=data[k], shapes=shapes, by_load=by_load)
             forwards(part, span, own, wanted, *found)
-            state[..., cells] = own.reshape(1, 1, size, -1)
+            state[..., cells] = own.reshape(1, size, -1)
             return found
 
         for found, change in threads.each(one, range(blocks)):
@@ -129,26 +114,17 @@ DISCS, TURNED_DISCS = (
 
 
 class Packed(NamedTuple):
-    """A model of P parts as compiled loops see it; most models have one."""
+    """A model as compiled loops see it."""
 
     family: Family
     rows: np.ndarray
-    """Numbers of law and shape of each part `[P, ..., N]`, batch axes as those of the parameters."""
+    """Numbers of law and shape `[..., N]`, batch axes as those of the parameters."""
     shapes: ShapesByLoad | Callable[[np.ndarray, bool], ShapesByLoad]
-    """Shapes of the parts; a function of loads where they follow the load (see `CompiledThreeStates.at_loads`)."""
+    """Limit surface or cells; a function of loads where cells follow the load (see `CompiledDistributed.at_loads`)."""
     axes: np.ndarray | None = None
     """Symmetric `[3, 3]`, or None: twists go in through it, wrenches come out."""
-    cells: int = 0
-    """Number of cells, each with a bristle; 0 for a model of three states a part."""
-    size: int = 2
-    """Components of the bristle of a cell."""
-
-    @property
-    def inner(self) -> tuple[int, ...]:
-        """Shape of the state of one contact."""
-        if self.cells:
-            return self.size, self.cells
-        return (3,) if len(self.rows) == 1 else (len(self.rows), 3)
+    inner: tuple[int, ...] = (3,)
+    """Shape of the state of one contact."""
 
     def turned(self, vectors: np.ndarray) -> np.ndarray:
         """Turn twists into the axes of the compiled loops, or wrenches out of them, `[..., 3]`."""
@@ -158,9 +134,7 @@ class Packed(NamedTuple):
 def parameter_names(model: Any) -> tuple[str, ...]:
     """Return the names of the P parameters of a model, in the order of the parameter vector.
 
-    Those of `ReducedModelPublished` are `PARAMETERS`, those of `DistributedModel` the parameters of the law. Those of
-    `ReducedModel` in parts are those without gamma, because its stored map depends on gamma, as it does on
-    the shape of the patch.
+    Those of `ReducedModelPublished` are `PARAMETERS`, those of `DistributedModel` the parameters of the law.
 
     Raises InvalidValueError for a model that has no roll-outs.
     """
@@ -173,7 +147,7 @@ def parameters_of(model: Any) -> np.ndarray:
     Raises InvalidValueError for a model that has no roll-outs.
     """
     packed = pack(model)
-    return packed.rows[0, packed.family.columns]
+    return packed.rows[packed.family.columns]
 
 
 def pack(model: Any, parameters: Any = None) -> Packed:
@@ -186,21 +160,17 @@ def pack(model: Any, parameters: Any = None) -> Packed:
     if parameters is None:
         return packed
     values = _checked(parameters, packed.family.names)
-    parts, count = packed.rows.shape
-    own = packed.rows.reshape(parts, *(1,) * (values.ndim - 1), count)
-    rows = np.broadcast_to(own, (parts, *values.shape[:-1], count)).copy()
+    rows = np.broadcast_to(packed.rows, (*values.shape[:-1], packed.rows.shape[-1])).copy()
     rows[..., packed.family.columns] = values
     return packed._replace(rows=rows)
 
 
 def _family(model: Any) -> Family:
     model = getattr(model, "reduction", model)
-    if isinstance(model, MomentModel):
-        return REDUCED
     if isinstance(model, ReducedModelPublished):
         return PUBLISHED
     if isinstance(model, DistributedModel) and not (is_rate_law(model.law) or model.patch.asymmetric):
-        families = (DISCS, TURNED_DISCS) if model.patch.radii.any() else (CELLS, TURNED_CELLS)
+        families = (DISCS, TURNED_DISCS) if model.patch.has_discs else (CELLS, TURNED_CELLS)
         return families[model.patch.anisotropic]
     given = "cells with a RateLaw or an asymmetry" if isinstance(model, DistributedModel) else type(model).__name__
     raise InvalidValueError("model", "be one that has compiled roll-outs", given)
@@ -219,11 +189,6 @@ def _refusal(model: Any) -> tuple[str, str, Any] | None:
     """Return the rule that keeps a model from compiled roll-outs, as `InvalidValueError` takes it, or None."""
     if isinstance(model, DistributedModel) or not model.depends_on_load:
         return None
-    if isinstance(model, MomentModel):
-        if model.load_error > 0.0:
-            return None
-        rule = "be > 0 for derivatives and parameters of roll-outs, which interpolate the shape over the load"
-        return "load_error", rule, model.load_error
     return (
         "model",
         "have a shape that does not follow the load, or be a ReducedModel: a fixed patch, or on_load_change='keep'",
@@ -241,72 +206,42 @@ def _packed(model: Any) -> Packed:
     if isinstance(model, DistributedModel):
         at_loads = model.compiled.at_loads
         shapes = at_loads if model.depends_on_load else at_loads(np.ones(1), False)
-        return Packed(family, np.array([law]), shapes, cells=model.state_shape[1], size=model.state_shape[0])
-    if not model.depends_on_load:
-        return pack_parts(law, model.parts_at(1.0))
-    row = [*law, *np.zeros(len(reduced_step.NAMES) - len(law))]
-    return Packed(REDUCED_BY_LOAD, np.array([row] * model.parts), model.compiled.at_loads)
+        return Packed(family, np.array(law), shapes, inner=model.state_shape)
+    return pack_shape(law, model.shape_at(1.0))
 
 
-def pack_parts(law: LawNumbers, parts: Iterable[tuple[float, ReducedShape | PublishedShape]]) -> Packed:
-    """Return a law and the parts of a patch at one load, each a share of the load with its shape."""
-    shares, shapes = zip(*parts, strict=True)
-    rows = np.array([[*law, *shape.numbers] for shape in shapes])
-    if isinstance(shapes[0], ReducedShape):
-        return _fixed(REDUCED, rows, shares, [(0, 0, 0)] * len(shapes), [shape.data for shape in shapes])
-    surface, root = shapes[0].surface.numbers, shapes[0].root
-    axes = None if (root == np.eye(2)).all() else axes_of(root)
-    return _fixed(PUBLISHED, rows, shares, [(surface.kind, 0, surface.size)], [surface.data], axes)
+def pack_shape(law: LawNumbers, shape: PublishedShape) -> Packed:
+    """Return a law and the shape of a `ReducedModelPublished`."""
+    surface = shape.surface.numbers
+    axes = None if (shape.root == np.eye(2)).all() else shape.axes
+    return _on_surface(np.array([*law, *shape.numbers]), surface.kind, surface.size, surface.data, axes)
 
 
-def _fixed(
-    family: Family,
-    rows: np.ndarray,
-    shares: Any,
-    surface: Sequence[tuple],
-    data: Sequence[np.ndarray],
-    axes: Any = None,
-) -> Packed:
-    """Return parts of fixed shapes, by the integers of their `surface` (see `ShapesByLoad`) and its numbers."""
-    begin, first = (np.zeros(1, dtype=int), data[0]) if len(data) == 1 else places_of(data)
-    places = np.array(surface)[:, None] + begin[:, None, None] * np.array([1, 1, 0])
-    parts, numbers = len(rows), rows.shape[1] - LAW
-    zeros = np.zeros((parts, 1, numbers)), np.zeros((parts, 1, numbers + 1))
-    return Packed(family, rows, ShapesByLoad(np.array(shares, dtype=float)[:, None], places, *zeros, first), axes)
-
-
-def pack_maps(
-    elasto_plastic: bool, sizes: Sequence[MapSizes], shares: np.ndarray, factors: np.ndarray, data: np.ndarray
-) -> Packed:
-    """Return a `ReducedModel` in parts, for roll-outs at given parameters, which take the place of those here.
-
-    `shares` `[P]` of the load, F `[P, 3, 3]`, and the maps one behind the other.
-    """
-    maps = maps_of(np.ascontiguousarray(data, dtype=np.float32), sizes)
-    shapes = (ReducedShape(factor, each) for factor, each in zip(factors, maps, strict=True))
-    return pack_parts(_any_law(elasto_plastic), zip(map(float, shares), shapes, strict=True))
+def _on_surface(row: np.ndarray, kind: int, size: int, data: np.ndarray, axes: np.ndarray | None) -> Packed:
+    none = np.zeros((1, 0))
+    return Packed(PUBLISHED, row, ShapesByLoad(np.array([kind, 0, size]), none, none, data), axes)
 
 
 def pack_surface(
     elasto_plastic: bool, kind: int, size: int, data: np.ndarray, root: np.ndarray | None = None
 ) -> Packed:
     """Return a `ReducedModelPublished` by its limit surface, for roll-outs at given parameters of law and shape."""
-    row = [*_any_law(elasto_plastic), *np.zeros(len(published_step.NAMES) - LAW)]
-    data, axes = np.ascontiguousarray(data, dtype=float), None if root is None else axes_of(root)
-    return _fixed(PUBLISHED, np.array([row]), [1.0], [(kind, 0, size)], [data], axes)
+    row = np.array([*_any_law(elasto_plastic), *np.zeros(len(published_step.NAMES) - LAW)])
+    axes = None if root is None else axes_of(root)
+    return _on_surface(row, kind, size, np.ascontiguousarray(data, dtype=float), axes)
 
 
 def pack_cells(elasto_plastic: bool, positions: np.ndarray, weights: np.ndarray) -> Packed:
-    """Return a `DistributedModel` by its cells and their weights `[N]`; see `pack_maps`.
+    """Return a `DistributedModel` by its cells and their weights `[N]`, for roll-outs at given parameters.
 
     `positions` are `[2, N]`, or levers `[5, N]`; of discs `[3, N]` or `[6, N]`, with `kappa a` behind them.
     """
     levers, shares = np.asarray(positions, dtype=float), np.asarray(weights, dtype=float)[None]
     family = {2: CELLS, 3: DISCS, 5: TURNED_CELLS, 6: TURNED_DISCS}[len(levers)]
+    inner = 3 if len(levers) in (3, 6) else 2, len(weights)
     if len(levers) > 3:
         levers = np.vstack([levers, np.zeros((2, levers.shape[1]))])  # no asymmetry
-    shapes, size = cells_by_load(levers, shares, None), 3 if len(positions) in (3, 6) else 2
-    return Packed(family, np.array([_any_law(elasto_plastic)]), shapes, cells=len(weights), size=size)
+    return Packed(family, np.array(_any_law(elasto_plastic)), cells_by_load(levers, shares, None), inner=inner)
 
 
 def _any_law(elasto_plastic: bool) -> LawNumbers:

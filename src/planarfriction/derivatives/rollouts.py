@@ -8,7 +8,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.derivatives.inputs import RolloutInputs, by_part, checked, rows_of, sequences, share, sum_to
+from planarfriction.derivatives.inputs import RolloutInputs, checked, rows_of, sequences, share, sum_to
 from planarfriction.derivatives.parameters import Packed, is_compiled, pack
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
@@ -102,10 +102,9 @@ def rollout(
 
     The steps are those of `model.step`. `normal_force` broadcasts with `[..., T]`: one number, one for each step, or
     one for each contact `[..., 1]`; `dt` is one number or `[T]`; leading axes broadcast. `parameters` `[..., P]` (see
-    `parameter_names`) replace those of the model; the limit surface, or the map of a `ReducedModel`, stays as it is, in
-    scaled coordinates. Models run in compiled code, batches on all processors; cells with a `RateLaw` or an asymmetry
-    step in Python, as do shapes that are rebuilt for each load (`load_error=0`, and `ReducedModelPublished` unless
-    "keep").
+    `parameter_names`) replace those of the model; the limit surface stays as it is, in scaled coordinates.
+    Models run in compiled code, batches on all processors; cells with a `RateLaw` or an asymmetry step in Python, as
+    does `ReducedModelPublished` where its shape follows the load.
 
     Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for `parameters` if the model cannot take
     them.
@@ -150,33 +149,32 @@ def rollout_vjp(
     gradient of an input that several contacts share is the sum over these contacts. `states` are those of
     `rollout_states`, if available. At zero load the gradient with respect to that load is one-sided.
 
-    If the shape depends on the load, it is differentiated too: weights of cells, second moments and shares by central
-    differences with a step of 1e-5 of the load (relative error 1e-10), maps along the chord between two of the stored
-    loads (docs/anisotropy.md, "Gradients to the load").
+    If the weights of cells depend on the load, they are differentiated too, by central differences with a step of 1e-5
+    of the load (relative error 1e-10).
 
     Raises `InvalidValueError` as `rollout` does, and for a model that has no compiled roll-out.
     """
     inputs = checked(model, state, twist, normal_force, dt, parameters)
-    (parts, count, _), steps, packed = inputs.state.shape, len(inputs.dt), inputs.model
+    (count, size), steps, packed = inputs.state.shape, len(inputs.dt), inputs.model
     inner, family, turned = packed.inner, packed.family, packed.turned
     cotangents = turned(rows_of("wrenches_bar", wrenches_bar, (steps, 3), inputs.batch))
     if states is None:
         on_the_way = _roll(inputs, steps)[2]
     else:
-        on_the_way = by_part(rows_of("states", states, (steps, *inner), inputs.batch), packed)
+        on_the_way = rows_of("states", states, (steps, *inner), inputs.batch).reshape(-1, steps, size)
     z_bar = np.zeros_like(inputs.state)
     if state_bar is not None:
-        z_bar[:] = by_part(rows_of("state_bar", state_bar, inner, inputs.batch), packed)
-    rows_bar = np.zeros((parts, count, inputs.rows.shape[-1]))
+        z_bar[:] = rows_of("state_bar", state_bar, inner, inputs.batch).reshape(-1, size)
+    rows_bar = np.zeros((count, inputs.rows.shape[-1]))
     bars, compiled = Bars(z_bar, np.zeros((count, steps, 3)), np.zeros((count, steps)), rows_bar), inputs.compiled(True)
     share(compiled, count, lambda *span: family.gradient(compiled, on_the_way, cotangents, span, bars))
-    given = parameters if parameters is not None else packed.rows[0][..., family.columns]
+    given = parameters if parameters is not None else packed.rows[..., family.columns]
     start = np.empty(inner) if state is None else state
     return RolloutVJP(
         sum_to(np.shape(start), inputs.shaped(z_bar)),
         sum_to(np.shape(twist), inputs.of_all(turned(bars.twist))),
         sum_to(np.shape(normal_force), inputs.of_all(bars.load)),
-        sum_to(np.shape(given), inputs.of_all(rows_bar.sum(axis=0)[:, family.columns])),
+        sum_to(np.shape(given), inputs.of_all(rows_bar[:, family.columns])),
     )
 
 
@@ -199,7 +197,7 @@ def rollout_jacobian(
     that are not parameters of the law.
     """
     inputs = checked(model, state, twist, normal_force, dt, parameters)
-    family, turned, count, steps = inputs.model.family, inputs.model.turned, inputs.state.shape[1], len(inputs.dt)
+    family, turned, count, steps = inputs.model.family, inputs.model.turned, len(inputs.state), len(inputs.dt)
     known = family.names
     chosen = [known.index(name) for name in (known if names is None else validation.choices("names", names, known))]
     columns = family.columns[np.array(chosen, dtype=int)]
@@ -242,9 +240,9 @@ def rollout_jvp(
     z, twists, loads, values = (rows_of(*each, inputs.batch) for each in given)
     numbers = np.zeros((len(values), inputs.rows.shape[-1]))
     numbers[:, family.columns] = values
-    end, count = inputs.state.copy(), inputs.state.shape[1]
+    end, count = inputs.state.copy(), len(inputs.state)
     moved = np.zeros_like(end)
-    moved[:] = by_part(z, packed)
+    moved[:] = z.reshape(len(z), -1)
     changed, compiled = Bars(moved, turned(twists), loads, numbers), inputs.compiled(slopes=bool(loads.any()))
     both = [np.zeros((count, *steps, 3)) for _ in range(2)]
     share(compiled, count, lambda *span: family.tangent(compiled, span, end, changed, *both))
@@ -253,12 +251,12 @@ def rollout_jvp(
 
 
 def _roll(inputs: RolloutInputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return states at the end `[P, B, S]`, wrenches `[..., T, 3]`, and with `kept = T` the states before each step.
+    """Return states at the end `[B, S]`, wrenches `[..., T, 3]`, and with `kept = T` the states before each step.
 
-    These are `[P, B, T, S]`; `kept = 0` for none.
+    These are `[B, T, S]`; `kept = 0` for none.
     """
-    end, count = inputs.state.copy(), inputs.state.shape[1]
-    states, wrenches = np.empty((len(end), count, kept, end.shape[-1])), np.zeros((count, len(inputs.dt), 3))
+    end, count = inputs.state.copy(), len(inputs.state)
+    states, wrenches = np.empty((count, kept, end.shape[-1])), np.zeros((count, len(inputs.dt), 3))
     compiled, family = inputs.compiled(), inputs.model.family
     share(compiled, count, lambda *span: family.rollout(compiled, span, end, wrenches, states))
     return end, inputs.of_all(inputs.model.turned(wrenches)), states

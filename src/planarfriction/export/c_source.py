@@ -23,13 +23,18 @@ LEAST = 1.2e-38
 """Least positive constant of single precision: thresholds below it are raised."""
 
 
+def comment(text: str) -> str:
+    """Return a text that stays within a comment, on its line."""
+    return ascii(text)[1:-1].replace("*/", "* /").replace("/*", "/ *")
+
+
 class Writer:
     """Differences between precisions: constants and the names of mathematical functions."""
 
     def __init__(self, precision: str = "double", own: bool = False) -> None:
         self.suffix = "f" if precision == "float" else ""
         self.own = own
-        """True to call the library's own `exp_of` and `sin_of`, which compilers put into vector code."""
+        """True to call the library's own `exp_of`, `sin_of` and `sqrt_of`, which compilers put into vector code."""
 
     def constant(self, value: Any) -> str:
         """Return the text of a constant."""
@@ -55,6 +60,8 @@ class Writer:
                 for each, text in zip(operation.arguments, arguments, strict=True)
             ]
         text = operation.text.format(*arguments)
+        if self.own:
+            text = text.replace("$sqrt", "sqrt_of")
         if "@" in text:
             text = text.replace("@", "" if self.own else "$").replace("(", "_of(" if self.own else "(", 1)
         head, sign, rest = text.partition("$")
@@ -93,6 +100,21 @@ class Writer:
         yield f"{indent}}} else {{"
         yield from self.lines(_of(branch.no, wanted), names, indent + "    ")
         yield f"{indent}}}"
+
+
+SQRT = """#if defined(__AVX2__) && !defined(__NO_MATH_ERRNO__) /* the one of math.h may set errno, which no vector does */
+    const union { real x; unsigned long long bits; } same = { x };
+    const real half = 0.5 * x;
+    real y = of_bits(0x5fe6eb50c7b537a9 - (long long)(same.bits >> 1));
+    y = y * (1.5 - half * y * y);
+    y = y * (1.5 - half * y * y);
+    y = y * (1.5 - half * y * y);
+    y = y * (1.5 - half * y * y);
+    return x * y + 0.5 * y * (x - (x * y) * (x * y));
+#else
+    return sqrt(x);
+#endif""".splitlines()
+"""Lines of the body of `sqrt_of`: a guess of 1/sqrt(x) within 3.5 %, Newton's method, and the rounding of the root."""
 
 
 def of_compiled(function: Any) -> list[str]:

@@ -13,7 +13,7 @@ import numpy as np
 from planarfriction import validation, writing
 from planarfriction.compiler import compiled_math
 from planarfriction.errors import InvalidValueError
-from planarfriction.export.c_source import Writer, of_compiled, passes_of
+from planarfriction.export.c_source import SQRT, Writer, comment, of_compiled, passes_of
 from planarfriction.export.c_values import Array, Fixed, Scalar
 from planarfriction.export.loops import Loops
 from planarfriction.export.pieces import Pieces, pieces_of
@@ -81,6 +81,12 @@ PRECISIONS = {"double": LARGEST, "float": 1e9}
 LONGEST_NAME = 40
 """Characters of the name of a library: compilers of C99 tell apart names of 63, and files have such names too."""
 
+HEADERS = """
+    assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg stdatomic
+    stdbool stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar wchar wctype
+""".split()
+"""Headers of C, which a library of that name would hide."""
+
 PARAMETERS = {
     "sigma_0": ("bristle stiffness per unit normal load [1/m]", "p->sigma_0 > 0"),
     "sigma_1": ("bristle damping per unit normal load [s/m]", "p->sigma_1 >= 0"),
@@ -123,18 +129,20 @@ def export_c(
     With `casadi`, `<name>_casadi.c` holds the step and its Jacobian as functions that `casadi.external` loads.
     With `controller`, a `planarfriction.online.Hold`, `<name>_grip.h` and `.c` hold that with its observer.
 
-    Raises InvalidValueError for a name that is no C identifier, an unknown precision, and models without source and
+    Raises InvalidValueError for a name that is no name of C, an unknown precision, and models without source and
     controllers without source (see `pieces_of`, `grip_of`); FileError if the folder cannot be written.
     """
-    if not (isinstance(name, str) and name.isascii() and name.isidentifier() and len(name) <= LONGEST_NAME):
-        raise InvalidValueError("name", f"be a C identifier of at most {LONGEST_NAME} characters", name)
+    if not (isinstance(name, str) and re.fullmatch(r"[a-zA-Z]\w*", name, re.ASCII) and len(name) <= LONGEST_NAME):
+        raise InvalidValueError("name", f"be a letter, then letters, digits and _, {LONGEST_NAME} in all", name)
+    if name.lower() in HEADERS:
+        raise InvalidValueError("name", "not be that of a header of C", name)
     validation.choice("precision", precision, PRECISIONS)
     validation.instance("casadi", casadi, bool, "True or False")
     if (casadi or controller is not None) and precision != "double":
         raise InvalidValueError("precision", "be double for CasADi and controllers", precision)
     grip = {} if controller is None else {"grip": grip_of(controller, name)}
     folder, ends = validation.path("folder", folder), FILES | (CASADI if casadi else {}) | (GRIP if grip else {})
-    texts = _texts(model, pieces_of(model, fixed=False), name, precision, grip, tuple(ends))
+    texts = _texts(model, pieces_of(model, precision, fixed=False), name, precision, grip, tuple(ends))
     writing.make_folder(folder)
     files = tuple(folder / f"{name}{end}" for end in ends.values())
     with contextlib.ExitStack() as stack:  # all can be written, or none is
@@ -150,26 +158,25 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, grip: dict, ki
     import planarfriction
 
     writer, slip = Writer(precision), slip_of(model.patch, precision)
-    first = f"{pieces.spacing} * k" if pieces.spacing > 1 else "k"
-    functions = _functions(writer, pieces, first)
+    functions = _functions(writer, pieces)
     places, words = model.compiled.points()
     moves, places = not words, dict(zip(("place_x", "place_y"), places.T, strict=True))
     functions["tilt"] = tilt_of(pieces.count)
     tables = _tables(writer, pieces.tables | places, functions) | ({} if slip is None else _tables(writer, slip.tables))
     step = functions["step"].splitlines()
     vector = Writer(precision, own=precision == "double")
-    results = [f"next[{first} + {i * pieces.stride}]" for i in range(pieces.states)]
     share = "(at->low[k] + at->part * (at->high[k] - at->low[k]))" if pieces.rungs else "share[k]"
-    passes = passes_of(vector, pieces.step, pieces.count, results, "shares[k]")
-    own = {each: "\n".join(of_compiled(getattr(compiled_math, each))) for each in ("exp", "sin")}
-    own = {each: lines for each, lines in own.items() if passes and f"{each}_of(" in "".join(passes.each)}
+    passes = passes_of(vector, pieces.step, pieces.count, _places(pieces), "shares[k]")
+    bodies = {"exp": of_compiled(compiled_math.exp), "sin": of_compiled(compiled_math.sin), "sqrt": SQRT}
+    stepping = "".join([passes.shared, *passes.each]) if passes else ""
+    own = {each: "\n".join(lines) for each, lines in bodies.items() if f"{each}_of(" in stepping}
     values = (
         functions
         | grip
         | {
             "name": name,
             "version": planarfriction.__version__,
-            "model": f"{type(model).__name__} of {model.patch.name or 'a patch'}, {type(model.law).__name__}",
+            "model": comment(f"{type(model).__name__} of {model.patch.name or 'a patch'}, {type(model.law).__name__}"),
             "digest": hashlib.sha256("\n".join([functions["step"], repr(tables)]).encode()).hexdigest()[:16],
             "pieces": pieces,
             "states": pieces.count * pieces.states,
@@ -180,9 +187,7 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, grip: dict, ki
             "ranges": " && ".join(PARAMETERS[each][1] for each in pieces.parameters),
             "tables": tables,
             "columns": _columns(pieces),
-            "stride": pieces.stride,
             "pattern": _pattern(pieces),
-            "first": first,
             "suffix": writer.suffix,
             "largest": writer.constant(PRECISIONS[precision]),
             "zero": writer.constant(0.0),
@@ -207,22 +212,26 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, grip: dict, ki
 
 
 def _columns(pieces: Pieces) -> int:
-    """Return the number of derivatives of a number of a cell or part."""
+    """Return the number of derivatives of a number of a cell."""
     return pieces.states + 3 + len(pieces.parameters)
+
+
+def _places(pieces: Pieces) -> list[str]:
+    """Return the places of the new states of cell k."""
+    return [f"next[k + {i * pieces.count}]" for i in range(pieces.states)]
 
 
 def _pattern(pieces: Pieces) -> list[int]:
     """Return rows, columns, starts of columns and rows of entries of the derivative of new states by states."""
-    states, own = pieces.count * pieces.states, range(pieces.states)
-    firsts = [c % pieces.stride if pieces.stride > 1 else c - c % pieces.states for c in range(states)]
-    rows = [first + pieces.stride * i for first in firsts for i in own]
+    states = pieces.count * pieces.states
+    rows = [c % pieces.count + pieces.count * i for c in range(states) for i in range(pieces.states)]
     return [states, states, *range(0, len(rows) + 1, pieces.states), *rows]
 
 
-def _functions(writer: Writer, pieces: Pieces, first: str) -> dict[str, str]:
-    """Return the lines of the functions of cell or part k."""
+def _functions(writer: Writer, pieces: Pieces) -> dict[str, str]:
+    """Return the lines of the functions of cell k."""
     wrench = ["w[0]", "w[1]", "w[2]"]
-    results = [*(f"next[{first} + {i * pieces.stride}]" for i in range(pieces.states)), *wrench]
+    results = [*_places(pieces), *wrench]
     rows = [f"rows[{row}][{column}]" for row in range(3 + pieces.states) for column in range(_columns(pieces))]
     traces = {
         "step": (pieces.step, results),
@@ -230,7 +239,7 @@ def _functions(writer: Writer, pieces: Pieces, first: str) -> dict[str, str]:
         "slopes": (pieces.slopes(), [*results, *rows]),
     }
     texts = {name: "\n".join(writer.lines(*each)) for name, each in traces.items()}
-    unused = {name: "" if "[k]" in text or "* k" in text else "    (void)k;\n" for name, text in texts.items()}
+    unused = {name: "" if "[k" in text else "    (void)k;\n" for name, text in texts.items()}
     return {name: unused[name] + text for name, text in texts.items()}
 
 
@@ -249,7 +258,7 @@ def _tables(
 ) -> dict[str, tuple[str, list[str]]]:
     """Return type and constants of the tables that functions read."""
     return {
-        table: ("int", list(map(str, numbers))) if numbers.dtype.kind == "i" else _table(writer, numbers)
+        table: _table(writer, numbers)
         for table, numbers in tables.items()
         if functions is None
         or table in ("share", "rungs", "place_x", "place_y")

@@ -75,7 +75,7 @@ class _Function:
     def __init__(self, loops: Loops, kernel: Any, arguments: tuple[Any, ...]) -> None:
         own = kernel.py_func
         self.loops, self.kernel, self.space, self.result = loops, kernel, own.__globals__, None
-        self.name = f"{own.__module__.rpartition('.')[2]}_{own.__name__.strip('_')}"
+        self.name = f"{own.__name__.strip('_')}_of_{own.__module__.rpartition('.')[2]}"
         self.lines: list[str] = []
         self.locals: dict[str, str] = {}
         self.indent, self._parameters = "    ", []

@@ -1,34 +1,41 @@
-"""Models taken apart for source code: their numbers as tables, and the traced step of one cell or part."""
+"""Models taken apart for source code: their numbers as tables, and the traced step of one cell."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction import formulas
+from planarfriction.compiler import compiled_math as xp
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.trace import Block, Mathematics, Number, Table, Trace, traced
-from planarfriction.kernels.twins import twin
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, cells_rollout, distributed_step, moment_steps, published_step, reduced_step
+from planarfriction.kernels import cells, cells_rollout, disc_cells, discs, distributed_step, moment_steps, published_step
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.law import grip
 from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, Root
-from planarfriction.kernels.reduced_contact import ReducedContact, ReducedPatch
 from planarfriction.kernels.rules import ratio
 from planarfriction.kernels.surfaces import CELLS
+from planarfriction.kernels.trace import Block, Mathematics, Number, Table, Trace, traced
+from planarfriction.kernels.twins import twin
 from planarfriction.kernels.vectors import norm, times
 from planarfriction.laws.base import is_rate_law
-from planarfriction.models import DistributedModel, MomentModel, ReducedModel, ReducedModelPublished
-from planarfriction.models.reduced import loads_of_change
+from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
 
 ERROR = 2e-3
 """Largest share of the load that stands on other cells than it should, halfway between two rungs [-]."""
 
 MOST_RUNGS = 512
+
+PROBED = np.geomspace(1e-6, 1e6, 1001)
+"""Loads [N] at which a patch is looked at to find where its shape changes."""
+
+MOVED = 0.1
+"""Share of the load that moves between cells from one rung to the next, to begin with."""
 
 
 class Ladder(NamedTuple):
@@ -40,12 +47,24 @@ class Ladder(NamedTuple):
     """Shares of the cells [L, N]."""
 
 
+def _loads_of_change(patch: ContactPatch) -> np.ndarray:
+    """Return loads [N] from the lowest to the highest at which the shape changes, by equal changes of the shape."""
+    moved = 0.5 * np.abs(np.diff(patch.weights(PROBED), axis=0)).sum(axis=1)
+    changes = np.flatnonzero(moved > 0.0)
+    if len(changes) == 0:  # the shape stays, or changes at loads beyond all that exist
+        return PROBED[[0, -1]]
+    span = slice(changes[0], changes[-1] + 2)
+    total = np.r_[0.0, np.cumsum(moved[changes[0] : changes[-1] + 1])]
+    wanted = np.linspace(0.0, total[-1], max(2, math.ceil(total[-1] / MOVED)) + 1)
+    return np.exp(np.interp(wanted, total, np.log(PROBED[span])))
+
+
 def ladder_of(patch: ContactPatch) -> Ladder:
     """Return rungs so close that shares between them err by `ERROR` at most.
 
     Raises InvalidValueError if more than `MOST_RUNGS` are needed.
     """
-    rungs = np.union1d(loads_of_change(patch), getattr(patch.pressure, "loads", ()))
+    rungs = np.union1d(_loads_of_change(patch), getattr(patch.pressure, "loads", ()))
     while True:
         shares, between = patch.weights(rungs), 0.5 * (rungs[1:] + rungs[:-1])
         off = 0.5 * np.abs(patch.weights(between) - 0.5 * (shares[1:] + shares[:-1])).sum(axis=1)
@@ -62,15 +81,11 @@ FIXED = "gamma", "elasto_plastic", "creep_speed"
 
 
 class Pieces(NamedTuple):
-    """A model as source code needs it: `count` cells or parts that see the same twist and share the load."""
+    """A model as source code needs it: `count` cells that see the same twist and share the load."""
 
     count: int
     states: int
-    """Number of states of a cell or part."""
-    stride: int
-    """Places between the states of a cell or part."""
-    spacing: int
-    """Places between the first states of one cell or part and of the next."""
+    """Number of states of a cell; the first of all cells come first."""
     tables: dict[str, np.ndarray]
     """Constant arrays by name; `share` [count] is that in the load."""
     step: Block
@@ -85,8 +100,11 @@ class Pieces(NamedTuple):
     """Number of loads, the table `rungs`, that `share` [rungs, count] is for; 0 for a fixed shape."""
 
 
-def pieces_of(model: Any, *, fixed: bool = True) -> Pieces:
-    """Take a model apart; only one of a `fixed` shape, or also cells whose pressure follows the load.
+def pieces_of(model: Any, precision: str = "double", *, fixed: bool = True, count: int = 0) -> Pieces:
+    """Take a model apart for a `precision` of `library.PRECISIONS`.
+
+    Only one of a `fixed` shape, or also cells whose pressure follows the load. If it has fewer cells than `count`,
+    others without load follow.
 
     Raises InvalidValueError for models without straight-line source: laws of the user's own, other patches whose shape
     depends on the load, friction that differs from cell to cell in other ways than by a metric.
@@ -97,7 +115,7 @@ def pieces_of(model: Any, *, fixed: bool = True) -> Pieces:
             if whole.patch.depends_on_load and (fixed or kind is not DistributedModel):
                 rule = "have a patch whose shape does not depend on the load" + ("" if fixed else ", or cells")
                 raise InvalidValueError("model", rule, model.patch.name or "a patch that does")
-            return taken_apart(whole)
+            return taken_apart(whole, precision, count)
     names = ", ".join(kind.__name__ for kind in (*_KINDS, ReducedModel))
     given = f"{type(model).__name__}, {type(law).__name__}"
     raise InvalidValueError("model", f"be one of {names} with a law of LuGre bristles", given)
@@ -122,76 +140,116 @@ def _vector(trace: Trace, *names: str) -> tuple[Any, ...]:
     return tuple(Number(trace, name) for name in names)
 
 
+def _state(trace: Trace, states: int, count: int) -> tuple[Any, ...]:
+    return _vector(trace, *(f"z[k + {i * count}]" for i in range(states)))
+
+
 _TWIST = "v[0]", "v[1]", "v[2]"
 
 
 # ---------------------------------------------------------------------- kinds of models
 
 
-def _distributed(model: DistributedModel) -> Pieces:
+def _sliding(u: Any) -> Any:
+    """Return what `discs.sliding` does, of a point."""
+    return 1.0, 1.0, norm(u), u
+
+
+def _sliding_of_disc(u: Any) -> Any:
+    """Return what `discs.sliding` does, from the direction of u: fourth powers of speeds leave single precision."""
+    spin = math.sqrt(2.0) * u[2]
+    size = norm((u[0], u[1], spin))
+    turned = ratio(spin, size)
+    turned = turned * turned
+    c_t, c_s, m = formulas.disc_friction(xp, 1.0 - turned, turned)
+    return c_t, c_s, size * math.sqrt(1.0 - turned + m * turned), (c_t * u[0], c_t * u[1], c_s * u[2])
+
+
+def _with(function: Any, **others: Any) -> Any:
+    """Return a function that calls others in place of those of its module."""
+    own = function.py_func
+    return FunctionType(own.__code__, own.__globals__ | others, own.__name__)
+
+
+def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     if model.patch.asymmetry is not None:
         raise InvalidValueError("model", "have no asymmetry", model.patch.asymmetry)
-    numbers, n, law = model.compiled.numbers(), model.patch.cells, model.law.numbers
-    lever = twin(cells.LEVERS if model.patch.anisotropic else cells.POSITIONS)
+    numbers, law, size = model.compiled.numbers(), model.law.numbers, model.compiled.size
+    more = max(count - model.patch.cells, 0)
+    n = model.patch.cells + more
+    kind, cell, sliding = cells, distributed_step.cell, _sliding
+    if size == 3:
+        kind, sliding = disc_cells, discs.sliding if precision == "double" else _sliding_of_disc
+        cell = _with(discs.step, sliding=sliding)
+    lever = twin(kind.LEVERS if model.patch.anisotropic else kind.POSITIONS)
     names = (
         ["lever_xx", "lever_xy", "lever_yy", "lever_x", "lever_y"]
         if model.patch.anisotropic
         else ["place_x", "place_y"]
-    )
+    ) + ["gyration"] * (size == 3)
 
     def step(trace: Trace) -> Any:
         own = _vector(trace, *(f"{name}[k]" for name in names))
         u = lever.seen(own, _vector(trace, *_TWIST))
-        z, dt = _vector(trace, "z[k]", f"z[{n} + k]"), Number(trace, "dt")
-        new, traction = twin(distributed_step.cell)(_law(trace, law), z, u, dt)
+        new, traction = twin(cell)(_law(trace, law), _state(trace, size, n), u, Number(trace, "dt"))
         return new, lever.wrench(own, traction)
 
     def steady(trace: Trace) -> Any:
         own, given = _vector(trace, *(f"{name}[k]" for name in names)), _law(trace, law)
         u = lever.seen(own, _vector(trace, *_TWIST))
-        speed = twin(norm)(u)
-        z = twin(times)(twin(ratio)(1.0, speed * twin(grip)(given, speed)), u)
-        return lever.wrench(own, twin(distributed_step.cell)(given, z, u, 0.0)[1])
+        speed, pull = twin(sliding)(u)[2:]
+        z = twin(times)(twin(ratio)(1.0, speed * twin(grip)(given, speed)), pull)
+        return lever.wrench(own, twin(cell)(given, z, u, 0.0)[1])
 
     def slopes(trace: Trace) -> Any:
         own = _vector(trace, *(f"{name}[k]" for name in names))
-        written = derive(distributed_step.cell, cells_rollout.BY, ("z", "u"))
+        written = derive(cell, cells_rollout.BY, ("z", "u"))
         forth, back = twin(written.forth), twin(written.back)
-        u, none, units = lever.seen(own, _vector(trace, *_TWIST)), (0.0, 0.0), np.eye(3).tolist()
-        z, dt = _vector(trace, "z[k]", f"z[{n} + k]"), Number(trace, "dt")
-        (new, traction), tape = forth(_law(trace, law), z, u, dt)
-        bars = [back(tape, (none, lever.seen(own, unit))) for unit in units]
-        bars += [back(tape, (unit, none)) for unit in ((1.0, 0.0), (0.0, 1.0))]
+        u, none = lever.seen(own, _vector(trace, *_TWIST)), (0.0,) * size
+        (new, traction), tape = forth(_law(trace, law), _state(trace, size, n), u, Number(trace, "dt"))
+        bars = [back(tape, (none, lever.seen(own, unit))) for unit in np.eye(3).tolist()]
+        bars += [back(tape, (tuple(unit), none)) for unit in np.eye(size).tolist()]
         kept = [cells_rollout.PARAMETERS.index(name) for name in _parameters(law)]
         rows = tuple((by_z, lever.wrench(own, by_u), *(by_law[i] for i in kept)) for by_z, by_u, *by_law in bars)
         return new, lever.wrench(own, traction), rows
 
-    tables, rungs = dict(zip(names, numbers, strict=False)), 0
+    tables, rungs = dict(zip(names, np.pad(numbers, [(0, 0), (0, more)], mode="edge"), strict=False)), 0
     if model.patch.depends_on_load:
         ladder = ladder_of(model.patch)
         tables |= {"share": ladder.shares, "rungs": ladder.rungs}
         rungs = len(ladder.rungs)
     else:
-        tables["share"] = model.patch.weights()
-    return Pieces(n, 2, n, 1, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes), rungs)
+        tables["share"] = np.pad(model.patch.weights(), (0, more))
+    return Pieces(n, size, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes), rungs)
 
 
-def _of_three_states(
-    law: LawNumbers, steps: Any, tables: dict, contact: Callable[[Trace], Any], settled: Any
-) -> Pieces:
-    """Trace `moment_steps` of the record of a contact; `settled(part, held)` is its state in steady sliding."""
+def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
+    """Trace `moment_steps` of the record of the contact."""
+    found, law = model.compiled.shapes.shape_at(None), model.law.numbers
+    surface, root, shape = found.surface.numbers, found.root, PublishedPatch(*found.numbers)
+    if surface.kind == CELLS:
+        raise InvalidValueError("surface", "be an ellipsoid or a table", type(found.surface).__name__)
+    root = Root(float(root[0, 0]), float(root[0, 1]), float(root[1, 1]))
+    steps = published_step
     frame, hold, taped_step = (twin(each) for each in (steps._FRAME, steps.MODEL.hold, steps.MODEL.taped_step))
+
+    def contact(trace: Trace) -> PublishedContact:
+        data: Any = Table(trace, "surface", surface.data)
+        return PublishedContact(_law(trace, law), shape, root, surface.kind, surface.size, data)
 
     def step(trace: Trace) -> Any:
         new, out, dt = [0.0] * 3, [0.0] * 3, Number(trace, "dt")
-        z, twist = _vector(trace, "z[3 * k]", "z[3 * k + 1]", "z[3 * k + 2]"), _vector(trace, *_TWIST)
+        z, twist = _state(trace, 3, 1), _vector(trace, *_TWIST)
         twin(moment_steps.step)(frame, hold, taped_step, contact(trace), z, twist, dt, new, out)
         return tuple(new), tuple(out)
 
     def steady(trace: Trace) -> Any:
         own, part = frame.read(contact(trace))
         held = hold(part, frame.seen(own, _vector(trace, *_TWIST)))
-        wrench = frame.wrench(own, taped_step(part, held, settled(part, held), 0.0).wrench)
+        grip = part.law.sigma_0 / twin(formulas.stribeck)(Mathematics, held.v, part.law)
+        x, y, s = twin(times)(twin(ratio)(1.0, grip * held.v), held.u)
+        settled = x, y, part.shape.contact_radius * s
+        wrench = frame.wrench(own, taped_step(part, held, settled, 0.0).wrench)
         return tuple(Mathematics.where(held.v > 0.0, each, 0.0) for each in wrench)
 
     def slopes(trace: Trace) -> Any:
@@ -203,61 +261,17 @@ def _of_three_states(
             return bar
 
         new, out, dt = [0.0] * 3, [0.0] * 39, Number(trace, "dt")
-        z, twist = _vector(trace, "z[3 * k]", "z[3 * k + 1]", "z[3 * k + 2]"), _vector(trace, *_TWIST)
-        hold_slopes = twin(steps.MODEL.hold_slopes)
+        z, twist = _state(trace, 3, 1), _vector(trace, *_TWIST)
         given = contact(trace), z, twist, dt, new, out
-        twin(moment_steps.slopes)(frame, hold_slopes, taped_step, pull_back, True, *given)
+        twin(moment_steps.slopes)(frame, twin(steps.MODEL.hold_slopes), taped_step, pull_back, True, *given)
         by_law = [tuple(getattr(each, name) for name in _parameters(law)) for each in laws]
         rows = [
             (*out[at + 18 : at + 21], *out[at : at + 3], bar) for at, bar in zip(range(3, 21, 3), by_law, strict=True)
         ]
         return tuple(new), tuple(out[:3]), tuple(rows)
 
-    count = len(tables["share"])
-    return Pieces(count, 3, 1, 3, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes))
-
-
-def _published(model: ReducedModelPublished) -> Pieces:
-    (part,), law = next(iter(model.compiled.shapes.at([None]))), model.law.numbers
-    surface, root, shape = part.shape.surface.numbers, part.shape.root, PublishedPatch(*part.shape.numbers)
-    if surface.kind == CELLS:
-        raise InvalidValueError("surface", "be an ellipsoid or a table", type(part.shape.surface).__name__)
-    root = Root(float(root[0, 0]), float(root[0, 1]), float(root[1, 1]))
-
-    def contact(trace: Trace) -> PublishedContact:
-        data: Any = Table(trace, "surface", surface.data)
-        return PublishedContact(_law(trace, law), shape, root, surface.kind, surface.size, data)
-
     tables = {"share": np.ones(1)} | ({"surface": surface.data} if len(surface.data) else {})
-
-    def settled(part: Any, held: Any) -> Any:
-        grip = part.law.sigma_0 / twin(formulas.stribeck)(Mathematics, held.v, part.law)
-        x, y, s = twin(times)(twin(ratio)(1.0, grip * held.v), held.u)
-        return x, y, part.shape.contact_radius * s
-
-    return _of_three_states(law, published_step, tables, contact, settled)
+    return Pieces(1, 3, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes))
 
 
-def _moments(model: MomentModel) -> Pieces:
-    parts, law = next(iter(model.compiled.shapes.at([None]))), model.law.numbers
-    shapes, maps = [part.shape for part in parts], [part.shape.data for part in parts]
-    upper = np.array([shape.factor for shape in shapes])[:, *np.triu_indices(3)]
-
-    def contact(trace: Trace) -> ReducedContact:
-        data: Any
-        factor: list[Any]
-        if len(maps) == 1:
-            data, factor = Table(trace, "map", maps[0]), [float(each) for each in upper[0]]
-        else:
-            data = Table(trace, "map", None, Number(trace, "first[k]", "index"))
-            factor = [Number(trace, f"factor[6 * k + {i}]") for i in range(6)]
-        return ReducedContact(_law(trace, law), ReducedPatch._make([*factor, 0.0]), data, 0)
-
-    tables = {"share": np.array([part.share for part in parts]), "map": np.concatenate(maps)}
-    if len(maps) > 1:
-        first = np.cumsum([0, *(len(each) for each in maps[:-1])])
-        tables |= {"first": first, "factor": upper.ravel()}
-    return _of_three_states(law, reduced_step, tables, contact, lambda _, held: held.q)
-
-
-_KINDS = {DistributedModel: _distributed, ReducedModelPublished: _published, MomentModel: _moments}
+_KINDS = {DistributedModel: _distributed, ReducedModelPublished: _published}

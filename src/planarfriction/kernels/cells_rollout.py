@@ -1,7 +1,7 @@
 """Roll-outs of cells, their discrete adjoint and their derivatives, in vector code (see `rollouts` for the inputs).
 
-The cells of a contact lie in blocks (see `cell_blocks`). It has one part, whose `shapes` are the weights of its cells
-at each load `[1, L, M]`, M that of all their blocks; `data` holds the numbers of their levers, block after block.
+The cells of a contact lie in blocks (see `cell_blocks`). `shapes` are the weights of its cells at each load `[L, M]`, M
+that of all their blocks; `data` holds the numbers of their levers, block after block.
 """
 
 from __future__ import annotations
@@ -110,12 +110,12 @@ def _weigh(w, blocks, lanes, weights, by_load):
 @kernel
 def _roll(kind, law, inputs, b, n, w, wrench, states):
     twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-    which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shapes[0], -1
+    which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shapes, -1
     (blocks, lanes), kept = divided(weights.shape[1]), states.shape[0] > 0
     for t in range(inputs.dt.shape[0]):
         if which[t] != last:
             last = which[t]
-            _weigh(w, blocks, lanes, weights[last], inputs.by_load[0, last])
+            _weigh(w, blocks, lanes, weights[last], inputs.by_load[last])
         if kept:
             _read(w, Z, states[t], n, kind.size)
         load, twist, dt = loads[t], three(twists[t]), inputs.dt[t]
@@ -127,22 +127,22 @@ def _roll(kind, law, inputs, b, n, w, wrench, states):
 
 @kernel
 def _rollout(kind, inputs, span, z, wrench, states, scratch):
-    w, n, rows = pointer(scratch), z.shape[2] // kind.size, inputs.rows[0]
-    blocks, _ = divided(inputs.shapes.shape[2])
+    w, n, rows = pointer(scratch), z.shape[1] // kind.size, inputs.rows
+    blocks, _ = divided(inputs.shapes.shape[1])
     for b in range(span[0], span[1]):
         law = law_of(rows[row_of(rows, b)])
         _lay(w, blocks, inputs.data)
-        _write(w, Z, z[0, b], n, kind.size)
-        _roll(kind, law, inputs, b, n, w, wrench[b], states[0, b])
-        _read(w, Z, z[0, b], n, kind.size)
+        _write(w, Z, z[b], n, kind.size)
+        _roll(kind, law, inputs, b, n, w, wrench[b], states[b])
+        _read(w, Z, z[b], n, kind.size)
 
 
 def rollout(kind, inputs, span, z, wrench, states):
-    """Step the contacts `span[0]` to `span[1]`: `z` [1, B, size n] in place, wrenches added to `wrench` [B, T, 3].
+    """Step the contacts `span[0]` to `span[1]`: `z` [B, size n] in place, wrenches added to `wrench` [B, T, 3].
 
-    The state before each step goes into `states` [1, B, T, size n], unless that is empty.
+    The state before each step goes into `states` [B, T, size n], unless that is empty.
     """
-    scratch = np.empty(divided(inputs.shapes.shape[2])[0] * BLOCK)
+    scratch = np.empty(divided(inputs.shapes.shape[1])[0] * BLOCK)
     _rollout(kind, inputs, span, z, wrench, states, scratch)
 
 
@@ -153,12 +153,12 @@ def rollout(kind, inputs, span, z, wrench, states):
 def _pull(kind, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
     """Carry the cotangents of a roll-out back, and return that of the law."""
     twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-    which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shapes[0], -1
+    which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shapes, -1
     (blocks, lanes), by_law = divided(weights.shape[1]), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for t in range(inputs.dt.shape[0] - 1, -1, -1):
         if which[t] != last:
             last = which[t]
-            _weigh(w, blocks, lanes, weights[last], inputs.by_load[0, last])
+            _weigh(w, blocks, lanes, weights[last], inputs.by_load[last])
         _write(w, Z, states[t], n, kind.size)
         load, pull, held = loads[t], three(pulls[t]), (three(twists[t]), inputs.dt[t])
         for k in range(blocks):
@@ -171,22 +171,22 @@ def _pull(kind, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
 
 @kernel
 def _gradient(kind, inputs, states, wrench_bar, span, bars, scratch):
-    w, n, rows = pointer(scratch), bars.state.shape[2] // kind.size, inputs.rows[0]
-    blocks, _ = divided(inputs.shapes.shape[2])
+    w, n, rows = pointer(scratch), bars.state.shape[1] // kind.size, inputs.rows
+    blocks, _ = divided(inputs.shapes.shape[1])
     for b in range(span[0], span[1]):
-        law, before, pulls = law_of(rows[row_of(rows, b)]), states[0], wrench_bar[row_of(wrench_bar, b)]
-        before, row_bar = before[row_of(before, b)], bars.rows[0, b]
+        law, before, pulls = law_of(rows[row_of(rows, b)]), states, wrench_bar[row_of(wrench_bar, b)]
+        before, row_bar = before[row_of(before, b)], bars.rows[b]
         _lay(w, blocks, inputs.data)
-        _write(w, BAR, bars.state[0, b], n, kind.size)
+        _write(w, BAR, bars.state[b], n, kind.size)
         by_law = _pull(kind, law, inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b])
-        _read(w, BAR, bars.state[0, b], n, kind.size)
+        _read(w, BAR, bars.state[b], n, kind.size)
         for m in range(len(by_law)):
             row_bar[COLUMNS[m]] += by_law[m]
 
 
 def gradient(kind, inputs, states, wrench_bar, span, bars):
     """Add the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
-    scratch = np.empty(divided(inputs.shapes.shape[2])[0] * BLOCK)
+    scratch = np.empty(divided(inputs.shapes.shape[1])[0] * BLOCK)
     _gradient(kind, inputs, states, wrench_bar, span, bars, scratch)
 
 
@@ -216,8 +216,8 @@ def _push(kind, law, by, block, twist, turn, dt, load, push, lanes):
 
 @kernel
 def _tangent(kind, inputs, span, z, changes, wrenches, slopes, scratch):
-    w, n, rows = pointer(scratch), z.shape[2] // kind.size, inputs.rows[0]
-    weights, all_by_load = inputs.shapes[0], inputs.by_load[0]
+    w, n, rows = pointer(scratch), z.shape[1] // kind.size, inputs.rows
+    weights, all_by_load = inputs.shapes, inputs.by_load
     blocks, lanes = divided(weights.shape[1])
     for b in range(span[0], span[1]):
         twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
@@ -226,8 +226,8 @@ def _tangent(kind, inputs, span, z, changes, wrenches, slopes, scratch):
         which, last = which[row_of(which, b)], -1
         by = (*d_law[:7], d_law.breakaway_ratio)
         _lay(w, blocks, inputs.data)
-        _write(w, Z, z[0, b], n, kind.size)
-        _write(w, BAR, changes.state[0, b], n, kind.size)
+        _write(w, Z, z[b], n, kind.size)
+        _write(w, BAR, changes.state[b], n, kind.size)
         for t in range(inputs.dt.shape[0]):
             if which[t] != last:
                 last = which[t]
@@ -240,8 +240,8 @@ def _tangent(kind, inputs, span, z, changes, wrenches, slopes, scratch):
             if load == 0.0:
                 _forget(w, blocks, Z, kind.size)
                 _forget(w, blocks, BAR, kind.size)
-        _read(w, Z, z[0, b], n, kind.size)
-        _read(w, BAR, changes.state[0, b], n, kind.size)
+        _read(w, Z, z[b], n, kind.size)
+        _read(w, BAR, changes.state[b], n, kind.size)
 
 
 def tangent(kind, inputs, span, z, changes, wrenches, slopes):
@@ -249,7 +249,7 @@ def tangent(kind, inputs, span, z, changes, wrenches, slopes):
 
     `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state in place.
     """
-    scratch = np.empty(divided(inputs.shapes.shape[2])[0] * BLOCK)
+    scratch = np.empty(divided(inputs.shapes.shape[1])[0] * BLOCK)
     _tangent(kind, inputs, span, z, changes, wrenches, slopes, scratch)
 
 

@@ -90,7 +90,7 @@ def _follow(kind, pushed, law, block, inputs, b, k, lanes, wanted, wrench, slope
         if which[t] != last:
             last = which[t]
             for i in range(lanes):
-                block[WEIGHT + i] = inputs.shapes[0, last, k * lanes + i]
+                block[WEIGHT + i] = inputs.shapes[last, k * lanes + i]
         load = loads[t]
         if load == 0.0:
             _forget(block)
@@ -105,23 +105,23 @@ def _follow(kind, pushed, law, block, inputs, b, k, lanes, wanted, wrench, slope
 
 @kernel
 def _sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes, scratch):
-    w, n, rows = pointer(scratch), z.shape[2] // kind.size, inputs.rows[0]
-    blocks, lanes = divided(inputs.shapes.shape[2])
+    w, n, rows = pointer(scratch), z.shape[1] // kind.size, inputs.rows
+    blocks, lanes = divided(inputs.shapes.shape[1])
     for b in range(span[0], span[1]):
         _lay(w, blocks, inputs.data, _SIZE)
-        _write(w, Z, z[0, b], n, kind.size, _SIZE)
+        _write(w, Z, z[b], n, kind.size, _SIZE)
         law = law_of(rows[row_of(rows, b)])
         for k in range(blocks):
             _follow(kind, pushed, law, at(w, k * _SIZE), inputs, b, k, lanes, wanted, wrenches[b], slopes[b])
-        _read(w, Z, z[0, b], n, kind.size, _SIZE)
+        _read(w, Z, z[b], n, kind.size, _SIZE)
 
 
 def sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes):
     """Run roll-outs with their derivatives by the numbers `wanted` of `PARAMETERS`.
 
-    They are added to `wrenches` [B, T, 3] and `slopes` [B, T, 3, len(wanted)]; `z` [1, B, size n] in place.
+    They are added to `wrenches` [B, T, 3] and `slopes` [B, T, 3, len(wanted)]; `z` [B, size n] in place.
     """
-    scratch = np.empty(divided(inputs.shapes.shape[2])[0] * _SIZE)
+    scratch = np.empty(divided(inputs.shapes.shape[1])[0] * _SIZE)
     _sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes, scratch)
 
 

@@ -67,28 +67,25 @@ def _bring_back(step, dx, dy):
 
 @kernel
 def step_all(own, p, functions):
-    """Step all pieces at the twists of a problem: write the new state and wrenches per unit load.
+    """Step all patches at the twists of a problem: write the new state and wrenches per unit load.
 
     `functions` are those of `Patches`: its `steps`, or its `slopes`, which write the slopes of the wrenches as well.
     """
-    for i in range(3 * own.count):
-        p.unit[i] = 0.0
-    for i in range(9 * own.count):
-        p.unit_slopes[i] = 0.0
-    for c in range(own.pieces):
-        k, first, record, share = own.owners[c], own.firsts[c], p.acting[c], p.acting_shares[c]
-        if record == 0:
-            continue
-        seen, dx, dy = p.seen, p.moved[2 * k], p.moved[2 * k + 1]
-        spin = p.twist[3 * k + 2]
-        seen[0], seen[1], seen[2] = p.twist[3 * k] - spin * dy, p.twist[3 * k + 1] + spin * dx, spin
-        call(functions[c], (record, at(p.state, first), seen, p.dt[0], at(p.new, first), p.step))
-        if dx != 0.0 or dy != 0.0:
-            _bring_back(p.step, dx, dy)
+    for k in range(own.count):
+        seen, dx, dy, spin = p.seen, p.moved[2 * k], p.moved[2 * k + 1], p.twist[3 * k + 2]
+        if p.acting[k] == 0:
+            for i in range(12):
+                p.step[i] = 0.0
+        else:
+            first = own.firsts[k]
+            seen[0], seen[1], seen[2] = p.twist[3 * k] - spin * dy, p.twist[3 * k + 1] + spin * dx, spin
+            call(functions[k], (p.acting[k], at(p.state, first), seen, p.dt[0], at(p.new, first), p.step))
+            if dx != 0.0 or dy != 0.0:
+                _bring_back(p.step, dx, dy)
         for i in range(3):
-            p.unit[3 * k + i] += share * p.step[i]
+            p.unit[3 * k + i] = p.step[i]
         for i in range(9):
-            p.unit_slopes[9 * k + i] += share * p.step[3 + i]
+            p.unit_slopes[9 * k + i] = p.step[3 + i]
 
 
 @kernel
@@ -351,10 +348,9 @@ def solve(patches, problem):
 @kernel
 def _forget_unloaded(own, p):
     """Clear the states of patches without load: they keep no memory."""
-    for c in range(own.pieces):
-        last = own.firsts[c + 1] if c + 1 < own.pieces else own.states
-        if p.load[own.owners[c]] == 0.0:
-            for i in range(own.firsts[c], last):
+    for k in range(own.count):
+        if p.load[k] == 0.0:
+            for i in range(own.firsts[k], own.firsts[k + 1]):
                 p.new[i] = 0.0
 
 

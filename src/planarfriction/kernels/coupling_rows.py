@@ -40,9 +40,7 @@ class Problem(NamedTuple):
     state: Doubles
     """State at the start of the step."""
     records: Integers
-    """Addresses of the pieces' records, [pieces]; 0 of one that carries nothing at its load."""
-    shares: Doubles
-    """Shares of the pieces in the loads of their patches, [pieces]."""
+    """Addresses of the patches' records, [k]; 0 of one that carries nothing at its load."""
     wrench: Doubles
     """W, [3k]; comes in as a first guess."""
     twist: Doubles
@@ -88,17 +86,15 @@ class Problem(NamedTuple):
     matrix: Doubles
     """Matrix of the Newton step, [3k, 3k]."""
     step: Doubles
-    """Result of a piece's step (see `steps.StepFunctions`)."""
+    """Result of a patch's step (see `steps.StepFunctions`)."""
     seen: Doubles
-    """Twist that a piece sees, [3]."""
+    """Twist that a patch sees, [3]."""
     turned: Doubles
     """Scratch of `leave_out_rising`, [2, 9]."""
     acting: Integers
-    """Addresses of the records that act in this step, [pieces]."""
-    acting_shares: Doubles
-    """Shares of the pieces that act in this step, [pieces]."""
+    """Addresses of the records that act in this step, [k]."""
     moved: Doubles
-    """Displacements of patches whose pressure cannot follow any further otherwise, [2k]."""
+    """Displacements of patches that follow as a whole, [2k]."""
     weights: Doubles
     """Weights of the points of all patches that can follow."""
     copies: Integers
@@ -112,14 +108,14 @@ INVALID = -1.0
 """Stands in place of a number of iterations."""
 
 
-def layout(patches: int, pieces: int, states: int, points: int, copies: int) -> Layout:
+def layout(patches: int, states: int, points: int, copies: int) -> Layout:
     """Return the layout of rows for k patches, of so many `points` to share loads, and words of records to copy."""
     k, n = patches, 3 * patches
     shapes = dict.fromkeys(Problem._fields, n)
     shapes |= dict.fromkeys(("dt", "tolerance", "most", "again", "iterations", "residual", "converged"), 1)
-    shapes |= dict.fromkeys(("free_load", "load", "load_0", "best_load", "kept_load", "follows"), k)
+    shapes |= dict.fromkeys(("free_load", "load", "load_0", "best_load", "kept_load"), k)
+    shapes |= dict.fromkeys(("follows", "records", "acting"), k)
     shapes |= dict.fromkeys(("moments", "moved"), 2 * k) | {"weights": points, "copies": copies, "support": 7 * patches}
-    shapes |= dict.fromkeys(("records", "shares", "acting", "acting_shares"), pieces)
     shapes |= dict.fromkeys(("state", "new"), states)
     shapes |= dict.fromkeys(("unit_slopes", "slopes"), 9 * k) | dict.fromkeys(("response", "matrix"), n * n)
     return Layout(Problem, **shapes | {"load_response": k * n, "step": SLOPES, "turned": 18, "seen": 3})
@@ -130,20 +126,16 @@ class Patches(NamedTuple):
 
     count: int
     """Number k of patches."""
-    pieces: int
-    """Number of pieces; a patch is one, or several that share its twist and its load."""
     states: int
     """Number of states."""
     solve: int
     """Address of `coupling.solve`."""
     steps: Integers
-    """Addresses of the pieces' steps (see `steps.StepFunctions`), [pieces]."""
+    """Addresses of the patches' steps (see `steps.StepFunctions`), [k]."""
     slopes: Integers
-    """Addresses of those that write slopes, [pieces]."""
-    owners: Integers
-    """Patches of the pieces, [pieces]."""
+    """Addresses of those that write slopes, [k]."""
     firsts: Integers
-    """First state of each piece, [pieces]."""
+    """First state of each patch, and behind the last the number of all, [k + 1]."""
     radius: Doubles
     """Lever arms of the patches that turn spins into speeds [m], [k]."""
     followers: Followers

@@ -15,7 +15,7 @@ from planarfriction.kernels.tilt import centre, tilt
 
 
 class Followers(NamedTuple):
-    """Points of each patch that share its load: its cells, or its parts."""
+    """Points of each patch that share its load: its cells, or its centre of pressure if it moves as a whole."""
 
     x: Doubles
     """Coordinates of the points of all patches [m]."""
@@ -24,9 +24,7 @@ class Followers(NamedTuple):
     """First point of each patch, and behind the last the count of all, [k + 1]."""
     words: Integers
     """Words of the record of a patch whose points are cells, of which the last is the address of the weights; 0 of one
-    whose points are parts, [k]."""
-    pieces: Integers
-    """First piece of each patch, [k]."""
+    that moves as a whole, [k]."""
 
 
 @kernel
@@ -51,19 +49,14 @@ def _borne(x, y, w, n, support, out):
 
 @kernel
 def _press(own, p, problem, k, n, first):
-    """Write the shares of n points of patch k, which begin at `first`, and how far its pressure has to move beyond."""
-    x, y, c = at(own.followers.x, first), at(own.followers.y, first), own.followers.pieces[k]
+    """Write the weights of the n points of patch k, which begin at `first`, or how far it moves as a whole."""
+    x, y = at(own.followers.x, first), at(own.followers.y, first)
     cx, cy = centre(p.moments[2 * k], p.moments[2 * k + 1], p.free_load[k])
     words, out = own.followers.words[k], at(p.weights, first)
     if words == 0:
-        _borne(x, y, at(p.shares, c), n, at(p.support, 7 * k), out)
-        tilt(x, y, out, n, cx, cy, out)
-        for i in range(n):
-            p.acting_shares[c + i] = out[i]
-            cx, cy = cx - out[i] * x[i], cy - out[i] * y[i]
-        p.moved[2 * k], p.moved[2 * k + 1] = cx, cy
-    elif p.records[c] != 0:
-        record, copied = integers(p.records[c]), 0
+        p.moved[2 * k], p.moved[2 * k + 1] = cx - x[0], cy - y[0]
+    elif p.records[k] != 0:
+        record, copied = integers(p.records[k]), 0
         _borne(x, y, doubles(record[words - 1]), n, at(p.support, 7 * k), out)
         tilt(x, y, out, n, cx, cy, out)
         for j in range(k):
@@ -72,7 +65,7 @@ def _press(own, p, problem, k, n, first):
         for i in range(words - 1):
             target[i] = record[i]
         target[words - 1] = at(problem, own.row.weights + first)
-        p.acting[c] = at(problem, own.row.copies + copied)
+        p.acting[k] = at(problem, own.row.copies + copied)
 
 
 @kernel
@@ -84,13 +77,11 @@ def hold(own, p):
 
 @kernel
 def follow(own, p, problem):
-    """Write the records and shares of the pieces that act in the problem, whose address is `problem`."""
-    for c in range(own.pieces):
-        if p.follows[own.owners[c]] >= 0.0:
-            p.acting[c], p.acting_shares[c] = p.records[c], p.shares[c]
+    """Write the records that act in the problem, whose address is `problem`, and how far patches move."""
     for k in range(own.count):
         if p.follows[k] < 0.0:
             continue
+        p.acting[k] = p.records[k]
         p.moved[2 * k], p.moved[2 * k + 1] = 0.0, 0.0
         first = own.followers.firsts[k]
         n = own.followers.firsts[k + 1] - first

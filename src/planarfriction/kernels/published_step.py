@@ -21,13 +21,15 @@ from planarfriction.kernels.derive import derive
 from planarfriction.kernels.moment_steps import Contact, Cotangents, Framed, StepModel
 from planarfriction.kernels.published_contact import PublishedPatch, through
 from planarfriction.kernels.rules import ratio
-from planarfriction.kernels.steady import STILL
 from planarfriction.kernels.steps import step_functions
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
 from planarfriction.kernels.vectors import applied_back, norm, plus, times
 
 NAMES = (*LawNumbers._fields, *PublishedPatch._fields)
 """Numbers of a contact, in the order of its row."""
+
+STILL = 1e-100
+"""Scaled speed [m/s] up to which a patch is at rest: its square is a number."""
 
 shape_of = reader(PublishedPatch)
 

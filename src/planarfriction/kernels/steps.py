@@ -1,8 +1,7 @@
 """Steps of contacts as Python calls them: one contact, a batch, a sequence, and their derivatives.
 
-A contact is one or several parts that see the same twist and share the load; all of them step by the same function,
-one of the `StepFunctions` of a model. It is called by its address: compiled into the code of one contact and into that
-of a batch, a step would round differently in each.
+All contacts step by the same function, one of the `StepFunctions` of a model. It is called by its address: compiled
+into the code of one contact and into that of a batch, a step would round differently in each.
 
 The entry points check what they are given and return False where that is not in order; of types that they were not
 compiled for they say so for free (`UNFIT`). Without load a contact forgets its state.
@@ -21,9 +20,9 @@ from numba.core.errors import NumbaError
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import call, pointer
-from planarfriction.compiler.memory import Doubles, Integers, at, reader
+from planarfriction.compiler.memory import at, reader
 from planarfriction.kernels.bind import bind
-from planarfriction.kernels.vectors import plus, put, three, times
+from planarfriction.kernels.vectors import put, three, times
 
 WORDS = "pddfdd"
 """Arguments of `StepFunctions` (see `calls.address_of`)."""
@@ -33,11 +32,11 @@ SLOPES = 12
 
 
 class StepFunctions(NamedTuple):
-    """Compiled steps of one part of a contact with S states.
+    """Compiled steps of a contact with S states.
 
-    Their arguments are `(contact, z, V, dt, new, out)`: the address of the part's record (with which the solver calls
-    its `contacts.ModelFunctions`), a number `dt`, and pointers to doubles. They write the new state to `new` and to
-    `out`, per unit load, the wrench W at the end of the step [3] and what follows.
+    Their arguments are `(contact, z, V, dt, new, out)`: the address of the contact's record (with which the solver
+    calls its `contacts.ModelFunctions`), a number `dt`, and pointers to doubles. They write the new state to `new` and
+    to `out`, per unit load, the wrench W at the end of the step [3] and what follows.
     """
 
     step: Any
@@ -62,26 +61,30 @@ def step_functions(name: str, templates: tuple, **model: Any) -> StepFunctions:
     )
 
 
-class Parts(NamedTuple):
-    """Parts of a contact at R loads, and the function that they are given to."""
+class Stepped(NamedTuple):
+    """A contact at R loads, and the function that steps it."""
 
     function: int
     """Address of one of the `StepFunctions`."""
-    count: int
-    """Number P of parts."""
     states: int
-    """Number S of states of a part."""
+    """Number S of states."""
     square: int
-    """Numbers of d new/dz of a part."""
+    """Numbers of d new/dz."""
     loads: int
     """Number R of loads: one for each contact of a batch, or 1."""
-    records: Integers
-    """Addresses of the records, [R, P]."""
-    shares: Doubles
-    """Shares of the load, [R, P]."""
+    record: int
+    """Address of the first of the R records, which lie one behind the other."""
+    words: int
+    """Number of words of a record."""
 
 
-_read = reader(Parts)
+_read = reader(Stepped)
+
+
+@kernel
+def _record(own, b):
+    """Return the address of the record of contact b."""
+    return at(own.record, own.words * b if own.loads > 1 else 0)
 
 
 @kernel
@@ -100,28 +103,24 @@ def _positive(load, dt):
 @kernel
 def _step(own, b, z, twist, load, dt, new, wrench, unit):
     """Step contact b; `unit` [3] is scratch."""
-    total = (0.0, 0.0, 0.0)
-    for k in range(own.count):
-        first, i = k * own.states, (b if own.loads > 1 else 0) * own.count + k
-        call(own.function, (own.records[i], at(z, first), twist, dt, at(new, first), unit))
-        total = plus(total, own.shares[i], three(unit))
+    call(own.function, (_record(own, b), z, twist, dt, new, unit))
     if load > 0.0:
-        put(wrench, times(load, total))
+        put(wrench, times(load, three(unit)))
     else:
         put(wrench, (0.0, 0.0, 0.0))
-        for i in range(own.count * own.states):
+        for i in range(own.states):
             new[i] = 0.0
 
 
 @jit
-def step_one(parts, z, vx, vy, omega, load, dt, result):
-    """Step one contact; `parts` are the words of `Parts`, `z` [P S].
+def step_one(stepped, z, vx, vy, omega, load, dt, result):
+    """Step one contact; `stepped` are the words of `Stepped`, `z` [S].
 
-    New state and wrench go into the first of `result` [P S + 9], whose last six are scratch. Called from Python: every
+    New state and wrench go into the first of `result` [S + 9], whose last six are scratch. Called from Python: every
     argument costs a quarter of a microsecond on the way in.
     """
-    own, out = _read(parts), pointer(result)
-    n = own.count * own.states
+    own, out = _read(stepped), pointer(result)
+    n = own.states
     valid = z.shape[0] == n and xp.in_range(vx) and xp.in_range(vy) and xp.in_range(omega) and _positive(load, dt)
     if not (valid and _in_order(z, n)):
         return False
@@ -132,11 +131,11 @@ def step_one(parts, z, vx, vy, omega, load, dt, result):
 
 
 @jit
-def step_many(parts, z, twist, load, dt, new, wrench, scratch):
-    """Step B contacts: `z`, `new` [B, P S], `twist`, `wrench` [B, 3], `load`, `dt` [B or 1]; `scratch` [3]."""
-    own, (count, n) = _read(parts), z.shape
+def step_many(stepped, z, twist, load, dt, new, wrench, scratch):
+    """Step B contacts: `z`, `new` [B, S], `twist`, `wrench` [B, 3], `load`, `dt` [B or 1]; `scratch` [3]."""
+    own, (count, n) = _read(stepped), z.shape
     loads, steps = load.shape[0], dt.shape[0]
-    valid = n == own.count * own.states and twist.shape[0] == count and twist.shape[1] == 3
+    valid = n == own.states and twist.shape[0] == count and twist.shape[1] == 3
     valid = valid and (loads == 1 or loads == count) and (steps == 1 or steps == count)
     for b in range(count if valid else 0):
         valid = valid and _positive(load[b if loads > 1 else 0], dt[b if steps > 1 else 0])
@@ -151,59 +150,39 @@ def step_many(parts, z, twist, load, dt, new, wrench, scratch):
     return True
 
 
-@jit
-def step_sequence(parts, z, twist, load, dt, wrench, scratch):
-    """Step one contact at each twist [T, 3] and load [T], `z` [P S] in place; `wrench` [T, 3], `scratch` [P S + 3]."""
-    own, n, here, there = _read(parts), z.shape[0], pointer(z), pointer(scratch)
-    unit = at(there, n)
-    for t in range(twist.shape[0]):
-        _step(own, 0, here, at(pointer(twist), 3 * t), load[t], dt, there, at(pointer(wrench), 3 * t), unit)
-        here, there = there, here
-    for i in range(n):
-        z[i] = here[i]
-
-
 @kernel
 def _jacobians(own, b, z, given, out, new):
     """Write the derivatives of a step of contact b to `out`; `new` [S] and all behind it are scratch."""
-    count, s, load, dt = own.count, own.states, given[3], given[4]
-    n, found, loaded = count * s, at(new, s), 1.0 if load > 0.0 else 0.0
-    by_twist, of_wrench = at(out, count * own.square), at(out, count * own.square + 3 * n)
-    wrench_twist = at(of_wrench, 3 * n)
-    for i in range(12):
-        wrench_twist[i] = 0.0
-    for k in range(count):
-        i = (b if own.loads > 1 else 0) * count + k
-        share = own.shares[i]
-        call(own.function, (own.records[i], at(z, k * s), given, dt, new, found))
-        for m in range(3):
-            wrench_twist[9 + m] += share * found[m]
-        for m in range(9):
-            wrench_twist[m] += share * load * found[3 + m]
-        for m in range(3 * s):
-            by_twist[3 * s * k + m] = loaded * found[SLOPES + m]
-        for m in range(3):
-            for p in range(s):
-                of_wrench[n * m + s * k + p] = share * load * found[SLOPES + s * (3 + m) + p]
-        for m in range(own.square):
-            out[own.square * k + m] = loaded * found[SLOPES + 6 * s + m]
+    s, load, dt = own.states, given[3], given[4]
+    found, loaded, by_twist = at(new, s), 1.0 if load > 0.0 else 0.0, at(out, own.square)
+    of_wrench, wrench_twist = at(by_twist, 3 * s), at(by_twist, 6 * s)
+    call(own.function, (_record(own, b), z, given, dt, new, found))
+    for m in range(3):
+        wrench_twist[9 + m] = found[m]
+    for m in range(9):
+        wrench_twist[m] = load * found[3 + m]
+    for m in range(3 * s):
+        by_twist[m] = loaded * found[SLOPES + m]
+        of_wrench[m] = load * found[SLOPES + 3 * s + m]
+    for m in range(own.square):
+        out[m] = loaded * found[SLOPES + 6 * s + m]
 
 
 @jit
-def jacobians(parts, z, given, result):
-    """Write derivatives of steps of B contacts: `z` [B P S]; `given` [B 5]: twist, load and dt; all arrays are flat.
+def jacobians(stepped, z, given, result):
+    """Write derivatives of steps of B contacts: `z` [B S]; `given` [B 5]: twist, load and dt; all arrays are flat.
 
-    Into `result` go, for one contact after the other: new state by state [P, square] and by twist [P, S, 3], wrench by
-    state [3, P, S], by twist [3, 3] and by load [3]. Behind all of them lies scratch for one part.
+    Into `result` go, for one contact after the other: new state by state [square] and by twist [S, 3], wrench by state
+    [3, S], by twist [3, 3] and by load [3]. Behind all of them lies scratch for one contact.
     """
-    own, states, inputs, out = _read(parts), pointer(z), pointer(given), pointer(result)
-    n, count = own.count * own.states, given.shape[0] // 5
+    own, states, inputs, out = _read(stepped), pointer(z), pointer(given), pointer(result)
+    n, count = own.states, given.shape[0] // 5
     if z.shape[0] != count * n or not (_in_order(z, z.shape[0]) and _in_order(given, given.shape[0])):
         return False
     for b in range(count):
         if not (given[5 * b + 3] >= 0.0 and given[5 * b + 4] >= 0.0):
             return False
-    size = own.count * own.square + 6 * n + 12
+    size = own.square + 6 * n + 12
     for b in range(count):
         _jacobians(own, b, at(states, n * b), at(inputs, 5 * b), at(out, size * b), at(out, size * count))
     return True

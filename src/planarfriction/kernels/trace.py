@@ -242,18 +242,15 @@ class Trace:
 
 
 class Table:
-    """An array that stands in the source, from the place `first` on.
+    """An array that stands in the source; if its numbers are given, those at known places are known."""
 
-    Of an array whose numbers are given, those at known places are known.
-    """
-
-    def __init__(self, trace: Trace, name: str, numbers: Any = None, first: Any = 0) -> None:
-        self.trace, self.name, self.numbers, self.first = trace, name, numbers, first
+    def __init__(self, trace: Trace, name: str, numbers: Any = None) -> None:
+        self.trace, self.name, self.numbers = trace, name, numbers
 
     def __getitem__(self, place: Any) -> Any:
         if self.numbers is not None and not isinstance(place, Number):
             return float(self.numbers[place])
-        return self.trace.note(self.name + "[{0}]", "real", self.first + place)
+        return self.trace.note(self.name + "[{0}]", "real", place)
 
 
 def traced(function: Callable[[Trace], Any]) -> Block:

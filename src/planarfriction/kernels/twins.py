@@ -17,7 +17,7 @@ import numpy as np
 
 from planarfriction.compiler import compiled_math, memory
 from planarfriction.kernels.trace import CompiledMathematics, Mathematics, Number, Table, flat
-from planarfriction.kernels import hermite, published_contact, reduced_contact, vectors
+from planarfriction.kernels import published_contact, vectors
 
 
 def _plus(a: Any, c: Any, b: Any) -> Any:
@@ -61,49 +61,6 @@ def _placed(a: Any, i: int, x: Any) -> tuple:
     return tuple(x if j == i else 0.0 for j in range(len(a)))
 
 
-# ---------------------------------------------------------------------- cubic patches
-
-
-def _polynomial(coefficients: tuple, x: Any) -> Any:
-    return functools.reduce(lambda total, c: total * x + c, reversed(coefficients), 0.0)
-
-
-def _weights(u: Any, v: Any) -> list[list[Any]]:
-    """Return the weights of the four numbers of four nodes: of the value, of the slope by u and of that by v."""
-    both = hermite._NEAR, hermite._NEXT, hermite._NEAR_SLOPES, hermite._NEXT_SLOPES
-    rows, columns = ([[_polynomial(each, x) for each in pair] for pair in both] for x in (u, v))
-
-    def products(a: int, b: int) -> list[Any]:
-        ends = [(rows[a + i], columns[b + j]) for i in (0, 1) for j in (0, 1)]
-        return [along[r] * across[c] for along, across in ends for c in (0, 1) for r in (0, 1)]
-
-    return [products(0, 0), products(2, 0), products(0, 2)]
-
-
-def _read(numbers: Callable[[Any, int], Any], at: Any, node: int, row: int, weights: list[Any]) -> tuple:
-    """Return three components of a patch: the sum of its 16 numbers times their weights."""
-    corners = at, at + node, at + row, at + row + node
-    places = [(corner, n) for corner in corners for n in range(4)]
-    return tuple(_dot(weights, [numbers(corner, 4 * m + n) for corner, n in places]) for m in range(3))
-
-
-def _patch(data: Any, at: Any, node: int, row: int, u: Any, v: Any) -> tuple:
-    """Return what `hermite.patch` does."""
-    return tuple(_read(lambda place, n: data[place + n], at, node, row, weights) for weights in _weights(u, v))
-
-
-def _patch_of_levels(data: Any, at: Any, node: int, row: int, t: tuple, t_slopes: tuple, u: Any, v: Any) -> tuple:
-    """Return what `hermite.patch_of_levels` does."""
-
-    def mixed(weights: tuple) -> Callable[[Any, int], Any]:
-        return lambda place, n: _dot(weights, [data[place + 12 * k + n] for k in range(4)])
-
-    by_value, by_u, by_v = _weights(u, v)
-    value = mixed(t)
-    read = [_read(value, at, node, row, weights) for weights in (by_value, by_u, by_v)]
-    return (*read, _read(mixed(t_slopes), at, node, row, by_value))
-
-
 _TWINS: dict[int, Any] = {
     id(own): twin
     for own, twin in (
@@ -122,9 +79,6 @@ _TWINS: dict[int, Any] = {
         (vectors.put_all, _put),
         (memory.at, _At),
         (published_contact.read, lambda record: record),
-        (reduced_contact.read, lambda record: record),
-        (hermite.patch, _patch),
-        (hermite.patch_of_levels, _patch_of_levels),
     )
 }
 """Twins by the `id` of what they stand for; those of functions are added as they are made."""

@@ -108,8 +108,7 @@ class RateLaw(FrictionLaw):
         twist[:, 0] = speed.reshape(-1)
         dt = 0.25 * self.largest_deflection / np.where(twist[:, 0] > 0.0, twist[:, 0], 1.0)
         step, single = self.functions(cells.POSITIONS).steps.step, self._single()
-        place = np.array([place_of(single)])
-        table = row_of(steps.Parts(address_of(step, steps.WORDS), 1, 2, 4, 1, place, _ALONE))
+        table = row_of(steps.Stepped(address_of(step, steps.WORDS), 2, 4, 1, place_of(single), single.size))
         z, new, pull = np.zeros((speed.size, 2)), np.empty((speed.size, 2)), np.empty((speed.size, 3))
         for _ in range(400):
             steps.ready(steps.step_many)(table, z, twist, _ALONE, dt, new, pull, np.empty(3))

@@ -4,7 +4,6 @@ from planarfriction.compiled import PackedModel, StepJacobians
 from planarfriction.families import MODELS
 from planarfriction.models.base import FrictionModel, ModelJacobians
 from planarfriction.models.distributed import DistributedModel
-from planarfriction.models.moments import MomentModel
 from planarfriction.models.reduced import ReducedModel
 from planarfriction.models.reduced_published import ReducedModelPublished
 
@@ -13,7 +12,6 @@ __all__ = [
     "DistributedModel",
     "FrictionModel",
     "ModelJacobians",
-    "MomentModel",
     "PackedModel",
     "ReducedModel",
     "ReducedModelPublished",

@@ -27,14 +27,13 @@ class ModelJacobians(NamedTuple):
     """Derivatives of the bristle rates and of the wrench; `[*s]` is the shape of the state without batch axes."""
 
     rate_state: np.ndarray
-    """d rate / d state: distributed `[..., 2, 2, N]` (cell by cell), reduced `[..., 3, 3]`, of P parts
-    `[..., P, 3, 3]` (part by part)."""
+    """d rate / d state: distributed `[..., 2, 2, N]` (cell by cell), of three states `[..., 3, 3]`."""
     rate_twist: np.ndarray
-    """d rate / d twist: distributed `[..., 2, N, 3]`, reduced `[..., 3, 3]`, of P parts `[..., P, 3, 3]`."""
+    """d rate / d twist: distributed `[..., 2, N, 3]`, of three states `[..., 3, 3]`."""
     rate_load: np.ndarray
     """d rate / d normal_force of a fixed shape: zero, `[..., *s]`."""
     wrench_state: np.ndarray
-    """d wrench / d state: distributed `[..., 3, 2, N]`, reduced `[..., 3, 3]`, of P parts `[..., 3, P, 3]`."""
+    """d wrench / d state: distributed `[..., 3, 2, N]`, of three states `[..., 3, 3]`."""
     wrench_twist: np.ndarray
     """d wrench / d twist at a held state, `[..., 3, 3]`."""
     wrench_load: np.ndarray
@@ -140,8 +139,8 @@ class FrictionModel(ByValue):
         nothing overshoots.
 
         With `moments` `[..., 2]` [N m] of the normal forces about the origin, on the moving body, the pressure follows
-        them (see `ContactPatch.weights`); bristles keep their deflections. Reduced models of parts shift load among
-        these, as if they were cells, and move them as far as that does not reach the centre of pressure.
+        them (see `ContactPatch.weights`); bristles keep their deflections. `ReducedModelPublished` moves as a whole to
+        the centre of pressure.
 
         Raises InvalidValueError for shapes that do not fit, numbers that are not finite, and a load or time below zero.
         """

@@ -3,29 +3,37 @@
 from __future__ import annotations
 
 import functools
-import itertools
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.compiled.published import PUBLISHED
+from planarfriction.compiled.published import CompiledPublished
 from planarfriction.compiled.remembered import Remembered
-from planarfriction.compiled.shapes_by_load import Part
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.moments import slopes_in
 from planarfriction.kernels.surfaces import ELLIPSOID
+from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import refuse_rate_law
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.limit_surface.base import SurfaceNumbers
-from planarfriction.models.part_shapes import REMEMBERED
-from planarfriction.models.reduced_map import is_point
-from planarfriction.models.three_states import ThreeStateModel
+from planarfriction.models.base import FrictionModel, ModelJacobians
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_cell_metrics, same_metric
+
+
+REMEMBERED = 64
+"""Number of loads whose shapes are remembered."""
+
+POINT = 1e-6
+"""Share of the load beside its heaviest cell up to which a contact is a point, without torque about it."""
+
+
+def is_point(patch: ContactPatch, normal_force: float) -> bool:
+    """Return True if one cell carries the load but for a share `POINT` of it."""
+    return bool(1.0 - patch.weights(normal_force).max() <= POINT)
 
 
 class _OfPoint(NamedTuple):
@@ -66,6 +74,12 @@ class PublishedShape(NamedTuple):
         return np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]]) @ self.axes
 
     @property
+    def place(self) -> np.ndarray:
+        """Centre of pressure in the contact frame, whatever the friction metric, `[2]` [m]."""
+        y, x = np.linalg.solve(self.root, self.lever[:2, 2])
+        return np.array([x, -y])
+
+    @property
     def viscous_lever(self) -> np.ndarray:
         """Map `[3, 3]` of twists to the speeds of viscous friction, `U V` at the centre of pressure."""
         return np.diag([1.0, 1.0, self.second_moment]) @ self.lever
@@ -88,31 +102,17 @@ def axes_of(root: np.ndarray) -> np.ndarray:
 class PublishedShapes:
     """Shapes of a patch at any load, updated as `on_load_change` says (see `ReducedModelPublished`)."""
 
-    count = 1
-
     def __init__(self, surface: LimitSurface, patch: ContactPatch, on_load_change: str) -> None:
         self._surface, self._patch = surface, patch
         self.depends_on_load = patch.depends_on_load and on_load_change != "keep"
         self._rescales = on_load_change == "rescale"
         self._recent: Remembered[PublishedShape] = Remembered(REMEMBERED)
 
-    def at(self, loads: Sequence[float | None]) -> Iterator[tuple[Part, ...]]:
-        """See `compiled.three_states.Shapes`."""
-        if not self.depends_on_load:
-            return itertools.repeat((Part(1.0, self.reference),), len(loads))
-        return ((Part(1.0, self.shape_at(load)),) for load in loads)  # pyright: ignore[reportArgumentType]
-
-    def shape_at(self, load: float) -> PublishedShape:
-        """Return the shape at a load > 0 [N]; recent loads are cached."""
-        return self._recent.get(load, lambda: self._built(load)) if self.depends_on_load else self.reference
-
-    def lever_arm(self, load: float | None) -> float:
-        """See `compiled.three_states.Shapes`."""
-        return self.shape_at(load).contact_radius  # pyright: ignore[reportArgumentType]
-
-    def arrays(self, shape: PublishedShape) -> tuple[np.ndarray, ...]:
-        """See `compiled.three_states.Shapes`."""
-        return (shape.surface.numbers.data,)
+    def shape_at(self, load: float | None) -> PublishedShape:
+        """Return the shape at a load > 0 [N]; recent loads are cached. None: any load, if it does not change it."""
+        if load is None or not self.depends_on_load:
+            return self.reference
+        return self._recent.get(load, lambda: self._built(load))
 
     @functools.cached_property
     def reference(self) -> PublishedShape:
@@ -148,7 +148,7 @@ ON_LOAD_CHANGE = ("rebuild", "rescale", "keep")
 
 
 @dataclass(frozen=True, eq=False)
-class ReducedModelPublished(ThreeStateModel):
+class ReducedModelPublished(FrictionModel):
     """Reduced LuGre friction: three bristles, conjugate to the wrench at the centre of pressure, and a limit surface.
 
     With `S = diag(1, 1, r)`, `V_S = S V`, `v_n = |V_S|` and `h(V)` the direction of the sliding wrench: `zdot = S h v_n
@@ -166,7 +166,6 @@ class ReducedModelPublished(ThreeStateModel):
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
 
-    _kind = PUBLISHED
     state_units = "m, m, m^2"
 
     surface: LimitSurface = None  # pyright: ignore[reportAssignmentType]
@@ -214,3 +213,47 @@ class ReducedModelPublished(ThreeStateModel):
     def shapes(self) -> PublishedShapes:
         """Shapes of the patch at any load."""
         return PublishedShapes(self.surface, self.patch, self.on_load_change)
+
+    @functools.cached_property
+    def compiled(self) -> CompiledPublished:
+        """Machine form of the model (see `FrictionModel.compiled`)."""
+        return CompiledPublished(self.law, self.shapes)
+
+    @property
+    def state_shape(self) -> tuple[int, ...]:
+        """`(3,)`"""
+        return (3,)
+
+    def jacobians(self, state: Any, twist: Any, normal_force: Any) -> ModelJacobians:
+        """Return the analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); one-sided at kinks.
+
+        With the rate f, G the map to the centre of pressure and `W = -G' (sigma_0 z + sigma_1 f + sigma_2 H V)`:
+        `dW/dz = -G' (sigma_0 + sigma_1 df/dz)`, `dW/dV = -G' (sigma_1 df/dV + sigma_2 H)`.
+        """
+        state, twist, load, _ = self._inputs(state, twist, normal_force)
+        law, count = self.law.numbers, load.size
+        z, v, f = state.reshape(count, 3), twist.reshape(count, 3), load.reshape(count)
+        rate_state, rate_twist, wrench_state, wrench_twist = np.zeros((4, count, 3, 3))
+        for rows, shape in self.compiled.shape_at_each_load(load):
+            by_z, by_v = shape.rate_slopes(self.compiled.linearisation(shape, z[rows], v[rows]))
+            rate_state[rows], rate_twist[rows] = by_z, by_v
+            pull = law.sigma_0 * np.eye(3) + law.sigma_1 * by_z
+            push = law.sigma_1 * by_v + law.sigma_2 * shape.viscous_lever
+            lever, weight = shape.lever.T, -f[rows][:, None, None]
+            wrench_state[rows], wrench_twist[rows] = weight * (lever @ pull), weight * (lever @ push)
+        blocks = (each.reshape(*load.shape, 3, 3) for each in (rate_state, rate_twist, wrench_state, wrench_twist))
+        by_state, by_twist, pull, push = blocks
+        by_load = self.compiled.evaluate(state, twist, load)[1]
+        return ModelJacobians(by_state, by_twist, np.zeros_like(state), pull, push, by_load)
+
+    def with_law(self, law: FrictionLaw) -> Self:
+        """Return the model with another law; see `FrictionModel.with_law`."""
+        changed = super().with_law(law)
+        changed.__dict__["shapes"] = self.shapes
+        return changed
+
+    def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:
+        pulls = -self.law.numbers.sigma_0 * load * self.patch.weights(load) * deflections
+        wrench = np.einsum("nij,in->j", self.patch.levers(), pulls)
+        per_state = self.jacobians(self.rest(), np.zeros(3), load).wrench_state
+        return np.linalg.lstsq(per_state, wrench, rcond=1e-12)[0]

@@ -75,6 +75,8 @@ class ContactPatch(Moments):
     point_shares: Any = None
     """Factors `q` on the areas `[N]` [-] that give evenly pressed shapes by name or outline the second moments of their
     areas, although each cell is a point; None: ones (other pressures, the published masks)."""
+    radii: Any = field(default=None, kw_only=True)
+    """Radii `a` of cells that are small discs, shape `[N]` [m], 0 for points; None: points (see `discs`)."""
     outline: outlines.Outline | None = field(init=False, default=None)
     """Outline from which the class methods cut the cells; None for other cells."""
     _fixed_weights: np.ndarray | None = field(init=False, default=None, compare=False)
@@ -95,6 +97,8 @@ class ContactPatch(Moments):
             self._set(cell_size=(self.grid.cell_width, self.grid.cell_height))
         check_cells(len(positions))
         areas = validation.positive_array("areas", self.areas, (len(positions),))
+        radii = np.zeros(len(positions)) if self.radii is None else self.radii
+        radii = validation.non_negative_array("radii", radii, (len(positions),))
         law = as_law(self.pressure, positions)
         if not law.depends_on_load:
             check_pressure(law.relative(positions), positions)
@@ -102,14 +106,14 @@ class ContactPatch(Moments):
         if not kept.any():
             raise InvalidValueError("pressure", "be > 0 on at least one cell", "0 on all of them")
         self._check_anisotropy(kept)
-        self._set(positions=positions[kept], areas=areas[kept], pressure=law.only(kept))
+        self._set(positions=positions[kept], areas=areas[kept], radii=radii[kept], pressure=law.only(kept))
         if type(law) is not Uniform:  # other pressures keep their ratios
             self._set(point_shares=None)
         elif self.point_shares is not None:
             self._set(point_shares=validation.positive_array("point_shares", self.point_shares, (len(positions),)))
             self.point_shares.setflags(write=False)
-        self.positions.setflags(write=False)
-        self.areas.setflags(write=False)
+        for numbers in (self.positions, self.areas, self.radii):
+            numbers.setflags(write=False)
         if not law.depends_on_load:
             fixed = self._shares(self.pressure.relative(self.positions))
             fixed.setflags(write=False)
@@ -270,18 +274,21 @@ class ContactPatch(Moments):
 
         return finer(self, parts)
 
-    def compressed(
-        self, degree: int = 5, *, cells: int | None = None, error: float | None = None, loads: Any = None
-    ) -> ContactPatch:
-        """Return a patch of a few of the cells, with the same moments up to `degree` and nearly the same limit surface.
+    def discs(self, n: int | None = None) -> ContactPatch:
+        """Return the patch as `n` small discs that stand for its cells; None: each cell is a disc of its own.
 
-        At most `cells` (default: 45, the number of moments up to `degree + 3`); if the patch has no more, it is
-        returned unchanged. `error` raises the degree until the relative error of every dissipation is below it. Shapes
-        that depend on the load need `loads`, (lowest, highest) [N]; see `patch.compressed`.
+        The disc of a cell has its second moment, `a^2/2 = (s_x^2 + s_y^2)/12` (length only on lines; points stay
+        points), and so has the disc of many cells: load, centre of pressure and second moment of the patch are kept.
+        Symmetric patches have symmetric discs, n or a few less; cells of different friction metric or asymmetry never
+        share a disc, so that there are at least as many as kinds of them. Raises InvalidValueError for n below 1.
         """
-        from planarfriction.patch.compressed import compressed
+        from planarfriction.patch.discs import discs
 
-        return compressed(self, degree, cells=cells, error=error, loads=loads)
+        return discs(self, n)
+
+    def compressed(self, *_: Any, **__: Any) -> ContactPatch:
+        """Raise an error that says what to write instead."""
+        raise InvalidValueError("compressed", "be replaced by discs(n): a patch of n small discs", "compressed()")
 
     def grid_error(self, normal_force: float | None = None, *, refined: int = 1) -> GridError:
         """Return the errors of `refined(refined)` against the continuous patch: of force, torque and breakaway.
@@ -339,7 +346,8 @@ class ContactPatch(Moments):
     def __repr__(self) -> str:
         grid = "" if self.grid is None else f" of {self.grid.columns} x {self.grid.rows}"
         law = type(self.pressure).__name__
-        return f"ContactPatch({self.name!r}, {self.cells} cells{grid}, {law} pressure)"
+        cells = "discs" if self.has_discs else "cells"
+        return f"ContactPatch({self.name!r}, {self.cells} {cells}{grid}, {law} pressure)"
 
     def _repr_html_(self) -> str:
         return picture("patch in a notebook", self)
@@ -359,6 +367,7 @@ class ContactPatch(Moments):
             "pressure": self.pressure.to_dict(), "metric": self.metric, "asymmetry": self.asymmetry,
             "outline": self.outline and self.outline.to_dict(), "cell_size": self.cell_size and list(self.cell_size),
             "grid": self.grid and dataclasses.asdict(self.grid), "point_shares": self.point_shares,
+            "radii": self.radii if self.has_discs else None,
         }  # fmt: skip
         plain = {name: part.tolist() if isinstance(part, np.ndarray) else part for name, part in parts.items()}
         return {name: part for name, part in plain.items() if part is not None}
@@ -369,7 +378,7 @@ class ContactPatch(Moments):
 
         Raises InvalidValueError for those, and for values that break a rule of the patch.
         """
-        options = ("cell_size", "metric", "asymmetry", "point_shares")
+        options = ("cell_size", "metric", "asymmetry", "point_shares", "radii")
         optional = ("shape", "name", "pressure", "grid", "outline", *options)
         validation.keys("patch", data, required=("positions", "areas"), optional=optional)
         validation.choice("patch shape", data.get("shape", "cells"), ("cells",))

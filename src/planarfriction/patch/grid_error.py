@@ -36,6 +36,7 @@ def finer(patch: ContactPatch, parts: int, name: str = "parts") -> ContactPatch:
     positions, size = positions.reshape(-1, 2), (width / parts, height / parts)
     shares = None if patch.point_shares is None else point_shares(positions, areas, size)
     pressure = patch.pressure.repeated(times)
+    fields["radii"] = np.repeat(patch.radii / parts, times)
     return type(patch)(positions, areas, pressure, None, patch.name, size, shares, **fields)
 
 

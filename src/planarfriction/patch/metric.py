@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -74,12 +75,29 @@ class Anisotropy(ByValue):
     def levers(self) -> np.ndarray:
         """Return `B` with `u_i = B_i V` for the twist V about the contact frame's origin, shape `[N, 2, 3]`.
 
-        `B_i = L_i [[1, 0, -y_i], [0, 1, x_i]]`; the wrench of a traction `t` of cell i is `B_i' t`.
+        `B_i = L_i [[1, 0, -y_i], [0, 1, x_i]]`; the wrench of a traction `t` of cell i is `B_i' t`. If any cell is a
+        disc, all have a third row `(0, 0, kappa a_i)` with the `lever_radii` a and `kappa^2 = 1/2`: `[N, 3, 3]`.
         """
         x, y = self.positions.T  # pyright: ignore[reportAttributeAccessIssue]
         one, zero = np.ones_like(x), np.zeros_like(x)
         plain = np.moveaxis(np.array([[one, zero, -y], [zero, one, x]]), -1, 0)
-        return plain if self.root is None else self.root @ plain
+        levers = plain if self.root is None else self.root @ plain
+        if not self.has_discs:
+            return levers
+        spin = np.zeros((len(x), 1, 3))
+        spin[:, 0, 2] = math.sqrt(0.5) * self.lever_radii
+        return np.concatenate([levers, spin], axis=1)
+
+    @functools.cached_property
+    def has_discs(self) -> bool:
+        """True if any cell is a disc and not a point."""
+        return bool(self.radii.any())  # pyright: ignore[reportAttributeAccessIssue]
+
+    @functools.cached_property
+    def lever_radii(self) -> np.ndarray:
+        """Radii `[N]` [m] of the cells in the space of the metric M, `a sqrt(tr M/2)`; those of points are 0."""
+        radii = self.radii  # pyright: ignore[reportAttributeAccessIssue]
+        return radii if self.root is None else radii * np.sqrt(0.5 * (self.root**2).sum((-2, -1)))
 
     def asymmetries(self) -> np.ndarray:
         """Return the asymmetry `a_i` of each cell, shape `[N, 2]`; zeros where there is none."""

@@ -1,7 +1,7 @@
 """Shares of areas and sums over the pressure of a patch: centre, contact radius, area, moments of any degree."""
 
 # pyright: reportAttributeAccessIssue=false
-# `positions`, `areas`, `point_shares` and `weights` are those of the patch that is made from this.
+# `positions`, `areas`, `radii`, `point_shares` and `weights` are those of the patch that is made from this.
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
+from planarfriction import formulas, validation
 from planarfriction.patch.metric import Anisotropy
 
 MOST_DEGREE = 40
@@ -57,20 +57,25 @@ class Moments(Anisotropy):
     def contact_radius(self, normal_force: Any = None) -> Any:
         """Return the contact radius `r = sum(w |rho - CoP|)` [m]: a spin about the CoP has the torque `mu f_N r`.
 
-        With a friction metric `sum(w |L J (rho - CoP)|)`, J a quarter turn; the second moment likewise.
+        With a friction metric `sum(w |L J (rho - CoP)|)`, J a quarter turn; the second moment likewise. A disc counts
+        with the mean distance of its points (see `formulas.disc_friction`).
         """
         weights, *offset = self._about_centre_of_pressure(normal_force)
-        return (weights * np.hypot(*self.lever_coordinates(*offset))).sum(-1)
+        x, y = self.lever_coordinates(*offset)
+        if not self.has_discs:
+            return (weights * np.hypot(x, y)).sum(-1)
+        slide, spin = x**2 + y**2, self.lever_radii**2
+        return (weights * np.sqrt(slide + formulas.disc_friction(np, slide, spin)[2] * spin)).sum(-1)
 
     @overload
     def second_moment(self, normal_force: float | None = None) -> float: ...
     @overload
     def second_moment(self, normal_force: np.ndarray | Sequence[Any]) -> np.ndarray: ...
     def second_moment(self, normal_force: Any = None) -> Any:
-        """Return the second moment `<rho^2> = sum(w |rho - CoP|^2)` [m^2]."""
+        """Return the second moment `<rho^2> = sum(w (|rho - CoP|^2 + a^2/2))` of cells with radii a [m^2]."""
         weights, *offset = self._about_centre_of_pressure(normal_force)
         dx, dy = self.lever_coordinates(*offset)
-        return (weights * (dx**2 + dy**2)).sum(-1)
+        return (weights * (dx**2 + dy**2 + 0.5 * self.lever_radii**2)).sum(-1)
 
     @overload
     def area(self, normal_force: float | None = None) -> float: ...

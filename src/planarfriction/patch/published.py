@@ -112,8 +112,10 @@ def cells(
     outline: Any = None,
     name: Any = None,
     point_shares: Any = None,
+    radii: Any = None,
 ) -> ContactPatch:
     """Return the patch that `ContactPatch.to_dict` described."""
     given = {"positions": positions, "areas": areas, "pressure": pressure, "grid": grid}
-    given |= {"cell_size": cell_size, "outline": outline, "name": name, "point_shares": point_shares}
+    given |= {"cell_size": cell_size, "outline": outline, "name": name}
+    given |= {"point_shares": point_shares, "radii": radii}
     return ContactPatch.from_dict({key: value for key, value in given.items() if value is not None})

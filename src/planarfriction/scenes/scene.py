@@ -184,7 +184,7 @@ class Contact(ByValue):
             rule = "be 'fixed' on the world: only a patch of the body follows its load"
             raise InvalidValueError(f"pressure {of_contact}", rule, self.pressure)
         if not isinstance(getattr(self.model, "reduction", None), DistributedModel):
-            rule = "have bristles on cells where the pressure follows (DistributedModel, ReducedModel without parts)"
+            rule = "have bristles on cells where the pressure follows (DistributedModel, ReducedModel)"
             raise InvalidValueError(f"model {of_contact}", rule, self.model)
 
     @property

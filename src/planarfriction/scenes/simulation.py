@@ -158,10 +158,7 @@ def _histories(scene: Scene, batches: SegmentBatches, output: Output) -> dict[st
                 full[:, :, cells] = part.reshape(len(part), 2, -1)
                 histories[name] = History(("time", "axis", f"cell_{contact.name}"), full, {"units": "m"})
             else:
-                inner = contact.model.state_shape
-                parts = () if len(inner) == 1 else (f"part_{contact.name}",)
-                states = part.reshape(len(part), *inner)
-                histories[name] = History(("time", *parts, "component"), states, {"units": contact.model.state_units})
+                histories[name] = History(("time", "component"), part, {"units": contact.model.state_units})
     histories["time"] = history("time", ("time",), output.time, "s")
     histories["contact"] = History(("contact",), np.array([contact.name for contact in scene.contacts]), {})
     return histories

@@ -67,9 +67,9 @@ class CoupledPatches:
         which = [next(i for i, each in enumerate(known) if each is model) for model in self.models]
         if follows is not None and len(follows) != len(which):
             raise InvalidValueError("follows", f"hold one for each of {len(which)} models", len(follows))
-        kinds = [described(model) for model in known]
+        kinds = [described(model, precision) for model in known]
         pieces = [each.pieces for each in kinds]
-        radii = [float(np.sqrt((model.patch.positions**2).sum(1).mean())) or 1.0 for model in self.models]
+        radii = [coupling.lever_of(model) or 1.0 for model in self.models]
         source = coupled_source_of(kinds, which, follows or [True] * len(which), radii, precision)
         self.state_shape = (sum(math.prod(model.state_shape) for model in self.models),)
         """Shape of the state of the patches of a world."""
@@ -81,7 +81,6 @@ class CoupledPatches:
         self.status = wp.zeros(self.worlds, dtype=wp.int32, device=self.device)
         """Bits of what was wrong since the last `check` [worlds]: 1 in parameters, 2 in what a step was given."""
         self._numbers = wp.array(source.numbers, dtype=dtype, device=self.device)
-        self._places = wp.array(source.places, dtype=wp.int32, device=self.device)
         self.kernel = kernel_of(source.text, Problems)
         """Kernel of `step`."""
         wp.load_module(self.kernel.module, device=self.device)
@@ -146,7 +145,7 @@ class CoupledPatches:
         one.rounds = self._address("results.iterations", results.iterations, dtype=wp.int32)
         one.converged = self._address("results.converged", results.converged, dtype=wp.int32)
         one.parameters, one.status = self.parameters.ptr, self.status.ptr
-        one.numbers, one.places = self._numbers.ptr, self._places.ptr or 0
+        one.numbers = self._numbers.ptr
         wp.launch(self.kernel, dim=self.worlds, inputs=[one], device=self.device)
 
     def check(self) -> None:

@@ -22,10 +22,8 @@ class Batch:
     which: wp.uint64
     """Models, and the index of that of each contact."""
     number_count: wp.int32
-    place_count: wp.int32
-    """Numbers that belong to each model in `numbers` and `places`."""
+    """Numbers that belong to each model in `numbers`."""
     numbers: wp.uint64
-    places: wp.uint64
     state: wp.uint64
     twist: wp.uint64
     normal_force: wp.uint64
@@ -47,7 +45,6 @@ class Problems:
     tolerance: wp.float64
     parameters: wp.uint64
     numbers: wp.uint64
-    places: wp.uint64
     state: wp.uint64
     twist: wp.uint64
     normal_force: wp.uint64

@@ -26,8 +26,6 @@ class Source(NamedTuple):
     text: str
     numbers: np.ndarray
     """Tables of numbers, one after another."""
-    places: np.ndarray
-    """Tables of whole numbers, one after another."""
 
 
 class Described(NamedTuple):
@@ -35,24 +33,25 @@ class Described(NamedTuple):
 
     pieces: Pieces
     points: np.ndarray
-    """Cells or parts that share the load [n, 2] [m]."""
+    """Cells that share the load [n, 2] [m]."""
     moves: bool
     """True if the patch moves where their pressure cannot follow moments any further."""
 
 
-def described(model: FrictionModel) -> Described:
-    """Return the pieces of a model and the points that share its load.
+def described(model: FrictionModel, precision: str, count: int = 0) -> Described:
+    """Return the pieces of a model and the points that share its load, `count` of them if it has fewer cells.
 
     Raises InvalidValueError for models without source (see `export_c`).
     """
     points, words = model.compiled.points()
-    return Described(pieces_of(model), points, not words)
+    pieces = pieces_of(model, precision, count=count)
+    return Described(pieces, np.pad(points, [(0, pieces.count - len(points)), (0, 0)], mode="edge"), not words)
 
 
 def source_of(model: Described, precision: str) -> Source:
     """Return the source of a step in single or double precision ("float", "double")."""
-    (own,), numbers, places = _described([model], precision, slopes=False)
-    return Source(_rendered("step.cpp.j2", own=own), numbers, places)
+    (own,), numbers = _described([model], precision, slopes=False)
+    return Source(_rendered("step.cpp.j2", own=own), numbers)
 
 
 def coupled_source_of(
@@ -62,7 +61,7 @@ def coupled_source_of(
 
     `which` are the models of the patches, `follows` tells whose pressure follows moments, `radii` are lever arms [m].
     """
-    kinds, numbers, places = _described(models, precision, slopes=True)
+    kinds, numbers = _described(models, precision, slopes=True)
     pieces = [models[kind].pieces for kind in which]
     counts = {
         "columns": [len(each.parameters) + 1 for each in pieces],
@@ -84,7 +83,7 @@ def coupled_source_of(
         shortening="\n".join(writer.lines(traced(_shortening), ["too_far", "share"], indent=" " * 16)),
         **{name.lower(): writer.constant(getattr(coupling, name)) for name in names},
     )
-    return Source(text, numbers, places)
+    return Source(text, numbers)
 
 
 def _shortening(trace: Trace) -> Any:
@@ -94,19 +93,16 @@ def _shortening(trace: Trace) -> Any:
 
 def _described(
     models: Sequence[Described], precision: str, slopes: bool
-) -> tuple[list[dict[str, Any]], np.ndarray, np.ndarray]:
+) -> tuple[list[dict[str, Any]], np.ndarray]:
     """Return what a template needs of each model, and the tables of all of them."""
     writer, described = Writer(precision), []
-    all_real: list[np.ndarray] = []
-    all_whole: list[np.ndarray] = []
+    joined: list[np.ndarray] = []
     for pieces, points, moves in models:
         outputs = [f"next[{i}]" for i in range(pieces.states)] + [f"w[{i}]" for i in range(12 if slopes else 3)]
         block = _slopes_by_twist(pieces) if slopes else pieces.step
         lines = list(writer.lines(block, outputs, indent=" " * 12))
-        read = {name: each for name, each in pieces.tables.items() if any(f"{name}[" in line for line in lines)}
-        whole = {name: each for name, each in read.items() if each.dtype.kind == "i"}
-        real = dict(zip(("place_x", "place_y"), points.T, strict=True)) | {"share": pieces.tables["share"]}
-        real |= {name: each for name, each in read.items() if name not in whole}
+        tables = dict(zip(("place_x", "place_y"), points.T, strict=True)) | {"share": pieces.tables["share"]}
+        tables |= {name: each for name, each in pieces.tables.items() if any(f"{name}[" in line for line in lines)}
         described.append(
             {
                 "precision": precision,
@@ -116,12 +112,11 @@ def _described(
                 "tilt": tilt_of(pieces.count).replace("static ", "CUDA_CALLABLE ").replace(")\n{", ") const\n{"),
                 "ranges": [PARAMETERS[each][1] for each in pieces.parameters],
                 "largest": writer.constant(PRECISIONS[precision]),
-                "numbers": _placed(real, all_real),
-                "places": _placed(whole, all_whole),
+                "numbers": _placed(tables, joined),
                 "step": "\n".join(lines),
             }
         )
-    return described, _joined(all_real, float), _joined(all_whole, np.int32)
+    return described, np.concatenate(joined)
 
 
 def _slopes_by_twist(pieces: Pieces) -> Block:
@@ -148,7 +143,3 @@ def _placed(tables: dict[str, np.ndarray], joined: list[np.ndarray]) -> dict[str
         places[name] = sum(len(one) for one in joined)
         joined.append(each.ravel())
     return places
-
-
-def _joined(tables: list[np.ndarray], kind: type) -> np.ndarray:
-    return np.concatenate(tables or [np.zeros(0)]).astype(kind)

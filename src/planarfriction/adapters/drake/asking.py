@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction.adapters.drake.shadow import Shadow
-from planarfriction.coupling import CoupledPatches, HostStep
+from planarfriction.coupling import CoupledPatches, HostStep, lever_of
 from planarfriction.kernels.coupling import solve_batch
 
 PASSES = 12
@@ -61,7 +61,7 @@ class Asking:
         self._moments = np.zeros((k, 2, 6))
         """Maps of forces and their moments about the world's origin to the moments about the patches' origins."""
         self._touching, self._levers = [False] * k, np.ones(3 * k)
-        self._levers[2::3] = [math.sqrt((model.patch.positions**2).sum(axis=1).mean()) for model in coupled.models]
+        self._levers[2::3] = [lever_of(model) for model in coupled.models]
         self._rows, self._moved = np.zeros((3 * k, size)), np.zeros((size, 3 * k))
         """Jacobian of the twists `[3k, nv]`; velocities that wrenches cause without contact `[nv, 3k]`."""
 

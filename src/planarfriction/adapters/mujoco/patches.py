@@ -156,7 +156,8 @@ def _digest(patches: Sequence[PatchContact]) -> list[int]:
     found = hashlib.sha256()
     for each in patches:
         cells = each.model.patch
-        found.update(repr((each, each.model.law)).encode() + cells.positions.tobytes() + cells.areas.tobytes())
+        found.update(repr((each, each.model.law)).encode())
+        found.update(b"".join(numbers.tobytes() for numbers in (cells.positions, cells.radii, cells.areas)))
         if not cells.depends_on_load:
             found.update(cells.weights().tobytes())
     return np.frombuffer(found.digest(), ">u2", 4).tolist()

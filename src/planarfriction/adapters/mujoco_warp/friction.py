@@ -24,7 +24,7 @@ from planarfriction.adapters.mujoco.patches import (
     room_of,
 )
 from planarfriction.adapters.mujoco_warp.loops import geometry, responses
-from planarfriction.coupling import HostStep
+from planarfriction.coupling import HostStep, lever_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.warp import CoupledPatches
 
@@ -255,17 +255,16 @@ class Friction:
         """Return the numbers of the patches for kernels."""
         names = "site", "own", "other", "owner", "support", "at_contact"
         rows = [(p.site, p.own, p.other, p.bodies[1], p.bodies[0], int(p.at_contact)) for p in self.placed]
-        device, positions = self.coupled.device, [each.model.patch.positions for each in self.patches]
+        device, levers = self.coupled.device, [lever_of(each.model) for each in self.patches]
         columns = zip(names, zip(*rows, strict=True), strict=True)
         found = {name: wp.array(each, dtype=int, device=device) for name, each in columns}
-        radius = np.array([np.sqrt((each**2).sum(1).mean()) for each in positions])
         return _filled(
             geometry.Patches(),
             {
                 **found,
                 "count": len(self.patches),
                 "states": self.coupled.state_shape[0],
-                "radius": wp.array(radius, dtype=float, device=device),
+                "radius": wp.array(levers, dtype=float, device=device),
             },
         )
 

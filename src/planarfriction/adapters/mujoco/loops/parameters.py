@@ -55,16 +55,15 @@ def displacement_of(own, m, p):
 
 @kernel
 def write_laws(own, m, patches, problem, place):
-    """Let the pieces act with the laws of the model, in copies of their records behind the address `place`."""
-    for c in range(patches.pieces):
-        p = patches.owners[c]
+    """Let the patches act with the laws of the model, in copies of their records behind the address `place`."""
+    for p in range(patches.count):
         if integers(own.laws)[p] == 0:
             continue
-        words, record, copied = integers(own.record_words)[c], integers(problem.records[c]), integers(place)
+        words, record, copied = integers(own.record_words)[p], integers(problem.records[p]), integers(place)
         for i in range(words):
             copied[i] = record[i]
         law, q = doubles(place), parameters_of(own, m, p)
         for i in range(len(_PLACES)):
             law[_PLACES[i]] = q[i]
-        problem.records[c] = place
+        problem.records[p] = place
         place = at(place, words)

@@ -106,7 +106,7 @@ class Scratch(NamedTuple):
     problem: Doubles
     """Words of a `coupling_rows.Problem`."""
     records: Integers
-    """Records of the pieces with the laws of the model (see `parameters.write_laws`)."""
+    """Records of the patches with the laws of the model (see `parameters.write_laws`)."""
     jacobian: Doubles
     """Jacobian of the twists, [3k, nv]."""
     inertia: Doubles
@@ -151,7 +151,7 @@ Places = offsets_of(Scratch)
 def scratch_layout(words: int, records: int, k: int, nv: int) -> Layout:
     """Return the layout of `Scratch` without its rows for constraints, for k patches.
 
-    `words` are those of a problem, `records` those of the records of all pieces.
+    `words` are those of a problem, `records` those of the records of all patches.
     """
     n = 3 * k
     shapes = {
@@ -219,7 +219,7 @@ class Host(NamedTuple):
     laws: int
     """Address of flags: 1 where the law of a patch has the numbers of `LawNumbers`, int [k]."""
     record_words: int
-    """Address of the words of the record of each piece, int [pieces]."""
+    """Address of the words of the record of each patch, int [count]."""
     free_count: int
     """Number of free joints."""
     free_joints: int
