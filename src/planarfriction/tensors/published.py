@@ -1,6 +1,6 @@
 """The published reduced model over `xp`: a bristle `[..., 3]` that steps as `kernels.bristle_step` says.
 
-State and twist are `[..., 3]`; the parameters of law and shape and time steps are `[..., 1]`, or plain numbers.
+State and twist are `[..., 3]`; the parameters of law and shape and time steps are `[..., 1, 1]`, or plain numbers.
 """
 
 from __future__ import annotations
@@ -10,10 +10,9 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from planarfriction import formulas, models
-from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import compiled_math
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import bristle_step
-from planarfriction.kernels import law as law_numbers
 from planarfriction.kernels.bristle_step import seen
 from planarfriction.kernels.vectors import norm, plus
 from planarfriction.laws import FrictionLaw
@@ -21,7 +20,7 @@ from planarfriction.limit_surface import LimitSurface
 from planarfriction.models.reduced_published import PublishedShape
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import surfaces
-from planarfriction.tensors.elements import over
+from planarfriction.tensors.elements import Vector, joined, over, split
 
 
 class PublishedNumbers(NamedTuple):
@@ -41,7 +40,7 @@ class PublishedNumbers(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """Velocities that drive the bristle in scaled coordinates, `[..., 3]`, and numbers `[..., 1]`."""
+    """Velocities that drive the bristle in scaled coordinates, `[..., 3, 1]`, and numbers `[..., 1, 1]`."""
 
     velocity: Any
     """`u = h(V) v_n` [m/s]"""
@@ -69,7 +68,7 @@ def values_of(law: FrictionLaw, shape: PublishedShape) -> dict[str, float]:
 
 
 def numbers_of(xp, values: Mapping[str, Any], surface: Any, root: Any) -> PublishedNumbers:
-    """Return a shape at values of its parameters `[..., 1]`; `surface` has the `kind`, `size` and `data` of its law."""
+    """Return a shape at values of its parameters `[..., 1, 1]`; `surface` has the `kind`, `size` and `data` of its law."""
     own = {name: values[name] for name in PublishedNumbers._fields[:4]}
     sliding = functools.partial(surfaces.sliding, xp, surface.kind, surface.size, surface.data)
     return PublishedNumbers(**own, surface=sliding, root=root)
@@ -81,7 +80,7 @@ def _through(root, x, y):
 
 def centre(shape: PublishedNumbers) -> tuple[Any, Any]:
     """Return the centre of pressure [m]."""
-    x, y = shape.centre_x[..., 0], shape.centre_y[..., 0]
+    x, y = shape.centre_x[..., 0, 0], shape.centre_y[..., 0, 0]
     if shape.root is None:
         return x, y
     (a, b), (_, d) = shape.root
@@ -90,70 +89,66 @@ def centre(shape: PublishedNumbers) -> tuple[Any, Any]:
 
 
 def scale(xp, shape: PublishedNumbers):
-    """Return `S = diag(1, 1, r)` as a vector `[..., 3]`: bristles are scaled by 1/S for a step, their rates by S."""
+    """Return `S = diag(1, 1, r)` as a vector `[..., 3, 1]`: bristles are scaled by 1/S for a step, their rates by S."""
     one = xp.ones_like(shape.contact_radius)
-    return _vector(xp, one, one, shape.contact_radius)
-
-
-def _vector(xp, x, y, s):
-    """Return components `[..., 1]`, which broadcast, as a vector `[..., 3]`."""
-    return xp.concatenate(xp.broadcast_arrays(x, y, s), -1)
+    return joined(xp, (one, one, shape.contact_radius))
 
 
 # ---------------------------------------------------------------------- steps
 
 
-def split(state) -> tuple[Any]:
-    """Return a state as a tuple of arrays: one."""
-    return (state,)
+def wide(state):
+    """Return a state as a bristle `[..., 3, 1]`."""
+    return state[..., None]
 
 
-def joined(xp, z: tuple[Any]):
-    """Return a state of a tuple of arrays."""
-    return z[0]
+def narrow(z):
+    """Return a bristle `[..., 3, 1]` as a state."""
+    return z[..., 0]
 
 
 def drive(xp, law: LawNumbers, shape: PublishedNumbers, twist) -> Drive:
     """Return the drive of the bristle at a twist."""
-    vx, vy, omega = twist[..., 0:1], twist[..., 1:2], twist[..., 2:3]
+    vx, vy, omega = split(wide(twist))
     vx, vy = _through(shape.root, vx, vy)
     vx, vy = vx - omega * shape.centre_y, vy + omega * shape.centre_x
-    scaled = _vector(xp, vx, vy, shape.contact_radius * omega)
-    speed = xp.norm(scaled, -1)
-    u = shape.surface(scaled, speed)
-    u_norm = xp.norm(u, -1)
+    scaled = joined(xp, (vx, vy, shape.contact_radius * omega))
+    speed = xp.norm(scaled, -2)
+    u = wide(shape.surface(narrow(scaled), narrow(speed)))
+    u_norm = xp.norm(u, -2)
     slides = u_norm > 0.0
     per_h = xp.where(slides, speed, 1.0) / xp.where(slides, u_norm, 1.0)
-    grip = over(xp)(law_numbers.grip)(law, speed)
-    return Drive(u, speed, per_h, grip, _vector(xp, vx, vy, shape.second_moment * omega))
-
-
-def evaluate(xp, law: LawNumbers, shape: PublishedNumbers, z, by: Drive):
-    """Return the rate of the bristle, and the wrench per unit load."""
-    s = scale(xp, shape)
-    rate = s * over(xp)(_rate)(law, z[0] / s, *by[:4])
-    return (rate,), pull(xp, law, z[0], rate, by)
+    viscous = joined(xp, (vx, vy, shape.second_moment * omega))
+    return Drive(u, speed, per_h, law.sigma_0 / formulas.stribeck(xp, speed, law), viscous)
 
 
 def _rate(law, z, u, speed, per_h, grip):
     """Return z' of the scaled bristle."""
     deflection, along = seen(z, norm(z), u, per_h, grip)
-    return plus(u, -formulas.bristle_decay(xp, deflection, along, speed, grip, law), z)
+    return plus(u, -formulas.bristle_decay(compiled_math, deflection, along, speed, grip, law), z)
+
+
+def evaluate(xp, law: LawNumbers, shape: PublishedNumbers, z, by: Drive):
+    """Return the rate of the bristle, and its pull (see `pull`)."""
+    s = scale(xp, shape)
+    rate = s * over(xp)(_rate)(law, Vector(z / s), Vector(by.velocity), *by[1:4]).array
+    return rate, pull(law, z, rate, by)
 
 
 def advance(xp, law: LawNumbers, shape: PublishedNumbers, z, by: Drive, dt):
-    """Return the bristle after `dt` of a constant twist, and the wrench per unit load."""
-    s, (u, speed, per_h, grip, _) = scale(xp, shape), by
-    new, k = over(xp)(bristle_step.step)(law, z[0] / s, u, speed, per_h, grip, dt)
-    return (s * new,), pull(xp, law, s * new, s * (u - k * new), by)
+    """Return the bristle after `dt` of a constant twist, and its pull (see `pull`)."""
+    s = scale(xp, shape)
+    new, k = over(xp)(bristle_step.step)(law, Vector(z / s), Vector(by.velocity), *by[1:4], dt)
+    rate = by.velocity - k * new.array
+    return s * new.array, pull(law, s * new.array, s * rate, by)
 
 
-def pull(xp, law: LawNumbers, z, rate, by: Drive):
-    """Return the wrench per unit load about the centre of pressure, in the axes of the metric."""
-    return (formulas.traction(z, rate, by.viscous, law),)
+def pull(law: LawNumbers, z, rate, by: Drive):
+    """Return the wrench per unit load about the centre of pressure, in the axes of the metric, `[..., 3, 1]`."""
+    return formulas.traction(z, rate, by.viscous, law)
 
 
 def wrench(xp, shape: PublishedNumbers, pull):
     """Return the wrench about the origin per unit load `[..., 3]`."""
-    fx, fy, tau = (pull[0][..., k : k + 1] for k in range(3))
-    return _vector(xp, *_through(shape.root, fx, fy), tau + shape.centre_x * fy - shape.centre_y * fx)
+    fx, fy, tau = split(pull)
+    return narrow(joined(xp, (*_through(shape.root, fx, fy), tau + shape.centre_x * fy - shape.centre_y * fx)))
