@@ -64,7 +64,8 @@ def test_closed_forms_of_discs_add_up():
     pair = pf.LimitSurfaceExact(pf.ContactPatch([[0.0, 0.0], [d, 0.0]], [1e-4, 1e-4], radii=[a, a]))
     far = pf.LimitSurfaceExact(pf.ContactPatch([[d, 0.0]], [1e-4], radii=[a]))
     wrench = pair.wrench((0.0, 0.0, 1.0))
-    assert wrench == pytest.approx(0.5 * far.wrench((0.0, 0.0, 1.0)) - [0.0, 0.0, 0.5 * 2 / 3 * a], rel=1e-12, abs=1e-15)
+    wanted = 0.5 * far.wrench((0.0, 0.0, 1.0)) - [0.0, 0.0, 0.5 * 2 / 3 * a]
+    assert wrench == pytest.approx(wanted, rel=1e-12, abs=1e-15)
 
 
 def test_the_disc_of_an_outline_is_one_disc():

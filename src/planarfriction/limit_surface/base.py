@@ -150,7 +150,7 @@ class LimitSurface(ByValue):
 
     @functools.cached_property
     def _scaled_levers(self) -> tuple[np.ndarray, np.ndarray]:
-        """Maps from scaled twists to what the loaded cells see, `[n, 2, 3]` (of discs `[n, 3, 3]`), and their weights."""
+        """Maps from scaled twists to what the loaded cells see, `[n, 2, 3]` (discs: `[n, 3, 3]`), and their weights."""
         x, y, weights = self._loaded_cells()
         loaded = self.patch.weights(self.normal_force) > 0.0
         root = None if self._one_metric else self.patch.root[loaded]  # pyright: ignore[reportOptionalSubscript]

@@ -76,7 +76,7 @@ def _parts(units: np.ndarray, levers: np.ndarray) -> list[np.ndarray]:
 
 
 def _direction(levers: np.ndarray, weights: np.ndarray, heading: np.ndarray) -> np.ndarray:
-    """Return `h` `[m, 3]` of headings `[m, n, 2 or 3]`: sums that run over the cells alike for one twist and for many."""
+    """Return `h` `[m, 3]` of headings `[m, n, 2 or 3]`: sums over the cells are the same for one twist as for many."""
     pull = np.ascontiguousarray((weights[:, None, None] * levers).reshape(-1, 3).T)
     return np.einsum("mk,dk->md", heading.reshape(-1, pull.shape[1]), pull)
 
