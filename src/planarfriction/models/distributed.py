@@ -44,7 +44,7 @@ class DistributedModel(FrictionModel):
     @property
     def state_shape(self) -> tuple[int, ...]:
         """`(2, N)` for the N cells that can carry load; `(3, N)` for discs."""
-        return (3 if self.patch.has_discs else 2, len(self.patch.positions))
+        return (self.patch.bristles, len(self.patch.positions))
 
     @functools.cached_property
     def compiled(self) -> CompiledDistributed:
