@@ -1,4 +1,4 @@
-"""Beyond the paper: exact surfaces, `ReducedModel`, few cells, loads and grooves, each against our own reference."""
+"""Beyond the paper: exact surfaces, few discs, loads and grooves, each against our own reference."""
 
 from __future__ import annotations
 
@@ -75,20 +75,23 @@ def test_the_exact_surface_is_the_limit_of_ever_finer_sums():
     assert misses[1] < misses[0] / 2.0 and misses[2] < misses[1] / 2.0
 
 
-def test_moments_are_nearer_than_the_published_one(result):
+def test_discs_are_nearer_than_the_published_model(result):
     assert set(result.numbers["driven"]) == set(beyond.QUICK_SHAPES)
-    for ratios in (*result.numbers["driven ratios"].values(), *result.numbers["driven ratios, auto"].values()):
-        # found: medians up to 0.13, third quartiles to 0.15, maxima to 0.93; 1 is a model that is no better
-        assert ratios["median"] < 0.25 and ratios["third quartile"] < 0.4
-        assert ratios["maximum"] < 1.0 and ratios["torque maximum"] < 1.0
     for ratios in result.numbers["driven ratios"].values():
-        assert ratios["torque median"] < 0.05
+        # 1 is a model that is no better: a thin line slides on the published table within 4 mN of 1 N most of the time
+        assert ratios["maximum"] < 0.6 and ratios["torque maximum"] < 0.6 and ratios["torque third quartile"] < 0.25
 
 
-def test_parts_beat_the_published_model_on_patches_of_no_table(result):
+def test_a_disc_for_every_cell_is_nearer_than_points_of_the_same_cells(result):
+    for each in result.numbers["driven"].values():
+        for name in ladder.STATISTICS:
+            assert each[ladder.ALL][name] < each["full"][name]
+
+
+def test_discs_beat_the_published_model_on_patches_of_no_table(result):
     for each in result.numbers["new shapes"].values():
-        for ratios in each[ladder.AUTO].values():
-            assert max(ratios) < 1.0
+        for ratios in each["reduced"].values():
+            assert max(ratios) < 0.6
 
 
 def test_a_table_of_the_exact_surface_is_nearer_than_the_sum_over_cells(result):
@@ -104,7 +107,7 @@ def test_plateaus(result):
     expected = angles["closed form"] * moment / radius**2
     assert angles["published reduced"] == pytest.approx(expected, rel=0.03)
     swapped = angles | {"ReducedModel": angles["published reduced"]}
-    assert [row.holds for row in contacts.plateau_comparisons(swapped)] == [False, False]
+    assert [row.holds for row in contacts.plateau_comparisons(swapped)] == [True, False]
 
 
 def test_a_drift_a_tenth_of_a_degree_off_would_be_noticed(result):
@@ -115,18 +118,19 @@ def test_a_drift_a_tenth_of_a_degree_off_would_be_noticed(result):
 
 
 def test_soft_finger(result):
-    family = result.numbers["load family"]
-    assert family["maps"] > 1
-    assert family["force from rebuilding [N]"] < 4e-3
-    assert family["torque from rebuilding [N m]"] < 4e-5
+    found = result.numbers["soft finger"]
+    assert found["reduced [m]"] < 1e-5
+    # discs stay where they are while their shares follow the load
+    assert found["steady force [N]"] < 6e-2
+    assert found["steady torque [N m]"] < 6e-4
 
 
 def test_in_hand_ends_are_those_of_two_simulations(result):
     case = Case("LineGrad", 2)
     ends = result.numbers["in hand"][case.words]
-    assert ends["reduced"] == 0.0 < ends["one part"] < ends["published"]  # 21 cells all have bristles
+    assert ends["reduced"] == ends[ladder.ALL] < ends["published"]  # 21 cells are 21 discs
     rows = ladder.in_hand_rows((case,))
-    assert {row.model: row.errors["end"] for row in rows}["one part"] == pytest.approx(ends["one part"], rel=1e-9)
+    assert {row.model: row.errors["end"] for row in rows}["reduced"] == pytest.approx(ends["reduced"], rel=1e-9)
     assert ends[ladder.SHIFT] == pytest.approx(ladder.friction_shift(case), rel=1e-9)
 
 
@@ -138,12 +142,11 @@ def test_every_published_in_hand_run_is_there():
     assert all(len(ladder.cases_of(shape)) % 2 == 0 for shape in beyond.SHAPES)
 
 
-def test_few_cells_are_a_rung_between_three_bristles_and_the_grid(result):
+def test_few_discs_are_a_rung_between_three_bristles_and_the_grid(result):
     ends = result.numbers["in hand"][f"{IN_WORDS['NonConvex2']}, load 1"]
-    for few in ("degree 5", "reduced"):
-        assert ends[few] < 0.1 * min(ends["one part"], ends["published"])
-        # few cells are off by less than 0.1 % of friction would do, three bristles by more, but less than 2 % would
-        assert ends[few] < ends[ladder.SHIFT] < ends["one part"] < 20.0 * ends[ladder.SHIFT]
+    assert ends["reduced"] < 0.1 * ends["published"]
+    # few discs are off by less than 0.1 % of friction would do, three bristles by more
+    assert ends["reduced"] < ends[ladder.SHIFT] < ends["published"]
 
 
 def test_score_counts_by_load():
@@ -193,12 +196,3 @@ def test_the_ladder_draws_every_family_that_was_run(result):
     for axes in figure.axes:
         (first, last), (left, right) = axes.dataLim.intervalx, axes.get_xlim()
         assert np.log(right / left) < 2.0 * np.log(last / first)  # an axis of times without an empty half
-
-
-def test_parts_are_looked_at_as_many_as_auto_takes(result):
-    for shape in beyond.QUICK_SHAPES:
-        models = ladder.models(shape)
-        assert models[ladder.AUTO] is models["6 parts"]
-        assert len(models["16 parts"].rest()) == 16
-    for each in result.numbers["in hand"].values():
-        assert each[ladder.AUTO] == each["6 parts"]

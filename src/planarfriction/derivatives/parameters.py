@@ -16,7 +16,7 @@ from planarfriction.geometry import transformed
 from planarfriction.kernels import cells_rollout, cells_sensitivities, disc_passes, published_step
 from planarfriction.kernels.cell_blocks import divided
 from planarfriction.kernels.law import LAW
-from planarfriction.kernels.published_rollouts import gradient, rollout
+from planarfriction.kernels.published_rollouts import gradient, rollout, sensitivities, tangent
 from planarfriction.kernels.rollouts import Inputs
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModelPublished
@@ -65,8 +65,8 @@ PUBLISHED = Family(
     np.array([published_step.NAMES.index(name) for name in PARAMETERS]),
     rollout,
     gradient,
-    published_step.sensitivities,
-    published_step.tangent,
+    sensitivities,
+    tangent,
 )
 """`ReducedModelPublished`."""
 

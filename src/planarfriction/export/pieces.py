@@ -161,7 +161,7 @@ def _sliding_of_disc(u: Any) -> Any:
     size = norm((u[0], u[1], spin))
     turned = ratio(spin, size)
     turned = turned * turned
-    c_t, c_s, m = formulas.disc_friction(xp, 1.0 - turned, turned)
+    c_t, c_s, m = formulas.disc_friction(xp, 1.0 - turned, turned, 0.0)
     return c_t, c_s, size * math.sqrt(1.0 - turned + m * turned), (c_t * u[0], c_t * u[1], c_s * u[2])
 
 

@@ -27,8 +27,6 @@ from planarfriction.kernels.vectors import norm
 KAPPA = math.sqrt(0.5)
 """Radius of gyration of a disc, over its radius."""
 
-REST = formulas.DISC_REST
-
 STILL = 1e-100
 """Speed [m/s] up to which the ratio of two speeds counts as that at rest: its slopes leave the range of numbers."""
 
@@ -37,7 +35,7 @@ STILL = 1e-100
 def sliding(u):
     """Return `c_t`, `c_s`, the mean speed S, and W."""
     slide, spin = u[0] * u[0] + u[1] * u[1], 2.0 * u[2] * u[2]
-    c_t, c_s, m = formulas.disc_friction(xp, slide, spin, REST)
+    c_t, c_s, m = formulas.disc_friction(xp, slide, spin)
     return c_t, c_s, math.sqrt(slide + m * spin), (c_t * u[0], c_t * u[1], c_s * u[2])
 
 

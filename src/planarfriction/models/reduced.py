@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
 from typing import Any, ClassVar, Self
 
@@ -40,12 +41,6 @@ class ReducedModel(FrictionModel):
     _: KW_ONLY
     cells: int = 24
     """Number of discs that stand for the patch."""
-
-    def __new__(cls, *_given: Any, **options: Any) -> Self:
-        for name in cls.REPLACED:
-            if name in options:
-                raise InvalidValueError(name, "be left out: write cells=, the number of discs", options[name])
-        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -87,6 +82,22 @@ class ReducedModel(FrictionModel):
 
     def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:
         return _of_discs(self.reduction.patch, self.patch, deflections, load)
+
+
+def _refusing_replaced(init: Callable[..., None]) -> Callable[..., None]:
+    """Return the constructor of `ReducedModel` with one clear line for options that were replaced."""
+
+    @functools.wraps(init)
+    def checked(self: ReducedModel, *given: Any, **options: Any) -> None:
+        for name in self.REPLACED:
+            if name in options:
+                raise InvalidValueError(name, "be left out: write cells=, the number of discs", options[name])
+        init(self, *given, **options)
+
+    return checked
+
+
+ReducedModel.__init__ = _refusing_replaced(ReducedModel.__init__)
 
 
 def _of_discs(few: ContactPatch, patch: ContactPatch, deflections: np.ndarray, load: float) -> np.ndarray:

@@ -13,7 +13,7 @@ from planarfriction.compiled.published import CompiledPublished
 from planarfriction.compiled.remembered import Remembered
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.moments import slopes_in
+from planarfriction.kernels.published_contact import slopes_in
 from planarfriction.kernels.surfaces import ELLIPSOID
 from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import refuse_rate_law

@@ -280,7 +280,8 @@ class ContactPatch(Moments):
         The disc of a cell has its second moment, `a^2/2 = (s_x^2 + s_y^2)/12` (length only on lines; points stay
         points), and so has the disc of many cells: load, centre of pressure and second moment of the patch are kept.
         Symmetric patches have symmetric discs, n or a few less; cells of different friction metric or asymmetry never
-        share a disc, so that there are at least as many as kinds of them. Raises InvalidValueError for n below 1.
+        share a disc, so that there are at least as many as kinds of them. A patch whose shape depends on the load has
+        up to `2 n`, with the moments of its cells at each load. Raises InvalidValueError for n below 1.
         """
         from planarfriction.patch.discs import discs
 

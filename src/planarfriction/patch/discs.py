@@ -15,16 +15,24 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from planarfriction import formulas, validation
+from planarfriction import validation
+from planarfriction.patch.disc_friction import disc_friction
 from planarfriction.patch.outline import with_outline
 from planarfriction.patch.pressure import PerCell
-from planarfriction.patch.shared import SharedPressure, loads_of_change
+from planarfriction.patch.shared import SharedPressure, mean_weights
 
 if TYPE_CHECKING:
     from planarfriction.patch.contact_patch import ContactPatch
 
 REMEMBERED = 8
 """Patches whose discs are kept: choosing them takes longer than a short run, and models with other laws ask again."""
+
+OF_ALL_LOADS = 2
+"""Times as many discs stand for a patch whose shape depends on the load.
+
+Steady friction of a Hertz contact at 0.5 to 10 N differs from that of fine cells by 0.3 to 1.6 % rms of `mu f_N` with
+48 discs, by 0.6 to 2 % with 24, and by 0.2 to 0.3 % with 24 that are chosen for one load.
+"""
 
 SAME = 1e-9
 """Relative difference of positions, shares and second moments below which they are the same."""
@@ -57,6 +65,7 @@ PLACES = 40
 def discs(patch: ContactPatch, n: Any) -> ContactPatch:
     """Implement `ContactPatch.discs`."""
     n = patch.cells if n is None else validation.count("n", n)
+    n = OF_ALL_LOADS * n if patch.depends_on_load else n
     return _own_discs(patch) if patch.cells <= n else _few_discs(patch, n)
 
 
@@ -76,7 +85,7 @@ def _few_discs(patch: ContactPatch, n: int) -> ContactPatch:
 
     cells = _own_discs(patch)
     places, root_scale = np.stack(cells.lever_coordinates(*cells.positions.T), -1), _ratio(cells)
-    weights = cells.weights(loads_of_change(cells)).mean(axis=0) if cells.depends_on_load else cells.weights()
+    weights = mean_weights(cells)
     squares = 0.5 * cells.lever_radii**2
     groups, parts = _kinds(cells), []
     for group, count in zip(groups, _counts(places, weights, groups, n), strict=True):
@@ -89,12 +98,13 @@ def _few_discs(patch: ContactPatch, n: int) -> ContactPatch:
     members = np.concatenate([part.cells for part in parts])[order]
     parted = np.concatenate([part.parted for part in parts])[order]
     begins = np.searchsorted(labels[order], np.arange(start[-1]))
-    areas = np.add.reduceat(cells.areas[members] * parted, begins)
-    shared = SharedPressure(cells, members, parted, begins, areas)
+    radii = np.concatenate([part.radii for part in parts]) / root_scale[first]
+    shared = SharedPressure(cells, members, parted, begins, radii)
+    areas = shared.sums(cells.areas)
     fields = {
         "metric": None if cells.metric is None else np.broadcast_to(cells.metric, (cells.cells, 2, 2))[first],
         "asymmetry": None if cells.asymmetry is None else cells.asymmetries()[first],
-        "radii": np.concatenate([part.radii for part in parts]) / root_scale[first],
+        "radii": radii,
     }
     if len(groups) == 1:
         fields |= {name: None if fields[name] is None else fields[name][0] for name in ("metric", "asymmetry")}
@@ -372,9 +382,7 @@ def _pulls(places: np.ndarray, radii: np.ndarray, centres: np.ndarray) -> np.nda
     """Return friction `[K, n, 3]` per share of load against unit spins about K centres; a disc has its own torque."""
     x, y = places.T
     ux, uy = -(y - centres[:, 1:]), x - centres[:, :1]
-    slide, spin = ux**2 + uy**2, np.broadcast_to(radii**2, ux.shape)
-    c_t, c_s, m = formulas.disc_friction(np, slide, spin)
-    speed = np.sqrt(slide + m * spin)
+    c_t, c_s, speed = disc_friction(ux**2 + uy**2, radii**2)
     per_speed = np.divide(1.0, speed, out=np.zeros_like(speed), where=speed > 0.0)
     fx, fy = c_t * ux * per_speed, c_t * uy * per_speed
-    return np.stack([fx, fy, x * fy - y * fx + 0.5 * c_s * spin * per_speed], -1)
+    return np.stack([fx, fy, x * fy - y * fx + 0.5 * c_s * radii**2 * per_speed], -1)

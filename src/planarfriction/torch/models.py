@@ -172,6 +172,8 @@ class ReducedModel(DistributedModel):
         cells: int = Reference.cells,
         **options: Any,
     ):
-        self.refuse(patch, law, "torch.ReducedModel", options)
-        super().__init__(Reference(patch, law, cells=cells).reduction.patch, law, normal_force, **options)
+        self.refuse(patch, law, "torch.ReducedModel")
+        replaced = {name: options.pop(name) for name in Reference.REPLACED if name in options}
+        discs = Reference(patch, law, cells=cells, **replaced).reduction.patch
+        super().__init__(discs, law, normal_force, **options)
         self.patch = patch

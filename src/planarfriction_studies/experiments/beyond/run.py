@@ -20,6 +20,12 @@ SHAPES, QUICK_SHAPES, QUICK_TWISTS = (*SIX_SHAPES, "LineGradX"), ("LineGrad", "N
 NEW_SHAPES, QUICK_NEW_SHAPES, QUICK_SEEDS = tuple(new_shapes.SHAPES), ("three feet",), (0, 1)
 
 
+SHOWN, UNSEEN = ("8 discs", "reduced", ladder.ALL), ("8 discs", "16 discs", "reduced", "64 discs")
+"""Models of the findings: on the published patches, and on those that no table holds."""
+
+MODELS_OF_DISCS = (*(f"{count} discs" for count in ladder.DISCS), "reduced", ladder.ALL)
+
+
 def run(work: Work) -> Result:
     """Carry out the experiment."""
     shapes = QUICK_SHAPES if work.quick else SHAPES
@@ -33,7 +39,7 @@ def run(work: Work) -> Result:
             ("plateaus", ""): contacts.plateaus,
             ("grooves", ""): partial(contacts.grooves, work.quick),
             ("staircase", ""): surfaces.staircase,
-            ("soft finger", ""): partial(contacts.load_family, work.quick),
+            ("soft finger", ""): partial(contacts.soft_finger, work.quick),
         }
         | {("spin-up", shape): partial(ladder.spin_up, shape) for shape in six}
         | {("new shapes", name): partial(new_shapes.largest_errors, name, seeds) for name in new},
@@ -58,7 +64,7 @@ def run(work: Work) -> Result:
         "jumps": surfaces.jumps(stairs),
         "plateaus": found["plateaus", ""],
         "grooves": {name: values.tolist() for name, values in found["grooves", ""].items()},
-        "load family": found["soft finger", ""],
+        "soft finger": found["soft finger", ""],
         "step": costs,
         "spin-up": of("spin-up"),
         "new shapes": {name: new_shapes.ratios(each) for name, each in unseen.items()},
@@ -97,7 +103,7 @@ def _runs_of(shape: str) -> Numbers:
 def _ends_figure(ends: Numbers) -> Any:
     """Draw the ends of the in-hand runs, and how far a change of friction moves them."""
     words = ladder.ENDS | {ladder.SHIFT: "0.1 % of friction"}
-    colours = (looks.REDUCED, looks.FEW, looks.MOMENTS, looks.OTHERS[3], looks.PARTS)
+    colours = (looks.REDUCED, looks.OTHERS[1], looks.FEW, looks.OTHERS[0])
     return end_shifts(
         {case: {words[name]: each[name] for name in words} for case, each in ends.items()},
         dict(zip(ladder.ENDS.values(), colours, strict=True)),
@@ -119,13 +125,12 @@ def _numbers(rows: list[ladder.Row], shifts: dict[str, float], errors: Numbers) 
         },
         "quartic installed": surfaces.has_quartic(),
         "driven": moved,
-        "driven ratios": ladder.ratios(moved, "one part"),
-        "driven ratios, auto": ladder.ratios(moved, ladder.AUTO),
-        "driven ratios, parts": ladder.ratios(moved, ladder.AUTO, "one part"),
+        "driven ratios": ladder.ratios(moved, "reduced"),
+        "driven ratios, all": ladder.ratios(moved, ladder.ALL),
         "in hand": ends,
         "in hand score": {
             model: {f"load {load}": ladder.score(ends, load, model) for load in (1, 2)}
-            for model in ("reduced", "one part", ladder.AUTO)
+            for model in SHOWN
         },
         # median over all runs of the time in the solver over that of the distributed model
         "run costs": {name: float(np.median([row.time for row in rows if row.model == name])) for name in models},
@@ -140,10 +145,7 @@ def _numbers(rows: list[ladder.Row], shifts: dict[str, float], errors: Numbers) 
 def _template_values(numbers: Numbers) -> Numbers:
     """Return the values that the template names."""
     exact, ends, drifts, unseen = (numbers[name] for name in ("surfaces", "in hand", "grooves", "new shapes"))
-    few = [each for each in ends.values() if "degree 5" in each]
-    moved = [each for each in numbers["driven"].values() if "degree 5" in each]
-    one, auto, over = (numbers[f"driven ratios{ending}"] for ending in ("", ", auto", ", parts"))
-    worse = {IN_WORDS[shape]: [name for name, value in each.items() if value > 1.05] for shape, each in over.items()}
+    ratios = {"reduced": numbers["driven ratios"], ladder.ALL: numbers["driven ratios, all"]}
     misses = [np.subtract(drifts[kind], drifts["closed form"]) for kind in contacts.GROOVED_MODELS]
     return {
         "nearer": {
@@ -152,32 +154,35 @@ def _template_values(numbers: Numbers) -> Numbers:
         },
         "fitted": [IN_WORDS[shape] for shape in surfaces.QUARTIC_SHAPES if shape in exact],
         "driven": {
-            "shapes": len(one),
-            "one": _by_statistic(one),
-            "auto": _by_statistic(auto),
-            "worse": {shape: names for shape, names in worse.items() if names},
+            "shapes": len(numbers["driven"]),
+            "ratios": {model: _by_statistic(each) for model, each in ratios.items()},
         },
         "unseen": {
             "twists": len(next(iter(unseen.values()))["reduced"]["force"]),
             "worst": {
                 model: {name: max(max(each[model][name]) for each in unseen.values()) for name in new_shapes.QUANTITIES}
-                for model in ("reduced", "one part", "4 parts", ladder.AUTO)
+                for model in UNSEEN
             },
         },
         "held": {
             model: {load: _score(each) for load, each in found.items()}
             for model, found in numbers["in hand score"].items()
         },
-        "friction": {
-            model: _friction_shares(ends, model) for model in ("reduced", "one part", ladder.AUTO, "published")
-        },
-        "furthest": {model: max(each[model] for each in ends.values()) for model in ("reduced", "published")},
-        "few": {
-            model: max(each[model] for each in few)
-            for model in ("degree 5", "published", "reduced", "one part", ladder.AUTO, "16 parts")
-        },
-        "quartile": [each["degree 5"]["third quartile"] / each["full"]["third quartile"] for each in moved],
+        "friction": {model: _friction_shares(ends, model) for model in (*SHOWN, "published")},
+        "furthest": {model: max(each[model] for each in ends.values()) for model in ("published", *SHOWN)},
+        "discs": {model: _over_all(numbers, model) for model in MODELS_OF_DISCS},
         "grooves": {"models": len(misses), "miss": float(np.abs(misses).max())},
+    }
+
+
+def _over_all(numbers: Numbers, model: str) -> Numbers:
+    """Return what discs cost and how far they are off, on the patches that have more cells than any number of them."""
+    moved, ends = ([each for each in numbers[name].values() if "64 discs" in each] for name in ("driven", "in hand"))
+    return {
+        "driven": float(np.median([each[model]["third quartile"] / each["published"]["third quartile"] for each in moved])),
+        "largest": float(np.median([each[model]["maximum"] / each["published"]["maximum"] for each in moved])),
+        "end": max(each[model] for each in ends),
+        "time": numbers["run ratios"][model][0],
     }
 
 
