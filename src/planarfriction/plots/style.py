@@ -86,10 +86,7 @@ def new_figure(width: float, height: float) -> PlotFigure:
 
 def model_colour(model: Any) -> str | None:
     """Return the colour of a friction model; None if it is not one of the library's."""
-    name = MODELS.name_of(model)
-    if name == "reduced" and model.parts is not None:
-        return PARTS if model.parts > 1 else MOMENTS
-    return OF_MODEL.get(name or "")
+    return OF_MODEL.get(MODELS.name_of(model) or "")
 
 
 def show_lengths(axes: Any, largest: float) -> None:
