@@ -35,6 +35,8 @@ class DistributedModel(FrictionModel):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.patch.has_discs:
+            refuse_rate_law(self.law, "patches of discs (dataclasses.replace(patch, radii=None) has points)")
         if self.patch.asymmetric:
             refuse_creep(self.law, "patches with an asymmetry")  # at rest they would push
             refuse_rate_law(self.law, "patches with an asymmetry")
