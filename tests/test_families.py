@@ -186,7 +186,7 @@ def test_laws_by_kind(tmp_path, table, law):
         ),
         (
             "law = {}\nmodel = { kind = 'reduced', parts = 4 }\n",
-            "[contact.model]: parts must be left out: write cells=, the number of cells that have bristles, got 4",
+            "[contact.model]: parts must be left out: write cells=, the number of discs, got 4",
         ),
     ],
 )

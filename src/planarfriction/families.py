@@ -116,7 +116,7 @@ MODELS = Family(
     "model",
     {
         "distributed": ("a bristle in every cell", "models.distributed:DistributedModel"),
-        "reduced": ("bristles on a few cells", "models.reduced:ReducedModel"),
+        "reduced": ("bristles on a few small discs", "models.reduced:ReducedModel"),
         "reduced-published": (
             "three bristles and a limit surface, as published",
             "models.reduced_published:ReducedModelPublished",

@@ -27,7 +27,7 @@ every_model = pytest.mark.parametrize(("kind", "patch"), MODELS)
 def model_of(kind: str, patch: str):
     if kind == "published":
         return pf.ReducedModelPublished(PATCHES[patch], LAW, pf.LimitSurfaceTable(PATCHES[patch]))
-    return pf.ReducedModel(PATCHES[patch], LAW, parts=2 if kind == "parts" else 1)
+    return pf.ReducedModel(PATCHES[patch], LAW)
 
 
 def drive(model, seed: int = 0):
@@ -54,7 +54,7 @@ def test_pytorch_has_the_same_numbers_and_gradients(kind, patch):
     if kind == "published":
         module = ReducedModelPublished(PATCHES[patch], LAW, model.surface, **options)
     else:
-        module = ReducedModel(PATCHES[patch], LAW, parts=model.parts, segments=8, speeds=8, **options)
+        module = ReducedModel(PATCHES[patch], LAW, **options)
     state, twists, loads = drive(model)
     got = module(*map(torch.tensor, (state, twists[3], loads[3])))
     assert got[0].detach().numpy() == pytest.approx(model.rate(state, twists[3], loads[3]), rel=1e-12, abs=1e-18)

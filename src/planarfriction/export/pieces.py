@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import formulas
-from planarfriction.compiler import compiled_math as xp
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import cells, cells_rollout, disc_cells, discs, distributed_step, moment_steps, published_step
@@ -161,7 +160,7 @@ def _sliding_of_disc(u: Any) -> Any:
     size = norm((u[0], u[1], spin))
     turned = ratio(spin, size)
     turned = turned * turned
-    c_t, c_s, m = formulas.disc_friction(xp, 1.0 - turned, turned, 0.0)
+    c_t, c_s, m = formulas.disc_friction_above(1.0 - turned, turned, 0.0)
     return c_t, c_s, size * math.sqrt(1.0 - turned + m * turned), (c_t * u[0], c_t * u[1], c_s * u[2])
 
 

@@ -118,9 +118,9 @@ class LimitSurfaceExact(LimitSurface):
 
     Integrated over the patch's outline if the pressure on it is uniform (polygons) or depends on the radius alone
     (discs and rings, `Uniform` or `SoftFinger`), otherwise over its cells, each a rectangle (on lines a segment) of
-    uniform pressure, or a disc if it has a radius. Points remain points. The wrench is continuous in the twist, and the
-    Jacobian is exact; on lines it has a logarithmic singularity where the centre of rotation meets the line, cut off at
-    1e-15 of a cell.
+    uniform pressure. Points remain points, and discs that stand for several cells remain discs. The wrench is continuous
+    in the twist, and the Jacobian is exact; on lines it has a logarithmic singularity where the centre of rotation meets
+    the line, cut off at 1e-15 of a cell.
 
     It costs more than a sum over cells; models, whose compiled code cannot evaluate it, store it as a table.
     """
@@ -160,8 +160,6 @@ class LimitSurfaceExact(LimitSurface):
         """The patch's outline, if the pressure can be integrated over it."""
         outline, pressure = self.patch.outline, self.patch.pressure
         laws = (Uniform, SoftFinger) if isinstance(outline, RoundOutline) else (Uniform,)
-        if self.patch.has_discs:
-            return None
         if isinstance(outline, RoundOutline) and self.patch.root is not None and (self.patch.root != np.eye(2)).any():
             return None  # a metric makes the rings ellipses
         if isinstance(outline, RoundOutline) and self._soft[0] <= outline.inner:
@@ -193,7 +191,7 @@ class LimitSurfaceExact(LimitSurface):
             corners = triangles[:, [0, 1, 2, 2]] - self.centre_of_pressure
             return _Elements(self._lever_corners(corners), areas / areas.sum())
         x, y, weights = self._loaded_cells()
-        if self.patch.has_discs:
+        if self.patch.has_discs and not self.patch.cell_extents().any():
             return _Discs(self.patch.lever_radii[self._weights() > 0.0], weights, np.array([x, y]))
         extents = self.patch.cell_extents()[self.patch.weights(self.normal_force) > 0.0]
         sides = int((extents > 0.0).any(axis=0).sum())

@@ -22,6 +22,9 @@ from planarfriction.patch import ContactPatch
 POINTS = 2
 """Times as many points as discs stand for a patch whose law knows no discs."""
 
+ALONE = 1e-6
+"""Second moment of cells about the centre of their disc, over its square radius, below which they are one cell."""
+
 
 @dataclass(frozen=True, eq=False)
 class ReducedModel(FrictionModel):
@@ -101,7 +104,7 @@ ReducedModel.__init__ = _refusing_replaced(ReducedModel.__init__)
 
 
 def _of_discs(few: ContactPatch, patch: ContactPatch, deflections: np.ndarray, load: float) -> np.ndarray:
-    """Return the bristles of discs from the `deflections` `[2, N]` of the cells of a patch.
+    """Return the bristles of discs from the `deflections` `[2 or 3, N]` of the cells of a patch.
 
     A disc takes the rigid motion that is nearest to the cells next to it; the least rigid motion of all discs that
     gives them the wrench of all cells is added.
@@ -109,18 +112,18 @@ def _of_discs(few: ContactPatch, patch: ContactPatch, deflections: np.ndarray, l
     from scipy.spatial import KDTree
 
     nearest = np.asarray(KDTree(few.positions).query(patch.positions)[1])
-    weights, levers, discs = patch.weights(load), patch.levers()[:, :2], few.levers()
+    weights, levers, discs = patch.weights(load), patch.levers(), few.levers()
     shares = np.bincount(nearest, weights, few.cells)
 
     def sums(values: np.ndarray) -> np.ndarray:
         return np.array([np.bincount(nearest, weights * each, few.cells) for each in values])
 
     state = np.zeros((discs.shape[1], few.cells))
-    state[:2] = sums(deflections) / np.where(shares > 0.0, shares, 1.0)
-    turned = (levers - discs[nearest, :2])[:, :, 2].T
-    spread = sums([np.sum(turned**2, axis=0)])[0]
-    spin = sums([np.sum(turned * (deflections - state[:2, nearest]), axis=0)])[0]
-    state[2:] = discs[:, 2:, 2].T * (spin / np.where(spread > 0.0, spread, 1.0))
+    state[:2] = sums(deflections[:2]) / np.where(shares > 0.0, shares, 1.0)
+    turned = (levers[:, :2] - discs[nearest, :2])[:, :, 2].T
+    spread, spin = sums([np.sum(turned**2, axis=0), np.sum(turned * (deflections[:2] - state[:2, nearest]), axis=0)])
+    spreads = spread > ALONE * shares * few.lever_radii**2
+    state[2:] = discs[:, 2:, 2].T * np.where(spreads, spin / np.where(spreads, spread, 1.0), 0.0)
     whole = np.einsum("n,nij,in->j", weights, levers, deflections)
     borne = few.weights(load)
     missing = whole - np.einsum("n,nij,in->j", borne, discs, state)

@@ -40,12 +40,12 @@ def line(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
 
 def line_grad(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return a line along y, `width` [m] long, with weights cells, ..., 2, 1 from the top."""
-    return ContactPatch.line(width, cells, profile=_steps(cells), name="LineGrad")
+    return _even(ContactPatch.line(width, cells, profile=_steps(cells), name="LineGrad"))
 
 
 def line_grad_x(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return a line along x, `width` [m] long, with weights cells, ..., 2, 1 from the left."""
-    return ContactPatch.line(width, cells, direction="x", profile=_steps(cells), name="LineGradX")
+    return _even(ContactPatch.line(width, cells, direction="x", profile=_steps(cells), name="LineGradX"))
 
 
 def non_convex_1(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
@@ -59,10 +59,10 @@ def non_convex_2(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPa
 
 
 def _even(patch: ContactPatch) -> ContactPatch:
-    """Return the patch with weights in proportion to pressure and area alone, as published."""
+    """Return the patch of points with weights in proportion to pressure and area alone, as published."""
     with warnings.catch_warnings():  # that the shape itself has given
         warnings.simplefilter("ignore")
-        return with_outline(dataclasses.replace(patch, point_shares=None), patch.outline)
+        return with_outline(dataclasses.replace(patch, point_shares=None, radii=None), patch.outline)
 
 
 def _steps(cells: int) -> np.ndarray:

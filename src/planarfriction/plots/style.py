@@ -19,12 +19,9 @@ from planarfriction.shown import unit_for
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Line colours that colour-blind readers tell apart (Okabe and Ito), the most distinct first."""
 
-DISTRIBUTED, PUBLISHED, ELLIPSOID, MOMENTS, PARTS, FEW, EXACT = PALETTE
+DISTRIBUTED, PUBLISHED, ELLIPSOID, OTHER, SECOND, FEW, EXACT = PALETTE
 """Colours in every figure: sums over cells and their model, the published table and its model, the ellipsoid and its
-model, `ReducedModel` with one part, with several, by default, what is exact."""
-
-OTHER = FEW
-"""Colour of something else, where no `ReducedModel` is."""
+model, something else, a second thing else, `ReducedModel` with few discs, what is exact."""
 
 MEASURED = "0.6"
 """Colour of what was measured, drawn as a broad line below the rest."""

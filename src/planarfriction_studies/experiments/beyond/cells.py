@@ -14,8 +14,12 @@ from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurfaceCells
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
+from planarfriction.plots.style import PlotFigure
 from planarfriction.scenes import Body, Contact, Scene, Signal, simulate
+from planarfriction_studies.experiments import looks
 from planarfriction_studies.experiments.beyond.shapes import SHAPES as NEW_SHAPES
+from planarfriction_studies.experiments.experiment import Table, table
+from planarfriction_studies.experiments.wording import short
 
 LAW = LuGre(mu_s=1.2, elasto_plastic=ElastoPlastic(0.9))
 
@@ -29,15 +33,18 @@ LAWS = {
 SHAPES: dict[str, Callable[[], ContactPatch]] = {
     "disc": PUBLISHED_PATCHES["Circle"],
     "square": PUBLISHED_PATCHES["Square"],
-    "T": PUBLISHED_PATCHES["NonConvex2"],
-    # the published ones have fewer cells than discs are asked for
+    # cells that are cut: the published ones are fewer than the discs that are asked for
+    "T": lambda: PUBLISHED_PATCHES["NonConvex2"]().refined(2),
     "two pads": lambda: PUBLISHED_PATCHES["NonConvex1"]().refined(4),
-    "line, linear pressure": lambda: PUBLISHED_PATCHES["LineGrad"]().refined(4),
+    "line, linear pressure": lambda: PUBLISHED_PATCHES["LineGrad"]().refined(8),
     **{name: NEW_SHAPES[name] for name in ("L", "annulus sector", "Gaussian off centre")},
 }
 
 RUNGS = (8, 16, 32, 64, 128)
 """Numbers of discs, beside the default and one for every cell."""
+
+FINE = 2000
+"""Points of the reference: their own staircase must be well below the errors that are measured."""
 
 SPEED, T_END, SAMPLES, STEPS = 0.02, 1.2, 600, 50
 """Speed of a driven motion [m/s], its end [s], its samples, linear in between, and steps from one to the next."""
@@ -64,8 +71,10 @@ def models_of(patch: ContactPatch) -> dict[str, Any]:
 
 
 def fine(patch: ContactPatch, law: LuGre = LAW) -> DistributedModel:
-    """Return the reference: points on cells cut in two or three along each side."""
-    return DistributedModel(patch.refined(2 if patch.cells > 300 else 3), law)
+    """Return the reference: points, about FINE of them, on cells cut in at least two along each side."""
+    sides = int((patch.cell_extents() > 0.0).any(axis=0).sum())
+    cuts = np.clip(round((FINE / patch.cells) ** (1.0 / max(sides, 1))), 2, 33) if sides else 1
+    return DistributedModel(patch.refined(int(cuts)), law)
 
 
 def gyration(patch: ContactPatch) -> float:
@@ -171,9 +180,11 @@ def load_of_slip(model: Any, wrench: np.ndarray, ramp: float) -> float:
     return float(np.interp(SLIPPED, off[first - 1 : first + 1], share[first - 1 : first + 1]))
 
 
-def slips(shape: str, models: dict[str, Any], law: LuGre, ramps: tuple[float, ...] = RAMPS) -> dict[str, np.ndarray]:
+def slips(
+    patch: ContactPatch, models: dict[str, Any], law: LuGre, ramps: tuple[float, ...] = RAMPS
+) -> dict[str, np.ndarray]:
     """Return by model the loads of slip over the reference's, less one, `[2, ramps]`: of two directions."""
-    patch, rng = SHAPES[shape](), np.random.default_rng([25, *shape.encode()])
+    rng = np.random.default_rng([25, patch.cells])
     pulls = [wrench_at_limit(patch, law, rng) for _ in range(2)]
     every = {name: model.with_law(law) for name, model in models.items()} | {"": fine(patch, law)}
     loads = {name: np.array([[load_of_slip(model, pull, ramp) for ramp in ramps] for pull in pulls])
@@ -228,3 +239,84 @@ def returned(model: Any, cycles: int, steps: int = 40, loads: bool = False) -> f
         work = -(rollout(model, None, twists, force, dt).wrenches * twists).sum(axis=-1)
         worst = max(worst, float((-np.cumsum(work, axis=1).min(axis=1) / np.abs(work).sum(axis=1)).max()))
     return worst
+
+
+def measured(shape: str, quick: bool) -> dict[str, dict[str, np.ndarray]]:
+    """Return by what is measured and model the errors `[runs, columns]` on a shape, as shares."""
+    patch = SHAPES[shape]()
+    models, laws = models_of(patch), [LAW] if quick else LAWS.values()
+    parts = [slips(patch, models, law, RAMPS[1:2] if quick else RAMPS) for law in laws]
+    motions, seeds = {"stops": stopping, "wandering": wandering}, 2 if quick else 20
+    return {name: driven(patch, models, motion, seeds) for name, motion in motions.items()} | {
+        "steady": steady(patch, models, 100 if quick else 1000),
+        "slip": {name: np.concatenate([np.abs(part[name]).ravel() for part in parts])[:, None] for name in models},
+    }
+
+
+def held(shape: str) -> dict[str, dict[str, np.ndarray]]:
+    """Return by level and model the way from cycle to cycle [m] of a shaken contact, of which the last is the end."""
+    patch = SHAPES[shape]()
+    return {f"{level:g}": creep(patch, models_of(patch), level) for level in LEVELS}
+
+
+def gained(cycles: int) -> dict[str, float]:
+    """Return by numbers of discs the most work that random motions gave back, as a share of all (see `returned`)."""
+    law = LuGre(mu_s=1.2, sigma_1=0.0, sigma_2=0.0, elasto_plastic=ElastoPlastic(0.9))
+    patch = SHAPES["disc"]()
+    return {f"{n} discs": returned(ReducedModel(patch, law, cells=n), cycles) for n in (1, ReducedModel.cells)}
+
+
+SHOWN = {
+    "force, median run": ("stops", lambda found: np.median(found[:, 0])),
+    "worst run": ("stops", lambda found: found[:, 0].max()),
+    "rms": ("stops", lambda found: np.sqrt((found[:, 2] ** 2).mean())),
+    "without stops, force": ("wandering", lambda found: found[:, 0].max()),
+    "torque": ("wandering", lambda found: found[:, 1].max()),
+    "steady, force": ("steady", lambda found: found[:, 0].max()),
+    "load of slip, median": ("slip", np.median),
+    "largest": ("slip", np.max),
+}
+"""Columns of the table: what is measured, and the number of all its runs that is shown."""
+
+LINES = {name: SHOWN[name] for name in ("force, median run", "rms", "steady, force", "load of slip, median")}
+"""Lines of the figure."""
+
+
+def pooled(found: dict[str, Any]) -> dict[str, dict[str, float]]:
+    """Return by model the columns of the table over the runs on all shapes [%]."""
+    names = list(next(iter(found.values()))["stops"])
+    runs = lambda what, name: np.concatenate([each[what][name] for each in found.values()])  # noqa: E731
+    return {
+        name: {words: 100.0 * float(of(runs(what, name))) for words, (what, of) in SHOWN.items()} for name in names
+    }
+
+
+def tables(errors: dict[str, dict[str, float]], creeps: dict[str, Any]) -> tuple[Table, Table]:
+    """Return the errors of more and more discs, and how they creep while they hold."""
+    columns = {words: lambda each, words=words: short(each[words], 2) for words in SHOWN}
+    note = "Driven motions with stops and reversals, without, steady turning about points inside, and ramps of a load."
+    few = table(f"Errors of few discs on {len(SHAPES)} shapes [% of mu f_N]", errors, columns, "model", note)
+    names = next(iter(next(iter(creeps.values())).values()))
+    rows = {
+        f"{shape}, {level}": {name: 1e9 * each[name] for name in names}
+        for shape, levels in creeps.items()
+        for level, each in levels.items()
+    }
+    note = f"Way of the last of {CYCLES} cycles, from the largest load as a share of the friction limit."
+    ways = {name: lambda each, name=name: short(each[name], 2) for name in names}
+    return few, table("Creep of a shaken contact that holds [nm per cycle]", rows, ways, "patch, load", note)
+
+
+def figure(errors: dict[str, dict[str, float]]) -> PlotFigure:
+    """Draw errors [%] over the number of discs; dotted: those of the published model."""
+    made, axes = looks.panels(6.4, 4.2)
+    rungs = {int(name.split()[0]): each for name, each in errors.items() if name.endswith("discs")}
+    colours = (looks.FEW, looks.DISTRIBUTED, looks.OTHERS[0], looks.OTHERS[1])
+    for words, colour in zip(LINES, colours, strict=True):
+        axes.plot(list(rungs), [each[words] for each in rungs.values()], "o-", color=colour, ms=5, label=words)
+        axes.axhline(errors["published"][words], color=colour, lw=1.0, ls=":")
+    axes.set(xscale="log", yscale="log", xlabel="discs", ylabel=r"error [% of $\mu f_N$]")
+    axes.set_xticks(list(rungs), [str(n) for n in rungs])
+    axes.minorticks_off()
+    looks.legend(made, axes, 2)
+    return made

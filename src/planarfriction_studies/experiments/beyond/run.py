@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction_studies.experiments import looks
-from planarfriction_studies.experiments.beyond import contacts, ladder, surfaces, tables
+from planarfriction_studies.experiments.beyond import cells, contacts, ladder, surfaces, tables
 from planarfriction_studies.experiments.beyond import shapes as new_shapes
 from planarfriction_studies.experiments.experiment import Numbers, Result, Work, median_and_quartiles
 from planarfriction_studies.experiments.in_hand.figures import end_shifts
@@ -32,6 +32,7 @@ def run(work: Work) -> Result:
     six = [shape for shape in shapes if shape in SIX_SHAPES]
     twists = QUICK_TWISTS if work.quick else surfaces.TWISTS
     new, seeds = (QUICK_NEW_SHAPES, QUICK_SEEDS) if work.quick else (NEW_SHAPES, new_shapes.SEEDS)
+    rungs, shaken = (("disc",), ("disc",)) if work.quick else (tuple(cells.SHAPES), ("disc", "L", "two pads"))
     found = work.pieces(
         {("models", shape): partial(_runs_of, shape) for shape in shapes}
         | {("limit surface", shape): partial(surfaces.surface_errors, shape, twists) for shape in shapes}
@@ -42,7 +43,10 @@ def run(work: Work) -> Result:
             ("soft finger", ""): partial(contacts.soft_finger, work.quick),
         }
         | {("spin-up", shape): partial(ladder.spin_up, shape) for shape in six}
-        | {("new shapes", name): partial(new_shapes.largest_errors, name, seeds) for name in new},
+        | {("new shapes", name): partial(new_shapes.largest_errors, name, seeds) for name in new}
+        | {("few discs", name): partial(cells.measured, name, work.quick) for name in rungs}
+        | {("creep", name): partial(cells.held, name) for name in shaken}
+        | {("work returned", ""): partial(cells.gained, 10_000 if work.quick else 1_000_000)},
         lambda key: ", ".join((key[0], IN_WORDS.get(key[1], key[1]))),
     )
     # one after the other: these are measured with a clock
@@ -67,6 +71,9 @@ def run(work: Work) -> Result:
         "soft finger": found["soft finger", ""],
         "step": costs,
         "spin-up": of("spin-up"),
+        "few discs": cells.pooled(of("few discs")),
+        "creep": _last(of("creep")),
+        "work returned": found["work returned", ""],
         "new shapes": {name: new_shapes.ratios(each) for name, each in unseen.items()},
     }
     return report(
@@ -77,6 +84,7 @@ def run(work: Work) -> Result:
             "driven_models": tables.driven_boxes(numbers["driven"]),
             "in_hand_ends": _ends_figure(numbers["in hand"]),
             "ladder": tables.draw_ladder(rows),
+            "few_discs": cells.figure(numbers["few discs"]),
             "grooves": tables.grooves(numbers["grooves"]),
         },
         numbers,
@@ -86,8 +94,20 @@ def run(work: Work) -> Result:
             *contacts.plateau_comparisons(numbers["plateaus"]),
             *contacts.grooves_comparisons(numbers["grooves"]),
         ],
-        tables=(*tables.tables(rows, numbers), new_shapes.table(unseen)),
+        tables=(
+            *tables.tables(rows, numbers),
+            new_shapes.table(unseen),
+            *cells.tables(numbers["few discs"], numbers["creep"]),
+        ),
     )
+
+
+def _last(ways: Numbers) -> Numbers:
+    """Return the last of the ways from cycle to cycle, by patch, level and model."""
+    return {
+        shape: {level: {model: float(each[-1]) for model, each in models.items()} for level, models in levels.items()}
+        for shape, levels in ways.items()
+    }
 
 
 def _runs_of(shape: str) -> Numbers:
@@ -170,6 +190,7 @@ def _template_values(numbers: Numbers) -> Numbers:
         },
         "friction": {model: _friction_shares(ends, model) for model in (*SHOWN, "published")},
         "furthest": {model: max(each[model] for each in ends.values()) for model in ("published", *SHOWN)},
+        "default": ladder.ReducedModel.cells,
         "discs": {model: _over_all(numbers, model) for model in MODELS_OF_DISCS},
         "grooves": {"models": len(misses), "miss": float(np.abs(misses).max())},
     }
@@ -178,9 +199,10 @@ def _template_values(numbers: Numbers) -> Numbers:
 def _over_all(numbers: Numbers, model: str) -> Numbers:
     """Return what discs cost and how far they are off, on the patches that have more cells than any number of them."""
     moved, ends = ([each for each in numbers[name].values() if "64 discs" in each] for name in ("driven", "in hand"))
+    over = lambda name: float(np.median([each[model][name] / each["published"][name] for each in moved]))  # noqa: E731
     return {
-        "driven": float(np.median([each[model]["third quartile"] / each["published"]["third quartile"] for each in moved])),
-        "largest": float(np.median([each[model]["maximum"] / each["published"]["maximum"] for each in moved])),
+        "driven": over("third quartile"),
+        "largest": over("maximum"),
         "end": max(each[model] for each in ends),
         "time": numbers["run ratios"][model][0],
     }

@@ -152,7 +152,9 @@ COLOURS = dict(
     zip(KINDS, (looks.REDUCED, looks.OTHERS[0], looks.DISTRIBUTED, looks.QUARTIC, looks.ELLIPSOID), strict=True)
 )
 
-MODEL_COLOURS = dict(zip(MOVED, (looks.REDUCED, looks.OTHERS[1], looks.FEW, looks.OTHERS[0], looks.DISTRIBUTED), strict=True))
+MODEL_COLOURS = dict(
+    zip(MOVED, (looks.REDUCED, looks.OTHERS[1], looks.FEW, looks.OTHERS[0], looks.DISTRIBUTED), strict=True)
+)
 
 
 def surface_errors(errors: dict[str, Arrays]) -> PlotFigure:
