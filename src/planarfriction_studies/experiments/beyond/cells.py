@@ -11,7 +11,7 @@ import numpy as np
 from planarfriction.derivatives import rollout
 from planarfriction.geometry import wrench_at
 from planarfriction.laws import ElastoPlastic, LuGre
-from planarfriction.limit_surface import LimitSurfaceCells
+from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceTable
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction.plots.style import PlotFigure
@@ -192,13 +192,24 @@ def slips(
     return {name: loads[name] / loads[""] - 1.0 for name in models}
 
 
+def highest_level(patch: ContactPatch, pulls: np.ndarray) -> float:
+    """Return the largest of loads `[T, 3]` about the centre of pressure, as shares of what the surface of mu_s holds."""
+    surface, moved_back = LimitSurfaceTable(patch), -patch.centre_of_pressure()
+    wrenches = wrench_at(pulls, moved_back)
+    twists = [surface.twist(-wrench) for wrench in wrenches]
+    return max(
+        float(wrench @ twist / (surface.dissipation(twist) * LAW.mu_s))
+        for wrench, twist in zip(wrenches, twists, strict=True)
+    )
+
+
 def creep(patch: ContactPatch, models: dict[str, Any], level: float) -> dict[str, np.ndarray]:
     """Return by model the way from cycle to cycle [m], `[CYCLES - 1]`, of a contact that is shaken and holds."""
     r, t = gyration(patch), np.linspace(0.0, CYCLE * CYCLES, 100 * CYCLES + 1)
     grown, phase = np.minimum(t / 0.3, 1.0), 2.0 * np.pi * t / CYCLE
     spin = 0.27 + 0.32 * np.cos(phase + 0.6)
     pulls = grown[:, None] * np.stack([0.43 + 0.32 * np.sin(phase), 0.27 * np.cos(phase), r * spin], axis=1)
-    pulls *= level * LAW.mu_s / np.linalg.norm(pulls / [1.0, 1.0, r], axis=1).max()
+    pulls *= level / highest_level(patch, pulls[100:200:2])
     body = Body(0.1, 0.4 * r**2, gravity=(0.0, 0.0))
     found = {}
     for name, model in (models | {"refined(2)": DistributedModel(patch.refined(2), LAW)}).items():
