@@ -193,7 +193,7 @@ def slips(
 
 
 def highest_level(patch: ContactPatch, pulls: np.ndarray) -> float:
-    """Return the largest of loads `[T, 3]` about the centre of pressure, as shares of what the surface of mu_s holds."""
+    """Return the largest of loads `[T, 3]` about the centre of pressure, as shares of what mu_s holds."""
     surface, moved_back = LimitSurfaceTable(patch), -patch.centre_of_pressure()
     wrenches = wrench_at(pulls, moved_back)
     twists = [surface.twist(-wrench) for wrench in wrenches]
