@@ -26,7 +26,7 @@ LAW = LuGre(mu_s=1.2, elasto_plastic=ElastoPlastic(0.9))
 LAWS = {
     "published": LAW,
     "higher static friction": LuGre(mu_s=1.5, elasto_plastic=ElastoPlastic(0.98)),
-    "soft bristles": LuGre(mu_s=1.2, sigma_0=1e4, sigma_1=30.0, elasto_plastic=ElastoPlastic(0.9)),
+    "soft bristles": LuGre(mu_s=1.2, sigma_0=1e5, sigma_1=250.0, elasto_plastic=ElastoPlastic(0.9)),
 }
 """Laws of the loads of slip."""
 
@@ -52,9 +52,9 @@ SPEED, T_END, SAMPLES, STEPS = 0.02, 1.2, 600, 50
 COLUMNS = ("largest force", "largest torque", "rms force", "rms torque")
 """Errors of a driven motion, in units of `mu_c f_N` and of that times the radius of gyration."""
 
-RAMPS, TOP, SLIPPED = (0.01, 0.1, 1.0), 1.35, 1e-5
+RAMPS, TOP, SLIPPED = (0.01, 0.1, 1.0), 1.35, 8.0
 """Times in which a load grows from zero to TOP times what the limit surface of mu_s holds [s], and displacement beyond
-that of the bent bristles at which the patch counts as slipping [m]."""
+that of the bent bristles at which the patch counts as slipping, in deflections at mu_s."""
 
 LEVELS, CYCLE, CYCLES = (0.5, 0.65, 0.8), 0.5, 12
 """Largest load of a shaken contact as shares of that limit surface, its cycle [s], and cycles: the last half counts."""
@@ -174,10 +174,11 @@ def load_of_slip(model: Any, wrench: np.ndarray, ramp: float) -> float:
     bent = np.outer(share, wrench / [1.0, 1.0, r**2]) / model.law.sigma_0
     off = np.abs(run[:, 1:] - run[0, 1:] - bent) * [1.0, 1.0, r]
     off = np.hypot(off[:, 0], off[:, 1]) + off[:, 2]
-    first = int(np.argmax(off > SLIPPED))
-    if off[first] <= SLIPPED:
+    most = SLIPPED * model.law.mu_s / model.law.sigma_0
+    first = int(np.argmax(off > most))
+    if off[first] <= most:
         raise ValueError(f"no slip of {model.patch.name} in {ramp} s")
-    return float(np.interp(SLIPPED, off[first - 1 : first + 1], share[first - 1 : first + 1]))
+    return float(np.interp(most, off[first - 1 : first + 1], share[first - 1 : first + 1]))
 
 
 def slips(
@@ -248,8 +249,13 @@ def returned(model: Any, cycles: int, steps: int = 40, loads: bool = False) -> f
         twists, dt = about_centre(model.patch, twists), 10.0 ** rng.uniform(-5.0, -2.0)
         force = rng.uniform(0.2, 2.0, (count, steps)) if loads else 1.0
         work = -(rollout(model, None, twists, force, dt).wrenches * twists).sum(axis=-1)
-        worst = max(worst, float((-np.cumsum(work, axis=1).min(axis=1) / np.abs(work).sum(axis=1)).max()))
+        worst = max(worst, gain(work))
     return worst
+
+
+def gain(work: np.ndarray) -> float:
+    """Return the most that was ever given back beyond what was put in, of the works `[motions, steps]` of steps."""
+    return float((-np.cumsum(work, axis=1).min(axis=1) / np.abs(work).sum(axis=1)).max())
 
 
 def measured(shape: str, quick: bool) -> dict[str, dict[str, np.ndarray]]:
