@@ -50,7 +50,7 @@ def test_few_discs_moved_at_random(shape):
         assert force.max() < most, motion.__name__
 
 
-def test_the_largest_error_on_three_feet_is_far_below_that_of_one_threshold_for_all():
+def test_errors_on_three_feet_are_far_below_those_of_one_threshold():
     ratios = new_shapes.ratios(new_shapes.largest_errors("three feet", (1, 2)))
     for quantity in new_shapes.QUANTITIES:
         assert max(ratios["reduced"][quantity]) < 0.5
