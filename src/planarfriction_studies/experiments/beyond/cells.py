@@ -52,7 +52,7 @@ SPEED, T_END, SAMPLES, STEPS = 0.02, 1.2, 600, 50
 COLUMNS = ("largest force", "largest torque", "rms force", "rms torque")
 """Errors of a driven motion, in units of `mu_c f_N` and of that times the radius of gyration."""
 
-RAMPS, TOP, SLIPPED = (0.01, 0.1, 1.0), 1.35, 8.0
+RAMPS, TOP, SLIPPED = (0.01, 0.1, 1.0), 1.6, 3.0
 """Times in which a load grows from zero to TOP times what the limit surface of mu_s holds [s], and displacement beyond
 that of the bent bristles at which the patch counts as slipping, in deflections at mu_s."""
 
