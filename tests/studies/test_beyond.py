@@ -120,9 +120,9 @@ def test_a_drift_a_tenth_of_a_degree_off_would_be_noticed(result):
 def test_soft_finger(result):
     found = result.numbers["soft finger"]
     assert found["reduced [m]"] < 1e-5
-    # discs stay where they are while their shares follow the load
-    assert found["steady force [N]"] < 6e-2
-    assert found["steady torque [N m]"] < 6e-4
+    # points of the same cells are as far from finer ones: 1 % of the load
+    assert found["steady force [N]"] < 2.5e-2
+    assert found["steady torque [N m]"] < 2e-4
 
 
 def test_in_hand_ends_are_those_of_two_simulations(result):
