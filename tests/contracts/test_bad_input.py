@@ -132,7 +132,8 @@ NUMBERS = {
     "normal_force": lambda x: pf.LimitSurfaceCells(SQUARE, normal_force=x),
     "segments": lambda x: pf.LimitSurfaceTable(SQUARE, x),
     "samples": lambda x: ELLIPSOID.compare(ELLIPSOID, samples=x),
-    "speeds": lambda x: pf.ReducedModel(SQUARE, pf.LuGre(), speeds=x, parts=1),
+    "cells": lambda x: pf.ReducedModel(SQUARE, pf.LuGre(), cells=x),
+    "n": SQUARE.discs,
 }
 ARRAYS = {
     "positions": pf.ContactPatch.points,
@@ -328,8 +329,9 @@ def test_what_was_unchecked(call, message):
         (lambda: pf.LimitSurfaceTable(SQUARE, 10**5), "segments must be at most 256"),
         (lambda: pf.LimitSurfaceTablePublished(SQUARE, 10**5), "segments must be at most"),
         (lambda: pf.LimitSurfaceQuartic(SQUARE, segments=10**5), "segments must be at most"),
-        (lambda: pf.ReducedModel(SQUARE, pf.LuGre(), segments=10**5), "segments must be at most 256"),
-        (lambda: pf.ReducedModel(SQUARE, pf.LuGre(), speeds=10**5), "speeds must be at most 64"),
+        (lambda: pf.ReducedModel(SQUARE, pf.LuGre(), parts=4), "parts must be left out: write cells="),
+        (lambda: pf.ReducedModel(SQUARE, pf.LuGre(), cells=0), "cells must be an integer >= 1, got 0"),
+        (lambda: SQUARE.discs(0), "n must be an integer >= 1, got 0"),
         (lambda: ELLIPSOID.compare(ELLIPSOID, samples=10**9), "samples must be at most"),
         (
             lambda: SIGNAL.held(1e-12),
@@ -410,9 +412,9 @@ BODY = pf.Body(mass=0.2, inertia=1e-4)
 @pytest.mark.parametrize(
     ("mistake", "line"),
     [
-        (lambda: pf.ReducedModel(pf.LuGre(), SQUARE, parts=1), r"patch must be a ContactPatch, got LuGre\("),
+        (lambda: pf.ReducedModel(pf.LuGre(), SQUARE), r"patch must be a ContactPatch, got LuGre\("),
         (lambda: pf.LimitSurfaceExact(REDUCED), "patch must be a ContactPatch, got ReducedModelPublished"),
-        (lambda: pf.ReducedModel(SQUARE, 0.5, parts=1), "law must be a friction law .* got 0.5"),
+        (lambda: pf.ReducedModel(SQUARE, 0.5), "law must be a friction law .* got 0.5"),
         (lambda: pf.simulate(REDUCED), "scene must be a Scene, got ReducedModelPublished"),
         (lambda: pf.Contact(SQUARE, 5.0), r"model .* must be a friction model .* got ContactPatch\("),
         (lambda: pf.Contact(REDUCED, "5 N"), "normal_force .* must be a number, or a Signal of numbers, got '5 N'"),

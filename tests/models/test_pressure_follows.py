@@ -132,7 +132,7 @@ def test_coupled_patches_follow_by_the_same_rule():
         np.testing.assert_allclose(patches.states(step.state)[p], new, rtol=1e-9, atol=1e-18)
 
 
-def test_a_coupled_patch_without_cells_that_changes_with_the_load_refuses_moments():
+def test_a_coupled_patch_without_cells_refuses_moments_of_loads():
     patches = CoupledPatches([MODELS["soft published"]])
     host = HostStep(np.zeros((1, 3)), np.ones(1), np.zeros((1, 3)), np.eye(3), moments=np.zeros((1, 2)))
     with pytest.raises(InvalidValueError, match="moments"):

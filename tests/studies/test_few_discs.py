@@ -38,7 +38,7 @@ def test_in_hand_few_discs_end_where_the_cells_do(case):
     assert miss(case) < FARTHEST
 
 
-def test_the_largest_error_on_three_feet_is_far_below_that_of_one_threshold_for_all():
+def test_errors_on_three_feet_are_far_below_those_of_one_threshold():
     ratios = new_shapes.ratios(new_shapes.largest_errors("three feet", (1, 2)))
     for quantity in new_shapes.QUANTITIES:
         assert max(ratios["reduced"][quantity]) < 0.5

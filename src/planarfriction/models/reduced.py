@@ -52,7 +52,10 @@ class ReducedModel(FrictionModel):
 
     @functools.cached_property
     def reduction(self) -> DistributedModel:
-        """Distributed model of the discs that stand for the patch."""
+        """Distributed model of the discs that stand for the patch.
+
+        Raises InvalidValueError as the class does.
+        """
         if is_rate_law(self.law):
             few = self.patch.discs(POINTS * self.cells)
             return DistributedModel(dataclasses.replace(few, radii=None), self.law)

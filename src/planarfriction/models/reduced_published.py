@@ -229,6 +229,8 @@ class ReducedModelPublished(FrictionModel):
 
         With the rate f, G the map to the centre of pressure and `W = -G' (sigma_0 z + sigma_1 f + sigma_2 H V)`:
         `dW/dz = -G' (sigma_0 + sigma_1 df/dz)`, `dW/dV = -G' (sigma_1 df/dV + sigma_2 H)`.
+
+        Raises InvalidValueError as `step` does.
         """
         state, twist, load, _ = self._inputs(state, twist, normal_force)
         law, count = self.law.numbers, load.size

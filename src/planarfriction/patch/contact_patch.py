@@ -14,7 +14,7 @@ from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import outline as outlines
 from planarfriction.patch.grid import MOST_CELLS, Grid, cell_extents, check_cells, point_shares, warn_of_the_unit
-from planarfriction.patch.grid_error import GridError, grid_error
+from planarfriction.patch.grid_error import GridError, finer, grid_error
 from planarfriction.patch.moments import Moments
 from planarfriction.patch.pressure import (
     Pressure,
@@ -276,8 +276,6 @@ class ContactPatch(Moments):
         Pressure laws are evaluated at the new cells; numbers per cell are repeated. Cells cut by a rim are replaced by
         cells of the same area and centroid. Points remain points. Raises InvalidValueError for too many cells.
         """
-        from planarfriction.patch.grid_error import finer
-
         return finer(self, parts)
 
     def discs(self, n: int | None = None) -> ContactPatch:
@@ -285,16 +283,16 @@ class ContactPatch(Moments):
 
         The disc of a cell has its second moment, `a^2/2 = (s_x^2 + s_y^2)/12` (length only on lines; points stay
         points), and so has the disc of many cells: load, centre of pressure and second moment of the patch are kept.
-        Symmetric patches have symmetric discs, n or a few less; cells of different friction metric or asymmetry never
-        share a disc, so that there are at least as many as kinds of them. A patch whose shape depends on the load has
-        up to `2 n`, with the moments of its cells at each load. Raises InvalidValueError for n below 1.
+        Symmetric patches have symmetric discs, n or a few less; cells of different friction never share a disc. A patch
+        whose shape depends on the load has up to `2 n`, with the moments of its cells at each load. Raises
+        InvalidValueError for n below 1.
         """
         from planarfriction.patch.discs import discs
 
         return discs(self, n)
 
     def compressed(self, *_: Any, **__: Any) -> ContactPatch:
-        """Raise an error that says what to write instead."""
+        """Refuse an old name, and say what to write instead. Raises InvalidValueError."""
         raise InvalidValueError("compressed", "be replaced by discs(n): a patch of n small discs", "compressed()")
 
     def grid_error(self, normal_force: float | None = None, *, refined: int = 1) -> GridError:
