@@ -194,8 +194,8 @@ class ContactPatch(Moments):
     ) -> ContactPatch:
         """Return a line of `length` [m] along `direction` ("y" or "x") through the origin, one cell wide, of discs.
 
-        Points in a row pull worst where the line turns about one of its cells: as discs, 21 cells have two thirds of the
-        largest error of force in motion (one third if they are squares). `dataclasses.replace(line, radii=None)` has
+        Points in a row pull worst where the line turns about one of its cells: as discs, 21 cells have two thirds of
+        the largest error of force in motion (one third if they are squares). `dataclasses.replace(line, radii=None)` has
         points.
 
         `profile` holds the relative pressures `[cells]` from the top down (y) or from the left to the right (x), or is
