@@ -333,6 +333,12 @@ def path(name: str, value: Any) -> Path:
     """Return `value` as a path, or raise."""
     if not isinstance(value, (str, os.PathLike)) or isinstance(os.fspath(value), bytes):
         raise InvalidValueError(name, "be a path: a text or a pathlib.Path", value)
+    try:
+        whole = b"\0" not in os.fsencode(value)
+    except UnicodeEncodeError:
+        whole = False
+    if not whole:
+        raise InvalidValueError(name, "be a path that files can have", quoted(os.fspath(value)))
     return Path(value)  # pyright: ignore[reportArgumentType]
 
 
