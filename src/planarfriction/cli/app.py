@@ -188,7 +188,7 @@ def export(file: Path, **options: Any) -> None:
 @click.option("--noise", metavar="FX,FY,TAU", help="Noise of the measured wrench in N and N m. Default: estimated.")
 @click.option("--plain", is_flag=True, help="Use plain LuGre bristles instead of elasto-plastic ones.")
 @click.option("--steady", is_flag=True, help="The logs begin in steady sliding, not at rest.")
-@click.option("--model", default="auto", show_default=True, help="reduced-published, distributed, reduced, or auto.")
+@click.option("--model", default="auto", show_default=True, help="reduced-published, reduced, distributed, or auto.")
 @click.option("--nuisance", metavar="NAMES", help="Rig disturbances: delay,bias,load,twist or none. Default: all.")
 @click.option("--starts", type=int, default=4, show_default=True, help="Number of starting points of the search.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Random seed of the starting points.")
