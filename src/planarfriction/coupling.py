@@ -28,6 +28,7 @@ from planarfriction.kernels import coupling as kernels
 from planarfriction.kernels.coupling_rows import Patches, layout
 from planarfriction.kernels.following import Followers
 from planarfriction.kernels.steps import WORDS
+from planarfriction.laws.base import refuse_fixed_stiffness
 from planarfriction.models import FrictionModel
 
 TOLERANCE = 1e-9
@@ -115,6 +116,7 @@ class CoupledPatches(ByValue):
         self._set(models=tuple(self.models))
         for model in self.models:
             validation.instance("models", model, FrictionModel, "friction models, one for each patch")
+            refuse_fixed_stiffness(model.law, "CoupledPatches")
         if not self.models:
             raise InvalidValueError("models", "hold at least one", "none")
         _ = self._packed

@@ -15,6 +15,7 @@ from planarfriction.compiler.memory import places_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.body import Motion, System
 from planarfriction.kernels.contacts import BODY, BODY_AXES, WORLD, Contacts, calls_of
+from planarfriction.laws.base import refuse_fixed_stiffness
 from planarfriction.scenes.scene import Contact
 from planarfriction.scenes.signal import SAME_TIME, Signal, breaks_between, displacement
 from planarfriction.scenes.start import first_slopes, first_states
@@ -36,6 +37,7 @@ def packed_contact(
     contact: Contact, loads: Sequence[float | None] | np.ndarray, between: tuple[float, float] | None = None
 ) -> PackedModel:
     """Pack the model of a contact (see `FrictionModel.packed`), with a pressure that follows the load if it does."""
+    refuse_fixed_stiffness(contact.model.law, "scenes")
     packed = contact.model.packed(loads, between)
     if contact.pressure == "fixed":
         return packed
