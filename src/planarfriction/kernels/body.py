@@ -28,6 +28,8 @@ from planarfriction.kernels.contacts import (
     contact_map,
     contact_map_slopes,
 )
+from planarfriction.kernels.law import law_of
+from planarfriction.kernels.settle import bring_back, factor_at
 from planarfriction.kernels.small_matrices import applied, inverse
 from planarfriction.kernels.vectors import applied_back, plus, put, put_all, three
 
@@ -76,7 +78,9 @@ class Work(NamedTuple):
     wrench: Doubles
     """Wrench of each contact per unit load, [C, 3]."""
     twist: Doubles
-    """Twist of one contact, [3]."""
+    """Twist of one contact and the factor on its stiffness, [4]."""
+    factor: Doubles
+    """That factor of each contact (see `settle.factor_at`), as `rates` left it, [C]."""
     stiffness: Doubles
     """d wrench / d twist of one contact, [3, 3]."""
     matrix: Doubles
@@ -129,7 +133,7 @@ class System(Packed):
     ) -> None:
         n, square = len(contacts.count), (3, 3)
         work = layout(
-            Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=3, stiffness=square,
+            Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=4, factor=n, stiffness=square,
             matrix=square, inverse=square, to_pose=square, body=3, rows=(4, 3), moved=(n, 8),
         )  # fmt: skip
         self._block, addresses = np.zeros(work.size), [address_of(*each) for each in BODY_FUNCTIONS]
@@ -157,6 +161,23 @@ def total_load(own, piece, since, c):
 def record_of(own, piece, c):
     """Return the address of the record of contact c with the shape that it has on a piece."""
     return own.contacts.record[own.motion.row[piece * own.size + c]]
+
+
+@kernel
+def settle_all(own, piece, y):
+    """Bring bristles back onto their limits that the load at the start of a piece leaves beyond."""
+    for c in range(own.size):
+        reference = own.contacts.reference[c]
+        if reference > 0.0:
+            first, size, factor = own.contacts.state[c], own.contacts.bristle[c], factor_of(own, piece, c)
+            count = (own.contacts.state[c + 1] - first) // size
+            bring_back(law_of(record_of(own, piece, c)), size, at(y, first), factor, count)
+
+
+@kernel
+def factor_of(own, piece, c):
+    """Return the factor on the stiffness of contact c at the start of a piece."""
+    return factor_at(own.contacts.reference[c], load_of(own, piece, 0.0, c))
 
 
 @kernel
@@ -224,6 +245,8 @@ def rates(system, piece, since, y, dy):
         place, seen = place_at(own, piece, since, c, body)
         contact_map(own.contacts.mount[c], place, at(body, 3), a)
         put(work.twist, applied(a, seen))
+        work.factor[c] = factor_at(own.contacts.reference[c], load_of(own, piece, since, c))
+        work.twist[3] = work.factor[c]
         call(function_of(own, c, EVALUATE), (record_of(own, piece, c), at(y, first), work.twist, at(dy, first), w))
         total = plus(total, total_load(own, piece, since, c), applied_back(a, w))
     for i in range(3):
@@ -258,6 +281,7 @@ def linearise(system, piece, y):
                 g[3 * i] -= omega * a[3 * i + 1]
                 g[3 * i + 1] += omega * a[3 * i]
         put(work.twist, applied(a, seen))
+        work.twist[3] = work.factor[c]
         z = at(y, own.contacts.state[c])
         call(function_of(own, c, LINEARISE), (record_of(own, piece, c), z, work.twist, linearisation_of(own, c)))
 

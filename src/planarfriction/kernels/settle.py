@@ -58,10 +58,30 @@ def settle(law, size, z, factor, n, out):
 
 @kernel
 def bring_back(law, size, z, factor, n):
-    """Bring bristles back onto their limits at a load."""
-    settle(law, size, z, factor, n, z)
-    for i in range(size * n):
-        z[i] = z[i] / factor
+    """Bring bristles back onto their limits at a load, and leave others as they are."""
+    for i in range(n):
+        beyond = _beyond(law, size, z, factor, n, i)
+        if beyond > ROUNDING:
+            for m in range(size):
+                z[m * n + i] /= beyond
+
+
+@kernel
+def turn_back(law, size, z, factor, n, change):
+    """Bring a change of bristles `z` to that after `bring_back`, or the cotangent after it to that before."""
+    for i in range(n):
+        beyond = _beyond(law, size, z, factor, n, i)
+        if beyond > ROUNDING:
+            _turn_rows(z, size, n, i, beyond, 1, change)
+
+
+@kernel
+def _beyond(law, size, z, factor, n, i):
+    """Return how far bristle i is bent, over its limit."""
+    square = 0.0
+    for m in range(size):
+        square += z[m * n + i] * z[m * n + i]
+    return factor * math.sqrt(square) * law.sigma_0 / law.mu_s
 
 
 @kernel
@@ -87,18 +107,18 @@ def unscale(record, size, z, factor, n, by_twist, of_wrench, by_state):
         by_twist[m] = by_twist[m] / factor
         of_wrench[m] = of_wrench[m] * factor
     for i in range(n):
-        square = 0.0
-        for m in range(size):
-            square += z[m * n + i] * z[m * n + i]
-        beyond = factor * math.sqrt(square) * law.sigma_0 / law.mu_s
+        beyond = _beyond(law, size, z, factor, n, i)
         if beyond > ROUNDING:
-            _turn_rows(z, size, n, i, square, beyond, 3, of_wrench)
-            _turn_rows(z, size, n, i, square, beyond, size, by_state)
+            _turn_rows(z, size, n, i, beyond, 3, of_wrench)
+            _turn_rows(z, size, n, i, beyond, size, by_state)
 
 
 @kernel
-def _turn_rows(z, size, n, i, square, beyond, rows, by_state):
-    """Multiply rows of derivatives by a bristle on its limit by those of that bristle."""
+def _turn_rows(z, size, n, i, beyond, rows, by_state):
+    """Multiply rows of derivatives by a bristle that is brought back by those of it by the bristle before."""
+    square = 0.0
+    for m in range(size):
+        square += z[m * n + i] * z[m * n + i]
     for k in range(rows):
         row, along = at(by_state, k * size * n), 0.0
         for m in range(size):
