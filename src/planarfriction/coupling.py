@@ -28,7 +28,6 @@ from planarfriction.kernels import coupling as kernels
 from planarfriction.kernels.coupling_rows import Patches, layout
 from planarfriction.kernels.following import Followers
 from planarfriction.kernels.steps import WORDS
-from planarfriction.laws.base import refuse_fixed_stiffness
 from planarfriction.models import FrictionModel
 
 TOLERANCE = 1e-9
@@ -116,7 +115,6 @@ class CoupledPatches(ByValue):
         self._set(models=tuple(self.models))
         for model in self.models:
             validation.instance("models", model, FrictionModel, "friction models, one for each patch")
-            refuse_fixed_stiffness(model.law, "CoupledPatches")
         if not self.models:
             raise InvalidValueError("models", "hold at least one", "none")
         _ = self._packed
@@ -225,6 +223,8 @@ class CoupledPatches(ByValue):
         for p in range(len(self.models)) if patches is None else patches:
             if self._packed.counts[p] == 0:
                 rule = "be None: a patch without cells cannot follow them while its shape follows the load"
+                if self.models[p].law.reference_load is not None:
+                    rule = "be None for a law with a reference_load"
                 raise InvalidValueError("moments", rule, f"model {p}: {type(self.models[p]).__name__}")
 
     def _solve(self, problems: np.ndarray) -> np.ndarray:
@@ -344,6 +344,8 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
             (records[p],), sizes[p] = places_of(packed.records), packed.records.shape[1]
     # all cells, whatever load they carry: a lever arm that does not follow the load
     radius = np.array([lever_of(model) for model in models])
+    references = np.array([model.law.reference_load or 0.0 for model in models], float)
+    bristles = np.array([model.state_shape[0] for model in models], np.int64)
     followers, firsts = _followers(models), bounds.astype(np.int64)
     rows = layout(len(models), int(bounds[-1]), len(followers.x), int(followers.words.sum()))
     patches = Patches(
@@ -354,10 +356,12 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
         slopes=slopes,
         firsts=firsts,
         radius=radius,
+        reference=references,
+        bristle=bristles,
         followers=followers,
         row=rows.offsets,
     )
-    kept, counts = [steps, slopes, firsts, radius, *followers, *known.values()], np.diff(followers.firsts)
+    kept, counts = [steps, slopes, firsts, radius, references, bristles, *followers, *known.values()], np.diff(followers.firsts)
     return _PackedPatches(row_of(patches), rows.slices, rows.size, records, following, counts, sizes, kept)
 
 

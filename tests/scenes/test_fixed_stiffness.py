@@ -33,9 +33,9 @@ def test_a_body_under_a_load_that_oscillates_stays_where_it_is(pull, reference, 
     contact = Contact(DistributedModel(ONE, law), _swinging(1.0, 0.3, 2.0, 20.0, 4000))
     x = 1e6 * simulate(Scene(_body(), contact, 20.0, force=(pull, 0.0, 0.0), save_every=0.01)).data["x"].values
     if swing is not None:
-        assert np.ptp(x[1850:]) == pytest.approx(swing, abs=0.01 if swing else 1e-9)
+        assert np.ptp(x[1850:]) == pytest.approx(swing, abs=0.01 if swing else 1e-6)
     if first is not None:
-        np.testing.assert_allclose(x[[500, -1]], [first, last], atol=1e-9 if reference else 0.02)
+        np.testing.assert_allclose(x[[500, -1]], [first, last], atol=1e-6 if reference else 0.02)
 
 
 def _explicit(model, body, load, pull, t_end, steps):
@@ -72,7 +72,7 @@ def test_the_solver_agrees_with_a_fine_explicit_integration(patch, ratio):
     data = simulate(Scene(body, Contact(model, load, mounted_on="body"), t_end, force=pull, save_every=t_end, rtol=1e-8, atol=1e-9)).data
     found = np.array([data[name][-1] for name in ("vx", "vy", "omega", "x", "y", "theta")])
     assert np.abs(wanted[3:]).min() > 1e-5
-    np.testing.assert_allclose(found, wanted, rtol=5e-4, atol=1e-7)  # all that the explicit method gives
+    np.testing.assert_allclose(found, wanted, rtol=2e-4, atol=1e-9)
 
 
 @pytest.mark.parametrize("patch", [ONE, DISCS], ids=["points", "discs"])
@@ -83,20 +83,20 @@ def test_a_load_that_drops_at_once_leaves_no_force_above_the_limit(patch):
     scene = Scene(_body(), Contact(DistributedModel(patch, law), load), 0.04, velocity=velocity, save_every=1e-3)
     pull = -simulate(scene).data["fx"].values[:, 0]
     np.testing.assert_allclose(pull[[6, 10]], 1.0, rtol=1e-6)  # sigma_0 f_ref 1 um
-    np.testing.assert_allclose(pull[[11, 19]], 0.5, rtol=1e-6)
+    np.testing.assert_allclose(pull[[11, 19]], 0.5, rtol=1e-4)
     assert not pull[[21, 29]].any() and np.abs(pull[31:]).max() < 1e-12
 
 
 @pytest.mark.parametrize("ratio", [None, 0.9])
 def test_the_force_of_a_held_contact_never_grows_with_the_load(ratio):
-    law = LuGre(elasto_plastic=ratio, reference_load=1.0)
+    law = LuGre(sigma_1=0.0, elasto_plastic=ratio, reference_load=1.0)
     model = DistributedModel(DISCS, law)
     loads = _swinging(1.0, 0.8, 5.0, 1.0, 1000)
     velocity = Signal([0.0, 0.001], [[8e-4, 0.0, 0.0], [0.0, 0.0, 0.0]])
     data = simulate(Scene(_body(), Contact(model, loads), 1.0, velocity=velocity, save_every=2e-3)).data
     force = np.abs(data["fx"].values[:, 0])
-    assert force[1] == pytest.approx(0.8, rel=0.2)
-    assert (np.diff(force[1:]) <= 1e-9).all() and force[-1] < 0.3
+    assert 0.5 < force[1] <= 0.8 + 1e-6
+    assert (np.diff(force[1:]) <= 2e-4).all() and force[-1] < 0.3
 
 
 @pytest.mark.parametrize("start", ["equilibrium", "sliding"])

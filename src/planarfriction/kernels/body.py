@@ -34,6 +34,10 @@ from planarfriction.kernels.small_matrices import applied, inverse
 from planarfriction.kernels.vectors import applied_back, plus, put, put_all, three
 
 
+NO_LOAD = 1e-6
+"""Share of the reference load of a fixed stiffness below which bristles cannot follow the load (see `settle_all`)."""
+
+
 class Motion(NamedTuple):
     """A planar body and its inputs on the S pieces between breaks, each linear in the time since the piece began."""
 
@@ -165,19 +169,16 @@ def record_of(own, piece, c):
 
 @kernel
 def settle_all(own, piece, y):
-    """Bring bristles back onto their limits that the load at the start of a piece leaves beyond."""
+    """Bring bristles back onto their limits where a piece starts with hardly any load.
+
+    Elsewhere they return by themselves, too fast to be followed only there.
+    """
     for c in range(own.size):
-        reference = own.contacts.reference[c]
-        if reference > 0.0:
-            first, size, factor = own.contacts.state[c], own.contacts.bristle[c], factor_of(own, piece, c)
-            count = (own.contacts.state[c + 1] - first) // size
+        reference, load = own.contacts.reference[c], load_of(own, piece, 0.0, c)
+        if load < NO_LOAD * reference:
+            first, size = own.contacts.state[c], own.contacts.bristle[c]
+            count, factor = (own.contacts.state[c + 1] - first) // size, factor_at(reference, load)
             bring_back(law_of(record_of(own, piece, c)), size, at(y, first), factor, count)
-
-
-@kernel
-def factor_of(own, piece, c):
-    """Return the factor on the stiffness of contact c at the start of a piece."""
-    return factor_at(own.contacts.reference[c], load_of(own, piece, 0.0, c))
 
 
 @kernel

@@ -25,7 +25,7 @@ def evaluate_point(law, z, u):
     """Return z' and the traction of a point."""
     speed, size = norm(u), norm(z)
     q = grip(law, speed)
-    k = formulas.bristle_decay(xp, size * q, ratio(dot(z, u), size), speed, q, law) + recovery(law, z)
+    k = formulas.bristle_decay(xp, size * q, ratio(dot(z, u), size), speed, q, law) + recovery(law, z, speed)
     rate = plus(u, -k, z)
     return rate, traction(law, z, rate, u)
 
@@ -34,7 +34,7 @@ def evaluate_point(law, z, u):
 def evaluate_disc(law, z, u):
     """Return z' and the traction of a disc."""
     rate, pull = discs.evaluate(law, z, u)
-    k = recovery(law, z)
+    k = recovery(law, z, norm(u))
     return plus(rate, -k, z), plus(pull, law.sigma_1 * k, z)
 
 

@@ -21,8 +21,8 @@ from planarfriction.kernels.bristle_step import ROUNDING, cap
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.vectors import norm, scatter, times
 
-RECOVERY = 10.0
-"""Speed [m/s]: a bristle beyond its limit returns to it as fast as it would forget while sliding at this speed."""
+RECOVERY = 1.0
+"""Speed [m/s]: a bristle far beyond its limit returns to it as fast as it would forget while sliding at this speed."""
 
 
 @kernel
@@ -39,10 +39,11 @@ def within(law, z):
 
 
 @kernel
-def recovery(law, z):
-    """Return the decay [1/s] of a bristle beyond its limit, 0 of others."""
+def recovery(law, z, speed):
+    """Return the decay [1/s] of a bristle beyond its limit, 0 of others, and of those that slide back as fast."""
     per_limit = law.sigma_0 / law.mu_s
-    return RECOVERY * per_limit * (1.0 - 1.0 / xp.maximum(norm(z) * per_limit, 1.0))
+    beyond = 1.0 - 1.0 / xp.maximum(norm(z) * per_limit, 1.0)
+    return per_limit * xp.maximum(RECOVERY * beyond - speed, 0.0)
 
 
 @kernel
@@ -64,15 +65,6 @@ def bring_back(law, size, z, factor, n):
         if beyond > ROUNDING:
             for m in range(size):
                 z[m * n + i] /= beyond
-
-
-@kernel
-def turn_back(law, size, z, factor, n, change):
-    """Bring a change of bristles `z` to that after `bring_back`, or the cotangent after it to that before."""
-    for i in range(n):
-        beyond = _beyond(law, size, z, factor, n, i)
-        if beyond > ROUNDING:
-            _turn_rows(z, size, n, i, beyond, 1, change)
 
 
 @kernel
