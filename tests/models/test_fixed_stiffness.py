@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planarfriction.derivatives import rollout, rollout_jvp, rollout_vjp
 from planarfriction.errors import InvalidValueError
+from planarfriction.export.pieces import pieces_of
 from planarfriction.laws import CoulombStribeck, Dahl, LuGre
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
@@ -193,6 +195,18 @@ def test_a_single_bristle_follows_the_same_equations():
         fixed.rate(z, v)
 
 
+def test_rollouts_are_steps_and_their_derivatives_refuse():
+    model, twists, loads = DistributedModel(_DISC, LuGre(reference_load=REFERENCE)), _twists(5), np.linspace(0.5, 3.0, 40)
+    done, state = rollout(model, None, twists, loads, 1e-3), model.rest()
+    for t, (twist, load) in enumerate(zip(twists, loads, strict=True)):
+        state, pull = model.step(state, twist, load, 1e-3)
+        np.testing.assert_array_equal(done.wrenches[t], pull)
+    np.testing.assert_array_equal(done.state, state)
+    for refused, more in ((rollout_vjp, (np.ones((40, 3)),)), (rollout_jvp, ())):
+        with pytest.raises(InvalidValueError, match="law must have no reference_load for compiled roll-outs"):
+            refused(model, None, twists, loads, 1e-3, *more)
+
+
 def test_what_does_not_know_a_fixed_stiffness_says_so():
     law = LuGre(reference_load=REFERENCE)
     with pytest.raises(InvalidValueError, match="reference_load must be > 0, got 0"):
@@ -207,5 +221,7 @@ def test_what_does_not_know_a_fixed_stiffness_says_so():
         model.step(model.rest(), np.zeros(3), 1.0, 1e-3, moments=[0.0, 0.0])
     with pytest.raises(TypeError):
         CoulombStribeck(reference_load=1.0)
+    with pytest.raises(InvalidValueError, match="law must have no reference_load for compiled sources"):
+        pieces_of(model)
     assert "reference_load=2" in repr(model)
     assert law != LuGre() and LuGre(reference_load=None) == LuGre()
