@@ -1,4 +1,4 @@
-"""Measure where each model lets go, how it creeps while it holds, and its price: `python docs/make_breakaway.py`.
+"""Measure where models let go, how they creep, and what more discs buy: `python docs/make_breakaway.py`.
 
 Numbers are kept in docs/breakaway.json; what is missing there is measured, and the tables of the pages (below lines
 `<!-- breakaway: NAME -->`) and the picture are written from it. Delete the file to measure all again.
@@ -21,6 +21,7 @@ from planarfriction.derivatives import rollout, rollout_states, rollout_vjp
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.plots import style
 from planarfriction_studies.bench.measurement import mixed_twists
+from planarfriction_studies.experiments.beyond import cells as few
 
 DOCS = Path(__file__).parent
 KEPT, PICTURE = DOCS / "breakaway.json", DOCS / "images" / "breakaway.png"
@@ -30,15 +31,31 @@ LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 LOAD = 10.0
 """Normal force [N] of the ramps and of the shaken contacts."""
 
+DEFAULT = pf.ReducedModel.cells
+COUNTS = (8, 16, DEFAULT, 32, 64, 128)
+"""Numbers of discs that are compared."""
+
+
+def discs(n: int) -> Callable[[pf.ContactPatch], pf.ReducedModel]:
+    """Return a maker of the reduced model with n discs."""
+    return lambda patch: pf.ReducedModel(patch, LAW, cells=n)
+
+
 MODELS: dict[str, tuple[Callable[[pf.ContactPatch], Any], str]] = {
-    "distributed": (lambda patch: pf.DistributedModel(patch, LAW), style.DISTRIBUTED),
-    "default": (lambda patch: pf.ReducedModel(patch, LAW), style.FEW),
-    'parts="auto"': (lambda patch: pf.ReducedModel(patch, LAW, parts="auto"), style.PARTS),
-    "4 parts": (lambda patch: pf.ReducedModel(patch, LAW, parts=4), style.EXACT),
-    "1 part": (lambda patch: pf.ReducedModel(patch, LAW, parts=1), style.MOMENTS),
+    "all cells": (lambda patch: pf.DistributedModel(patch, LAW), style.DISTRIBUTED),
+    "64 discs": (discs(64), style.PALETTE[2]),
+    "default": (discs(DEFAULT), style.OF_MODEL["reduced"]),
+    "8 discs": (discs(8), style.PALETTE[3]),
     "published": (lambda patch: pf.ReducedModelPublished(patch, LAW), style.PUBLISHED),
 }
 """Models by the words of the tables: how they are made, and their colour."""
+
+PRICED: dict[str, Callable[[pf.ContactPatch], Any]] = {name: make for name, (make, _) in MODELS.items()}
+PRICED |= {f"{n} discs": discs(n) for n in COUNTS} | {"a disc a cell": lambda patch: discs(patch.cells)(patch)}
+"""Models whose steps are timed."""
+
+SEEDS = 10
+"""Driven motions of each shape."""
 
 FINER = "refined(2)"
 """Distributed model on finer cells, beside the shaken contacts."""
@@ -140,10 +157,20 @@ def two_pads(name: str) -> dict[str, float]:
     return least | {"slip": float(np.hypot(data.x[-1] - data.x[0], data.y[-1] - data.y[0]))}
 
 
+def driven(shape: str) -> dict[str, list[list[float]]]:
+    """Return by number of discs the largest and the rms error of the force of each driven motion, over `mu_c f_N`."""
+    patch = few.SHAPES[shape]()
+    models = {str(n): discs(n)(patch) for n in COUNTS if n < patch.cells}
+    models |= {"a disc a cell": discs(patch.cells)(patch), "all cells": pf.DistributedModel(patch, LAW),
+               "published": pf.ReducedModelPublished(patch, LAW)}  # fmt: skip
+    found = few.driven(patch, models, few.stopping, SEEDS)
+    return {name: [[float(each[0]), float(each[2])] for each in errors] for name, errors in found.items()}
+
+
 def prices(steps: int = 20_000, rounds: int = 9) -> dict[str, dict[str, float]]:
     """Return by model its states, and the times of a rollout and of its gradient over the published model's."""
     twists, loads = mixed_twists(steps), np.full(steps, 2.0)
-    models = {name: make(PUBLISHED_PATCHES["Circle"]()) for name, (make, _) in MODELS.items()}
+    models = {name: make(PUBLISHED_PATCHES["Circle"]()) for name, make in PRICED.items()}
 
     def gradient(model: Any) -> None:
         _, wrenches, states = rollout_states(model, model.rest(), twists, loads, 1e-4)
@@ -174,7 +201,7 @@ def shaken(shape: str, level: float) -> dict[str, float]:
     fx, fy, spin = 0.43 + 0.32 * np.sin(phase), 0.27 * np.cos(phase), 0.27 + 0.32 * np.cos(phase + 0.6)
     wrenches = LOAD * grown[:, None] * np.stack([fx, fy, r * spin], axis=1)
     wrenches *= level / highest_level(patch, wrenches[100:300])
-    makes = {name: make for name, (make, _) in MODELS.items() if name != "4 parts"}
+    makes = {name: make for name, (make, _) in MODELS.items()}
     makes[FINER] = lambda patch: pf.DistributedModel(patch.refined(2), LAW)
     found = {}
     for name, make in makes.items():
@@ -217,19 +244,31 @@ def table_of_models(kept: dict[str, Any]) -> Rows:
 
 def table_of_creep(kept: dict[str, Any]) -> Rows:
     """Rows: largest creep per cycle [nm] of all shapes, by level and model, without finer cells."""
-    names = [name for name in MODELS if name != "4 parts"]
-    rows = [["largest load", *names]]
+    rows = [["largest load", *MODELS]]
     for level in LEVELS:
         found = [kept[f"shaken {shape} {level}"] for shape in SHAKEN]
         cells = []
-        for name in names:
+        for name in MODELS:
             value = max(1e9 * numbers[f"{name}, {T_END:g} s"] for numbers in found)
             cells.append(f"{value:.2g}" if value < 99.5 else f"{value:.0f}")
         rows.append([f"{level:g}", *cells])
     return rows
 
 
-TABLES = {"models": table_of_models, "creep": table_of_creep}
+def table_of_cells(kept: dict[str, Any]) -> Rows:
+    """Rows: states, price and errors of driven motions, by number of discs."""
+    rows = [["discs", "states", "step", "largest error of the force: median run", "worst run", "rms, median run"]]
+    for name in (*map(str, COUNTS), "a disc a cell", "all cells", "published"):
+        price = kept["prices"].get(name) or kept["prices"][f"{name} discs"]
+        runs = [np.array(kept[f"driven {shape}"][name]) for shape in few.SHAPES if name in kept[f"driven {shape}"]]
+        largest, rms = 100 * np.concatenate(runs).T
+        words = {str(DEFAULT): f"**{DEFAULT}**", "all cells": "none: a point a cell", "published": "none: published"}
+        rows.append([words.get(name, name), f"{price['states']:.0f}", f"{price['step']:.2g}",
+                     f"{np.median(largest):.2g} %", f"{largest.max():.2g} %", f"{np.median(rms):.2g} %"])  # fmt: skip
+    return rows
+
+
+TABLES = {"models": table_of_models, "creep": table_of_creep, "cells": table_of_cells}
 
 
 def draw(kept: dict[str, Any]) -> style.PlotFigure:
@@ -238,7 +277,7 @@ def draw(kept: dict[str, Any]) -> style.PlotFigure:
     left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0), sharey=True)
     for k, (name, (_, colour)) in enumerate(MODELS.items()):
         errors = [100 * np.abs(kept[f"breakaway {shape}"][name]) for shape in SHAPES]
-        places = np.repeat(np.arange(len(SHAPES)) + 0.13 * (k - 2.5), len(errors[0]))
+        places = np.repeat(np.arange(len(SHAPES)) + 0.15 * (k - 2.0), len(errors[0]))
         left.plot(places, np.maximum(np.concatenate(errors), 1e-3), "o", color=colour, ms=3.5, alpha=0.7, label=name)
         price, worst = kept["prices"][name]["step"], max(each.max() for each in errors)
         right.plot(price, worst, "o", color=colour, ms=8)
@@ -260,6 +299,7 @@ def measures() -> Iterator[tuple[str, Callable[[], Any]]]:
     yield from ((f"breakaway {shape}", lambda shape=shape: breakaway(shape)) for shape in SHAPES)
     yield from ((f"two pads {name}", lambda name=name: two_pads(name)) for name in MODELS)
     yield "prices", prices
+    yield from ((f"driven {shape}", lambda shape=shape: driven(shape)) for shape in few.SHAPES)
     for level in LEVELS:
         for shape in SHAKEN:
             yield f"shaken {shape} {level}", lambda shape=shape, level=level: shaken(shape, level)

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Circle, Rectangle
 
 import planarfriction as pf
 from planarfriction import plots
@@ -41,10 +41,29 @@ def figures() -> dict[str, plots.style.PlotFigure]:
         "limit-surface": plots.plot_limit_surface(pf.LimitSurfaceExact(pads)),
         "pre-sliding-cycles": pre_sliding_cycles(),
         "grip-plan": grip_plan(),
+        "discs": discs(),
         "pressure-map": plots.plot_patch(fingertip(), normal_force=5.0),
         "concept-motions": motions(),
         "concept-bristle": bristle(),
     }
+
+
+def discs() -> plots.style.PlotFigure:
+    """Draw the discs that stand for three patches, the darker the more load they carry, over the cells."""
+    figure = plots.style.new_figure(9.0, 3.1)
+    circle, tee = (PUBLISHED_PATCHES[name]() for name in ("Circle", "NonConvex2"))
+    patches = {"a disc": circle, "a T": tee, "a fingertip": fingertip()}
+    for axes, (words, patch) in zip(figure.subplots(1, 3), patches.items(), strict=True):
+        few = patch.discs(pf.ReducedModel.cells)
+        axes.plot(*1e3 * patch.positions.T, ".", color="0.6", ms=1.5)
+        shares = few.weights() / few.weights().max()
+        for centre, radius, share in zip(1e3 * few.positions, 1e3 * few.radii, shares, strict=True):
+            axes.add_patch(Circle(centre, radius, color=plots.style.OF_MODEL["reduced"], alpha=0.6 * share, lw=0.0))
+            axes.add_patch(Circle(centre, radius, fill=False, color="0.3", lw=0.6))
+        axes.set_title(f"{words}: {few.cells} discs for {patch.cells} cells", fontsize="medium")
+        axes.set(aspect="equal", xticks=(), yticks=(), xlim=(-12, 12), ylim=(-12, 12))
+        axes.spines[:].set_visible(False)
+    return figure
 
 
 def motions() -> plots.style.PlotFigure:
@@ -104,7 +123,7 @@ def small_cycles(model: pf.ReducedModel | pf.ReducedModelPublished, cycles: int 
 
 
 def pre_sliding_cycles() -> plots.style.PlotFigure:
-    """Small closed motions: the published reduced model ratchets and gives energy, that of moments does not."""
+    """Small closed motions: the published reduced model ratchets and gives energy, discs do not."""
     law = pf.LuGre(mu_s=1.2, elasto_plastic=0.9, sigma_1=0.0, sigma_2=0.0)
     figure = plots.style.new_figure(8.0, 3.2)
     force, energy = figure.subplots(1, 2)

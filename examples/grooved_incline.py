@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 import planarfriction as pf
-from planarfriction.plots.style import DISTRIBUTED, EXACT, MOMENTS, PALETTE, new_figure, tidy
+from planarfriction.plots.style import DISTRIBUTED, EXACT, FEW, PALETTE, new_figure, tidy
 
 G = 9.81  # [m/s^2]
 ANGLE, ALONG, ACROSS = np.radians(-50.0), 0.6, 1.0  # grooves from the x axis; coefficients relative to MU
@@ -91,7 +91,7 @@ def draw(slopes: np.ndarray, found: dict[str, list[float]], path: pf.Solution, s
     axes[0].legend(fontsize=8, loc="upper right")
     fine = np.linspace(steepest_at_rest() + 1e-6, np.radians(62.0), 200)
     axes[1].plot(np.degrees(fine), np.degrees([drift(s) for s in fine]), color=EXACT, label="closed form")
-    for (kind, values), mark, colour in zip(found.items(), "ox", (DISTRIBUTED, MOMENTS), strict=True):
+    for (kind, values), mark, colour in zip(found.items(), "ox", (DISTRIBUTED, FEW), strict=True):
         axes[1].plot(np.degrees(slopes), np.degrees(values), mark, color=colour, label=kind, fillstyle="none")
     axes[1].axvspan(10.0, np.degrees(steepest_at_rest()), color="0.9", label="stays at rest")
     axes[1].set(xlabel="slope [deg]", ylabel="drift from the fall line [deg]", xlim=(10.0, 62.0), ylim=(0.0, None))

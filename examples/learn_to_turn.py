@@ -71,7 +71,7 @@ class TurnInHand(gymnasium.vector.VectorEnv):
         self.single_observation_space = gymnasium.spaces.Box(low, high)
         self.action_space = gymnasium.vector.utils.batch_space(self.single_action_space, worlds)
         self.observation_space = gymnasium.vector.utils.batch_space(self.single_observation_space, worlds)
-        pad = pf.ReducedModel(pf.ContactPatch.disc(radius=RADIUS, cells=21), LAW, parts=1)
+        pad = pf.ReducedModel(pf.ContactPatch.disc(radius=RADIUS, cells=21), LAW)
         patches = [PatchContact(pad, site=side, geoms=(side, "plate")) for side in SIDES]
         spec = mujoco.MjSpec.from_string(HAND)
         prepare(spec, patches)

@@ -41,7 +41,7 @@ def patch_friction(solver: Any) -> Friction:
     """Return the friction of a disc of the size of the shape."""
     m = solver.mj_model
     law = pf.LuGre(mu_c=MU, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
-    disc = pf.ReducedModel(pf.ContactPatch.disc(radius=RADIUS, cells=31), law, parts=1)
+    disc = pf.ReducedModel(pf.ContactPatch.disc(radius=RADIUS, cells=31), law)
     patch = PatchContact(disc, site=m.site(0).name, geoms=(m.geom(0).name, m.geom(1).name))
     return Friction(m, [patch], model=solver.mjw_model, data=solver.mjw_data)
 

@@ -12,6 +12,7 @@ from scipy.optimize import fsolve
 import planarfriction as pf
 from planarfriction.compiler import jit
 from planarfriction.compiler.calls import address_of, call
+from planarfriction.compiler.memory import place_of
 from planarfriction.coupling import CoupledPatches, CoupledStep, HostStep
 from planarfriction.kernels.steps import SLOPES, WORDS
 from planarfriction.patch import friction_metric
@@ -35,12 +36,11 @@ MODELS = {
     "distributed, Stribeck exponent 1": pf.DistributedModel(DISC, pf.LuGre(mu_s=1.2, gamma=1.0)),
     "distributed, grain": pf.DistributedModel(GRAINED, LAW),
     "distributed, asymmetric": pf.DistributedModel(LOPSIDED, LAW),
-    "reduced": pf.ReducedModel(DISC, LAW, parts=1),
-    "reduced, plain": pf.ReducedModel(DISC, PLAIN, parts=1),
+    "reduced": pf.ReducedModel(DISC, LAW),
+    "reduced, plain": pf.ReducedModel(DISC, PLAIN),
     "distributed, a rate of its own": pf.DistributedModel(DISC, BoucWen()),
     "distributed, a rate of its own, grain": pf.DistributedModel(GRAINED, BoucWen()),
-    "reduced, grain": pf.ReducedModel(GRAINED, LAW, parts=1),
-    "reduced, four parts": pf.ReducedModel(DISC, LAW, parts=4),
+    "reduced, grain": pf.ReducedModel(GRAINED, LAW),
     "published": pf.ReducedModelPublished(DISC, LAW),
     "published, off its origin": pf.ReducedModelPublished(ASIDE, LAW),
     "published, grain": pf.ReducedModelPublished(GRAINED, LAW, surface=pf.LimitSurfaceTable(GRAINED)),
@@ -55,20 +55,15 @@ def _called(function, record, z, v, dt, new, out):
 @pytest.mark.parametrize("name", MODELS)
 def test_compiled_steps_and_their_slopes_are_those_of_the_model(name):
     model, generator = MODELS[name], np.random.default_rng(1)
-    steps, function = model.compiled.packed_parts([None]), address_of(model.compiled.functions.slopes, WORDS)
+    packed, function = model.compiled.with_all_states([None]), address_of(model.compiled.functions.slopes, WORDS)
     for _ in range(40):
         twist = generator.normal(size=3) * [1.0, 1.0, 100.0] * 10.0 ** generator.uniform(-5.0, -1.0)
         dt = 10.0 ** generator.uniform(-5.0, -2.0)
         small = [1.0, 1.0, 0.01] if isinstance(model, pf.ReducedModelPublished) else 1.0
         state = generator.uniform(-0.7, 0.7, model.state_shape) * model.law.largest_deflection * small
-        new, wrench, slopes = np.zeros(state.size), np.zeros(3), np.zeros((3, 3))
-        pieces, given = steps.addresses.shape[1], state.reshape(-1).copy()
-        for own, part in enumerate(np.split(np.arange(state.size), pieces)):
-            out, moved = np.empty(SLOPES), np.empty(len(part))
-            _called(function, steps.addresses[0, own], given[part], twist, dt, moved, out)
-            new[part] = moved
-            wrench += steps.shares[0, own] * out[:3]
-            slopes += steps.shares[0, own] * out[3:].reshape(3, 3)
+        new, out = np.empty(state.size), np.empty(SLOPES)
+        _called(function, place_of(packed.records), state.reshape(-1), twist, dt, new, out)
+        wrench, slopes = out[:3], out[3:].reshape(3, 3)
         expected_state, expected = model.step(state, twist, 1.0, dt)
         expected_slopes = model.step_jacobians(state, twist, 1.0, dt).wrench_twist
         # other code for the same formulas: rounding, through exponentials of up to 1e4
@@ -162,7 +157,7 @@ def test_agrees_with_a_dense_solver(rank):
 def test_patches_that_do_not_see_each_other_step_alone():
     generator = np.random.default_rng(3)
     models = [
-        pf.ReducedModel(DISC, LAW, parts=1),
+        pf.ReducedModel(DISC, LAW),
         pf.DistributedModel(DISC, PLAIN),
         pf.ReducedModelPublished(DISC, LAW),
     ]
@@ -190,7 +185,8 @@ def test_axes_broadcast():
     patches, host = CoupledPatches([MODELS["reduced"]]), _host(np.random.default_rng(2), 1)
     many = host._replace(normal_force=np.linspace(0.5, 2.0, 4)[:, None])
     step = patches.step(patches.rest(), many, np.array([[1e-3], [1e-2]]))
-    assert step.twist.shape == (2, 4, 1, 3) and step.state.shape == (2, 4, 3) and step.converged.shape == (2, 4)
+    assert step.twist.shape == (2, 4, 1, 3) and step.converged.shape == (2, 4)
+    assert step.state.shape == (2, 4, *patches.state_shape)
     alone = patches.step(patches.rest(), many._replace(normal_force=many.normal_force[2]), 1e-2)
     assert np.array_equal(alone.wrench, step.wrench[1, 2])
     assert patches.step(patches.rest(), host, np.empty(0)).twist.shape == (0, 1, 3)
@@ -216,7 +212,7 @@ def test_loads_follow_wrenches_and_vanish_at_zero():
 
 
 def test_shapes_follow_the_loads_that_come_out():
-    models = [pf.ReducedModel(SOFT, LAW, parts=1), pf.DistributedModel(SOFT, LAW), pf.ReducedModel(SOFT, LAW, parts=2)]
+    models = [pf.ReducedModel(SOFT, LAW), pf.DistributedModel(SOFT, LAW), pf.ReducedModelPublished(SOFT, LAW)]
     patches, generator = CoupledPatches(models), np.random.default_rng(4)
     hosts = [_host(generator, 3) for _ in range(6)]
     host = HostStep(*(np.stack(field) for field in zip(*(each[:4] for each in hosts), strict=True)))
@@ -283,7 +279,7 @@ def test_approaches_the_solver_with_order_one(kind):
 @pytest.mark.parametrize("damping", [0.0, 800.0])
 def test_what_sticks_does_not_creep(dt, damping):
     """Pushed with two thirds of what friction can hold, at any step length and without damping: it leans and stays."""
-    model = pf.ReducedModel(DISC, pf.LuGre(mu_s=1.2, sigma_0=1e6, sigma_1=damping, elasto_plastic=0.9), parts=1)
+    model = pf.ReducedModel(DISC, pf.LuGre(mu_s=1.2, sigma_0=1e6, sigma_1=damping, elasto_plastic=0.9))
     first, last = (_box(dt, steps * dt, model, push=(1.3, 0.0, 0.0)) for steps in (400, 800))
     # steps of the tolerance, 1e-9 m/s, that do not add up
     assert abs(last - first)[:2].max() / (400 * dt) < 1e-10
@@ -395,7 +391,7 @@ def test_bad_input_is_refused_in_one_line(name):
     given = {"state": np.zeros(3), "dt": 1e-3, **wrong}
     options = {key: given.pop(key) for key in ("tolerance", "iterations") if key in given}
     state, dt = given.pop("state"), given.pop("dt")
-    patches = CoupledPatches([MODELS["reduced"]])
+    patches = CoupledPatches([MODELS["published"]])
     with pytest.raises(pf.errors.InvalidValueError, match=message):
         patches.step(state, _changed(**given), dt, **options)
 
@@ -419,15 +415,15 @@ def test_models_are_checked(models, message):
 
 
 def test_a_host_is_a_host_step_and_states_are_views():
-    patches = CoupledPatches([MODELS["reduced"], MODELS["reduced, four parts"]])
+    patches = CoupledPatches([MODELS["published"], MODELS["distributed"]])
     with pytest.raises(pf.errors.InvalidValueError, match="host must be a HostStep, got tuple"):
         patches.step(patches.rest(), (1, 2), 1e-3)  # pyright: ignore[reportArgumentType]
-    with pytest.raises(pf.errors.InvalidValueError, match=r"state must be an array of shape \[..., 15\]"):
+    with pytest.raises(pf.errors.InvalidValueError, match=r"state must be an array of shape \[..., 157\]"):
         patches.states(np.zeros(3))
     state = patches.rest()
     one, other = patches.states(state)
-    one[:], other[2] = 1.0, 2.0
-    assert state[:3].sum() == 3.0 and other.shape == (4, 3) and (state[9:12] == 2.0).all()
+    one[:], other[0, 2] = 1.0, 2.0
+    assert state[:3].sum() == 3.0 and other.shape == (2, 77) and state[5] == 2.0
 
 
 def test_copies_are_equal_and_step_alike():

@@ -12,7 +12,9 @@ from tests.support.coupling_problems import abrupt_run, random_bodies, random_ru
 LAW = pf.LuGre(mu_s=1.2, sigma_0=1e8, elasto_plastic=0.9)
 """Bristles a hundred times stiffer than published."""
 
-PATCHES = CoupledPatches([pf.ReducedModel(pf.ContactPatch.disc(radius=0.01, cells=9), LAW, parts=1)] * 4)
+PATCH = pf.ContactPatch.disc(radius=0.01, cells=9)
+ELLIPSOID = pf.LimitSurfaceEllipsoid(PATCH)
+PATCHES = CoupledPatches([pf.ReducedModelPublished(PATCH, LAW, ELLIPSOID)] * 4)
 
 
 def _runs(height: float, steps: int):
@@ -28,7 +30,8 @@ def _excess_work(state, host, step, dt) -> np.ndarray:
     change = flat - host.wrench.reshape(count, -1)
     twist = host.twist.reshape(count, -1) + np.einsum("eij,ej->ei", host.twist_response, change)
     work = dt * (twist * flat).sum(axis=1)
-    squares = ((z.reshape(count, 4, 3) ** 2).sum(axis=2) for z in (state, step.state))
+    lengths = np.array([1.0, 1.0, ELLIPSOID.contact_radius])
+    squares = (((z.reshape(count, 4, 3) / lengths) ** 2).sum(axis=2) for z in (state, step.state))
     before, after = (0.5 * LAW.sigma_0 * (step.normal_force * each).sum(axis=1) for each in squares)
     return (work - (before - after)) / (abs(work) + before + after + 1e-300)
 

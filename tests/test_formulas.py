@@ -53,23 +53,6 @@ def test_stribeck_falls_from_static_to_coulomb_friction(gamma):
     assert at_v_s == pytest.approx(0.7 + 0.4 / math.e, rel=1e-15)  # rounding
 
 
-@pytest.mark.parametrize("gamma", GAMMAS)
-def test_stribeck_slope_is_the_slope(gamma):
-    speed = LAW["v_s"] * np.linspace(0.2, 4.0, 300)
-    expected = slope(lambda v: formulas.stribeck(np, v, law_of(gamma=gamma)), speed, 1e-3 * LAW["v_s"])
-    # Largest slope 300 s/m; rounding of g over the step 1e-16/2e-6, truncation (1e-3)^4 of that of the curve.
-    assert formulas.stribeck_slope(np, speed, law_of(gamma=gamma)) == pytest.approx(expected, abs=1e-9 * 300)
-
-
-def test_stribeck_slope_at_rest_is_the_limit_from_the_right():
-    at_rest = [formulas.stribeck_slope(np, 0.0, law_of(gamma=gamma)) for gamma in GAMMAS]
-    assert at_rest == pytest.approx([-0.4 / 2e-3, 0.0, 0.0, 0.0])  # finite for gamma >= 1
-    nearby = [formulas.stribeck_slope(np, 1e-30, law_of(gamma=gamma)) for gamma in GAMMAS]
-    assert nearby == pytest.approx(at_rest, abs=1e-9)  # gamma = 1.5: sqrt(1e-27) of 200 s/m
-    # Below 1 the limit is infinite: documented as zero.
-    assert formulas.stribeck_slope(np, 0.0, law_of(gamma=0.5)) == 0.0
-
-
 # ---------------------------------------------------------------------- slip fraction
 
 
@@ -188,16 +171,6 @@ def test_decay_by_breakaway_is_the_slope(ratio):
     assert formulas.bristle_decay_by_breakaway(np, 1e-16, 1e6, ratio) == 0.0  # beyond full deflection nothing moves
 
 
-@pytest.mark.parametrize("least", [0.2, 1.0])
-def test_floor_slopes_are_the_slopes(least):
-    value = np.linspace(-1.0, 3.0, 41) * least + 1e-2
-    by_value = slope(lambda v: formulas.floored(np, v, least), value, 1e-4)
-    by_least = slope(lambda e: formulas.floored(np, value, e), least, 1e-4)
-    # Quadratic: rounding of 1e-16/1e-4.
-    assert formulas.floored_slope(np, value, least) == pytest.approx(by_value, abs=1e-11)
-    assert formulas.floored_by_least(np, value, least) == pytest.approx(by_least, abs=1e-11)
-
-
 def test_relaxation_slope_is_the_slope():
     x = 10.0 ** np.linspace(-5.0, 2.0, 300)
     got = formulas.relaxation_slope(np, x, *formulas.relaxation(np, x))
@@ -220,18 +193,17 @@ def compiled(speed, deflection, along, grip, laws, decay_dt, out):
         v, d, a, q, law = speed[i], deflection[i], along[i], grip[i], read_law(laws[i])
         s = law.breakaway_ratio
         out[i, 0] = formulas.stribeck(compiled_math, v, law)
-        out[i, 1] = formulas.stribeck_slope(compiled_math, v, law)
-        out[i, 2] = formulas.slip_fraction(compiled_math, d, s)
-        out[i, 3] = formulas.slip_fraction_slope(compiled_math, d, s)
-        out[i, 4] = formulas.bristle_decay(compiled_math, d, a, v, q, law)
-        out[i, 5] = formulas.traction(d, a, v, law)
+        out[i, 1] = formulas.slip_fraction(compiled_math, d, s)
+        out[i, 2] = formulas.slip_fraction_slope(compiled_math, d, s)
+        out[i, 3] = formulas.bristle_decay(compiled_math, d, a, v, q, law)
+        out[i, 4] = formulas.traction(d, a, v, law)
         left = formulas.relaxation(compiled_math, decay_dt[i])
-        out[i, 6], out[i, 7] = left
-        out[i, 8] = formulas.reachable_deflection(compiled_math, d, law)
-        out[i, 9] = formulas.cap(compiled_math, d, 0.5)
-        out[i, 10] = formulas.mean_decay(v, q, decay_dt[i])
-        out[i, 11] = formulas.bristle_decay_by_breakaway(compiled_math, q, d, s)
-        out[i, 12] = formulas.relaxation_slope(compiled_math, decay_dt[i], left[0], left[1])
+        out[i, 5], out[i, 6] = left
+        out[i, 7] = formulas.reachable_deflection(compiled_math, d, law)
+        out[i, 8] = formulas.cap(compiled_math, d, 0.5)
+        out[i, 9] = formulas.mean_decay(v, q, decay_dt[i])
+        out[i, 10] = formulas.bristle_decay_by_breakaway(compiled_math, q, d, s)
+        out[i, 11] = formulas.relaxation_slope(compiled_math, decay_dt[i], left[0], left[1])
 
 
 def test_every_formula_gives_the_same_number_in_compiled_loops():
@@ -246,13 +218,12 @@ def test_every_formula_gives_the_same_number_in_compiled_loops():
     along = random.uniform(-1.0, 1.0, n) * speed
     elasto_plastic = random.choice([0.0, 1.0], n)
     decay_dt = 10.0 ** random.uniform(-6, 2.5, n)
-    out, sigma = np.empty((n, 13)), random.uniform(0.0, 10.0, (3, n))
+    out, sigma = np.empty((n, 12)), random.uniform(0.0, 10.0, (3, n))
     law = LawNumbers(*sigma, mu_c, mu_s, v_s, gamma, elasto_plastic, ratio, random.choice([0.0, 1e-3], n))
     compiled(speed, deflection, along, grip, np.stack(law, -1), decay_dt, out)
     bristle = (deflection, along, speed, grip, law)
     expected = [
         formulas.stribeck(np, speed, law),
-        formulas.stribeck_slope(np, speed, law),
         formulas.slip_fraction(np, deflection, ratio),
         formulas.slip_fraction_slope(np, deflection, ratio),
         formulas.bristle_decay(np, *bristle),
@@ -270,8 +241,8 @@ def test_every_formula_gives_the_same_number_in_compiled_loops():
         finite = np.isfinite(wanted)
         assert np.array_equal(finite, np.isfinite(got)), column
         allowed = 1e-14 * np.abs(wanted[finite]) + 1e-15 * np.abs(wanted[finite]).max()
-        if column == 7:  # (1 - exp(-x))/x just above 1e-3 amplifies the last place of exp by 1/x
+        if column == 6:  # (1 - exp(-x))/x just above 1e-3 amplifies the last place of exp by 1/x
             allowed = allowed + 6e-16 / np.maximum(decay_dt, 1e-3)
-        if column == 12:  # and its slope, above 0.1, by 1/x^2
+        if column == 11:  # and its slope, above 0.1, by 1/x^2
             allowed = allowed + 6e-16 / np.maximum(decay_dt, 0.1) ** 2
         assert (np.abs(got[finite] - wanted[finite]) <= allowed).all(), column

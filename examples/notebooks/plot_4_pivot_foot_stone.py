@@ -77,7 +77,7 @@ walk = pf.plots.plot_motion(step)
 # A uniform disc on a table stops sliding and spinning at the same moment, and v/(omega R) tends to 0.653 however it
 # is thrown (Farkas et al., Physical Review Letters 90, 2003).
 coulomb = pf.LuGre(mu_c=0.2, sigma_0=1e5, sigma_1=10.0, sigma_2=0.0)
-puck = pf.ReducedModel(pf.ContactPatch.disc(0.04), coulomb, parts=1)  # its steady sliding is exact
+puck = pf.ReducedModel(pf.ContactPatch.disc(0.04), coulomb, cells=64)
 for spin in (20.0, 30.0, 60.0):
     data = pf.simulate(pf.scenes.free_slide(puck, twist=(1.0, 0.0, spin), save_every=1e-3)).data
     slow = data.sel(time=data.time[data.vx > 0.02]).isel(time=-1)
@@ -89,7 +89,7 @@ for spin in (20.0, 30.0, 60.0):
 # spinning on the spot. It does not curl, because friction that is the same in all directions on an evenly loaded
 # ring opposes the velocity. Why real stones curl is a question about ice.
 ice = pf.LuGre(mu_c=0.01, sigma_0=1e5, sigma_1=10.0, sigma_2=0.0)
-stone = pf.simulate(pf.scenes.curling(pf.ReducedModel(pf.ContactPatch.ring(0.0585, 0.0645), ice, parts=1)))
+stone = pf.simulate(pf.scenes.curling(pf.ReducedModel(pf.ContactPatch.ring(0.0585, 0.0645), ice)))
 end = stone.data.isel(time=-1)
 print(f"{float(end.x):.2f} m in {float(end.time):.1f} s, {float(end.theta) / (2 * np.pi):.2f} turns")
 histories = pf.plots.plot_histories(stone)

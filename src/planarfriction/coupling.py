@@ -332,9 +332,8 @@ class _PackedPatches(NamedTuple):
 
 def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatches:
     functions = [model.compiled.functions for model in models]
-    steps, slopes = (
-        np.array([address_of(getattr(each, name), WORDS) for each in functions], np.int64) for name in ("step", "slopes")
-    )
+    steps = np.array([address_of(each.step, WORDS) for each in functions], np.int64)
+    slopes = np.array([address_of(each.slopes, WORDS) for each in functions], np.int64)
     (records, sizes), known = np.zeros((2, len(models)), np.int64), {}
     following = [p for p, model in enumerate(models) if model.depends_on_load]
     for p, model in enumerate(models):

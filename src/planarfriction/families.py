@@ -116,7 +116,7 @@ MODELS = Family(
     "model",
     {
         "distributed": ("a bristle in every cell", "models.distributed:DistributedModel"),
-        "reduced": ("bristles on a few cells", "models.reduced:ReducedModel"),
+        "reduced": ("bristles on a few small discs", "models.reduced:ReducedModel"),
         "reduced-published": (
             "three bristles and a limit surface, as published",
             "models.reduced_published:ReducedModelPublished",
@@ -131,6 +131,7 @@ PRESSURES = Family(
         "linear_gradient": ("linear over the patch", "patch.pressure:LinearGradient"),
         "soft_finger": ("a soft fingertip that grows with the load", "patch.pressure:SoftFinger"),
         "pressure_maps": ("maps measured at several loads", "patch.pressure_maps:PressureMaps"),
+        "shared": ("that of the cells of another patch", "patch.shared:SharedPressure"),
     },
 )
 

@@ -71,15 +71,6 @@ def stribeck_at(effect, law):
     return law.mu_c + (law.mu_s - law.mu_c) * effect
 
 
-def stribeck_slope(xp, speed, law):
-    """Derivative `dg/d|v|` [s/m]; at rest the right-hand limit, finite for `gamma >= 1` (zero where it has none)."""
-    ratio = speed * (1.0 / law.v_s)
-    safe = xp.where(ratio > 0.0, ratio, 1.0)
-    at_rest = xp.where(law.gamma == 1.0, 1.0, 0.0)
-    steepness = xp.where(ratio > 0.0, xp.power(safe, law.gamma) / safe, at_rest)
-    return -(law.mu_s - law.mu_c) * law.gamma * (1.0 / law.v_s) * steepness * xp.exp(-xp.power(ratio, law.gamma))
-
-
 def slip_fraction(xp, deflection, breakaway_ratio):
     """Elasto-plastic `alpha` [-] of the relative deflection `|z|/z_max`: 0 below breakaway, 1 at full deflection.
 
@@ -176,12 +167,17 @@ def disc_friction(xp, slide, spin):
     """Sliding friction of a disc, `c_t`, `c_s` and `m` [-], from `p = |u|^2` of its centre and `o = (a omega)^2`.
 
     The mean speed of the disc is `S = sqrt(p + m o)`, with `m = 1/4 + 7/36 (e_1 + A e_2)` and `(e_1, e_2, e_3) = (o^2,
-    p o, p^2)/(o^2 + B p o + C p^2)`. Force and scaled torque of sliding are `W/S` with `W = (c_t u, c_s kappa a omega)`,
-    the gradient of S: `c_t = 1 + h e_1`, `c_s = 2 (m - h e_2)`, and `h = 7/36 ((A - B) e_1 - 2 C e_2 - A C e_3)`. Within
-    0.0085 of the exact disc. ("Discs")
+    p o, p^2)/(o^2 + B p o + C p^2)`. Force and scaled torque of sliding are `W/S`, and W is S times the gradient of S:
+    `W = (c_t u, c_s kappa a omega)`, `c_t = 1 + h e_1`, `c_s = 2 (m - h e_2)` and `h = 7/36 ((A - B) e_1 - 2 C e_2 - A
+    C e_3)`. Within 0.0085 of the exact disc. ("Discs")
     """
+    return disc_friction_above(slide, spin, DISC_REST)
+
+
+def disc_friction_above(slide, spin, rest):
+    """`disc_friction` with p and o in any unit, that of their squares for `rest`, in which it takes `DISC_REST`."""
     pp, po, oo = slide * slide, slide * spin, spin * spin
-    per = 1.0 / (oo + (DISC_B * po + DISC_C * pp) + DISC_REST)
+    per = 1.0 / (oo + (DISC_B * po + DISC_C * pp) + rest)
     e_1, e_2, e_3 = oo * per, po * per, pp * per
     h = (7.0 / 36.0 * (DISC_A - DISC_B)) * e_1 - (7.0 / 18.0 * DISC_C) * e_2 - (7.0 / 36.0 * DISC_A * DISC_C) * e_3
     m = 0.25 + 7.0 / 36.0 * e_1 + (7.0 / 36.0 * DISC_A) * e_2

@@ -77,16 +77,13 @@ def _parts() -> list[Part]:
     patch, law = ContactPatch.disc(radius=0.01, cells=5), LuGre(mu_s=1.2, elasto_plastic=0.9)
     cells, reduced, published = (MODELS[name](patch, law) for name in ("distributed", "reduced", "reduced-published"))
     grooved = models.DistributedModel(patch.with_friction_metric(friction_metric(0.0, along=1.0, across=0.8)), law)
-    whole, halved = (models.ReducedModel(patch, law, parts=parts) for parts in (1, 2))
     return [
         *_of(cells, "distributed", *_WORK),
         *_of(grooved, "friction with a grain", "scenes", "roll-outs"),
         *_of(reduced, "reduced", "scenes", "steps", "derivatives of scenes"),
         Part("coupled patches", functools.partial(_couple, [cells, reduced, published, grooved])),
         *([Part("steps inside MuJoCo", _host)] if find_spec("mujoco") else []),
-        *_of(halved, "reduced in parts", "derivatives of scenes"),
         Part("derivatives of scenes in reverse", functools.partial(_reverse, reduced)),
-        *_of(whole, "reduced in one part", "roll-outs"),
         *_of(published, "reduced-published", *_WORK),
         Part("limit surfaces", functools.partial(_surfaces, patch)),
     ]

@@ -23,9 +23,9 @@ REPEATS = 5
 
 RUNGS: dict[str, Callable[[Any, Any], Any]] = {
     "distributed": DistributedModel,
+    "reduced, 64 discs": lambda patch, law: ReducedModel(patch, law, cells=64),
     "reduced": ReducedModel,
-    "reduced, 4 parts": lambda patch, law: ReducedModel(patch, law, parts=4),
-    "reduced, 1 part": lambda patch, law: ReducedModel(patch, law, parts=1),
+    "reduced, 8 discs": lambda patch, law: ReducedModel(patch, law, cells=8),
     "reduced, as published": lambda patch, law: ReducedModelPublished(patch, law),
 }
 """Models of the ladder, from the reference down to three states."""

@@ -11,7 +11,7 @@ import panel as pn
 from bokeh.models import ColumnDataSource, NumeralTickFormatter
 from bokeh.plotting import figure
 
-from planarfriction.plots.style import DISTRIBUTED, FEW, MOMENTS, PARTS, PUBLISHED
+from planarfriction.plots.style import DISTRIBUTED, FEW, OTHER, PUBLISHED, SECOND
 from planarfriction_explorer import looks
 from planarfriction_explorer.ladder import RUNGS, Rung, climb
 from planarfriction_explorer.live import Live, Task
@@ -22,7 +22,7 @@ _WORDS = (
     "to its opposite. The error is the root mean square difference from the distributed model."
 )
 
-_COLOURS = dict(zip(RUNGS, (DISTRIBUTED, FEW, PARTS, MOMENTS, PUBLISHED), strict=True))
+_COLOURS = dict(zip(RUNGS, (DISTRIBUTED, SECOND, FEW, OTHER, PUBLISHED), strict=True))
 
 _HEAD = ("model", "bristle states", "error [% of μ<sub>c</sub> f<sub>N</sub>]", "time in the solver [ms]")
 

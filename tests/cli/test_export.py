@@ -50,7 +50,7 @@ def test_files(capsys, tmp_path, arguments, mu_c):
         (["scene.toml"], "--contact must be one of left, right"),
         (["scene.toml", "--contact", "middle"], "--contact must be one of left, right"),
         (["model.toml", "--contact", "left"], "--contact must be given only for a scene"),
-        (["model.toml", "--name", "a b"], "name must be a C identifier"),
+        (["model.toml", "--name", "a b"], "name must be a letter, then letters, digits and _, 40 in all"),
         (["model.toml", "--precision", "half"], "precision must be one of double, float"),
         (["broken.toml"], "broken.toml: unknown key 'mass'"),
         (["cells.toml"], "surface must be an ellipsoid or a table"),

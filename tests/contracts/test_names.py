@@ -84,7 +84,7 @@ ODD_NAMES = [
 
 
 def test_results_are_reached_by_any_name(tmp_path):
-    reduced, distributed = pf.ReducedModel(SQUARE, LAW, parts=1), pf.DistributedModel(SQUARE, LAW)
+    reduced, distributed = pf.ReducedModel(SQUARE, LAW), pf.DistributedModel(SQUARE, LAW)
     models = [reduced if i % 2 else distributed for i in range(len(ODD_NAMES))]
     contacts = [pf.Contact(model, 1.0, name=name) for model, name in zip(models, ODD_NAMES, strict=True)]
     scene = pf.Scene(pf.Body(1, 1), contacts, 0.02, name="φ")

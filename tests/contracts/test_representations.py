@@ -31,8 +31,8 @@ def solution():
 
 
 def test_records_are_one_short_and_telling_line(solution):
-    model = pf.ReducedModel(DISC, LAW, parts=4)
-    assert repr(model) == "ReducedModel('disc' of 77 cells, LuGre(mu_c=1, mu_s=1.2, ...), parts=4)"
+    model = pf.ReducedModel(DISC, LAW, cells=16)
+    assert repr(model) == "ReducedModel('disc' of 77 cells, LuGre(mu_c=1, mu_s=1.2, ...), cells=16)"
     assert (
         repr(pf.LimitSurfaceExact(SOFT, normal_force=2.0)) == "LimitSurfaceExact('disc' of 77 cells, normal_force=2.0)"
     )

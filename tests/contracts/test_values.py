@@ -37,13 +37,13 @@ def used(model):
 
 
 def a_solution() -> pf.Solution:
-    return pf.simulate(pf.scenes.in_hand(pf.ReducedModel(SQUARE, LAW, parts=1), t_end=0.05))
+    return pf.simulate(pf.scenes.in_hand(pf.ReducedModel(SQUARE, LAW), t_end=0.05))
 
 
 def an_identification() -> identify.Identification:
     nothing = np.full(1, np.nan)
     history = {"name": "log", "time": TIMES, "measured": np.ones((30, 3)), "predicted": np.zeros((30, 3))}
-    model = pf.ReducedModel(SQUARE, LAW, parts=1)
+    model = pf.ReducedModel(SQUARE, LAW)
     return identify.Identification(
         ("mu_c",), np.ones(1), nothing, np.eye(1), (), nothing, (("fx", "N"),), (history,), LAW, model, (1, 2)
     )
@@ -51,7 +51,7 @@ def an_identification() -> identify.Identification:
 
 MODELS = {
     f"{kind.__name__} of a {name}": lambda kind=kind, patch=patch: used(kind(patch, LAW))
-    for kind in (pf.DistributedModel, pf.models.MomentModel, pf.ReducedModel, pf.ReducedModelPublished)
+    for kind in (pf.DistributedModel, pf.ReducedModel, pf.ReducedModelPublished)
     for name, patch in (("square", SQUARE), ("finger", FINGER))
 }
 SURFACES = {
@@ -91,14 +91,13 @@ MAKERS = {
     "vector signal": lambda: pf.Signal.constant([1, 2, 3]),
     "body": lambda: pf.Body(1, 1, outline=[[0, 0], [0, 1], [1, 1]]),
     "contact": lambda: pf.Contact(pf.DistributedModel(SQUARE, LAW), 1.0),
-    "scene": lambda: pf.scenes.drift(pf.ReducedModel(SQUARE, LAW, parts=1)),
+    "scene": lambda: pf.scenes.drift(pf.ReducedModel(SQUARE, LAW)),
     "statistics": lambda: solvers.Statistics(steps=3),
     "RODAS4": lambda: copy.deepcopy(solvers.RODAS4),
     "RODAS3": lambda: copy.deepcopy(solvers.RODAS3),
     "comparison": lambda: SURFACES["LimitSurfaceCells"]().compare(SURFACES["LimitSurfaceEllipsoid"]()),
-    "jacobians": lambda: MODELS["MomentModel of a square"]().jacobians(np.zeros(3), (0.1, 0.0, 0.0), 1.0),
-    "step jacobians": lambda: MODELS["MomentModel of a square"]().step_jacobians(np.zeros(3), (1, 0, 0), 1.0, 1e-3),
-    "shape": lambda: MODELS["MomentModel of a finger"]().shape_at(1.0),
+    "jacobians": lambda: MODELS["ReducedModelPublished of a square"]().jacobians(np.zeros(3), (0.1, 0.0, 0.0), 1.0),
+    "step jacobians": lambda: MODELS["ReducedModelPublished of a square"]().step_jacobians(np.zeros(3), (1, 0, 0), 1.0, 1e-3),
     "published shape": lambda: MODELS["ReducedModelPublished of a finger"]().shape_at(1.0),
     "surface numbers": lambda: SURFACES["LimitSurfaceTable"]().numbers,
     "roll-out": lambda: pf.rollout(MODELS["DistributedModel of a square"](), None, np.ones((5, 3)), 1.0, 1e-3),
@@ -136,7 +135,7 @@ def test_what_differs_is_not_equal():
     assert pf.ContactPatch.disc(0.01, 5) != pf.ContactPatch.disc(0.01, 5, name="other")
     assert pf.ContactPatch.points([(0, 0), (0.1, 0)]) != pf.ContactPatch.points([(0, 0), (0.1, 0)], [1.0, 2.0])
     assert pf.Body(1, 1, outline=[[0, 0], [0, 1], [1, 1]]) != pf.Body(1, 1)
-    assert pf.ReducedModel(SQUARE, LAW, parts=1) != pf.ReducedModel(SQUARE, LAW, speeds=10, parts=1)
+    assert pf.ReducedModel(SQUARE, LAW) != pf.ReducedModel(SQUARE, LAW, cells=8)
     assert pf.ReducedModelPublished(SQUARE, LAW) != pf.ReducedModelPublished(
         SQUARE, LAW, surface=SURFACES["LimitSurfaceTable"]()
     )

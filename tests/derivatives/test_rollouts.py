@@ -283,13 +283,15 @@ def test_one_load_for_each_contact_and_rest():
 # ---------------------------------------------------------------------- other models
 
 
-@pytest.mark.parametrize("kind", ["leaning cells", "a map for each load"])
+@pytest.mark.parametrize("kind", ["leaning cells", "a table for each load"])
 def test_a_rollout_of_any_model_takes_its_steps(kind):
     model = {
         "leaning cells": lambda: pf.DistributedModel(
             PATCH.with_friction_metric(np.eye(2), asymmetry=[0.2, 0.0]), ELASTIC
         ),
-        "a map for each load": lambda: pf.ReducedModel(FINGER, ELASTIC, segments=8, speeds=8, load_error=0.0, parts=1),
+        "a table for each load": lambda: pf.ReducedModelPublished(
+            FINGER, ELASTIC, pf.LimitSurfaceTablePublished(FINGER, segments=4, normal_force=1.0)
+        ),
     }[kind]()
     twists = np.random.default_rng(3).normal(size=(2, 5, 3)) * (1e-3, 1e-3, 0.3)
     loads, steps = np.linspace(0.5, 1.5, 5), np.linspace(1e-4, 2e-4, 5)
@@ -305,8 +307,22 @@ def test_a_rollout_of_any_model_takes_its_steps(kind):
         pf.rollout(model, None, np.zeros(3), 1.0, 1e-4)
     with pytest.raises(InvalidValueError, match="state, twist and normal_force must broadcast"):
         pf.rollout(model, None, twists, np.ones((3, 5)), 1e-4)
-    with pytest.raises(InvalidValueError, match=r"(model|load_error) must"):
+    with pytest.raises(InvalidValueError, match="model must"):
         pf.rollout(model, None, twists, loads, steps, parameters=np.ones(7))
+
+
+# ---------------------------------------------------------------------- ends of the range
+
+
+@pytest.mark.parametrize("surface", [pf.LimitSurfaceCells, pf.LimitSurfaceTable, pf.LimitSurfaceTablePublished])
+def test_twists_whose_squares_leave_the_range_of_numbers_are_rest(surface):
+    generator, model = np.random.default_rng(0), pf.ReducedModelPublished(PATCH, ELASTIC, surface=surface(PATCH))
+    twist = 10.0 ** generator.uniform(-163.0, -160.0, (1000, 1, 1)) * generator.normal(size=(1000, 1, 3)) * [1, 1, 150]
+    start = generator.normal(size=(1000, 3)) * [1e-7, 1e-7, 1e-9]
+    ours, still = (derivatives.rollout(model, start, each, 1.0, 1e-3) for each in (twist, 0.0 * twist))
+    np.testing.assert_array_equal(ours.wrenches, still.wrenches)
+    for each in derivatives.rollout_vjp(model, start, twist, 1.0, 1e-3, np.ones((1, 3))):
+        assert np.isfinite(each).all()
 
 
 # ---------------------------------------------------------------------- errors

@@ -51,7 +51,7 @@ def changed(scene: pf.Scene, name: str, k: int, component: int, change: float) -
     return dataclasses.replace(scene, contacts=[own, scene.contacts[1]])
 
 
-@pytest.mark.parametrize("kind", ["distributed", "ellipsoid", "moments"])
+@pytest.mark.parametrize("kind", ["distributed", "ellipsoid", "reduced"])
 def test_derivatives_to_knots_and_start_are_differences(kind):
     """Differences of order 4 of tight simulations; both sides are right to a few 1e-7 of the largest value."""
     scene = pushed(kind)
@@ -68,7 +68,7 @@ def test_derivatives_to_knots_and_start_are_differences(kind):
                 near, back, far, far_back = (data[variable].values for data in tight)
                 expected = (8.0 * (near - back) - (far - far_back)) / (12.0 * h)
                 error = np.abs(values[..., i] - expected).max() / np.abs(expected).max()
-                assert error <= 5e-6, (found.names[p], variable, error)
+                assert error <= 1e-5, (found.names[p], variable, error)
 
 
 def test_a_sliding_block_loses_speed_to_each_knot_of_its_load():
@@ -112,7 +112,7 @@ def agree(scene: pf.Scene, numbers: dict, of_motion: float, of_wrenches: float) 
             assert error < allowed, (name, slope is None, error)
 
 
-@pytest.mark.parametrize("kind", ["ellipsoid", "moments", "distributed"])
+@pytest.mark.parametrize("kind", ["ellipsoid", "reduced", "distributed"])
 def test_the_reverse_is_the_product_with_the_derivatives_forwards(kind):
     """Two methods of order 4 with steps of their own; through a lost load, stops and a new slip.
 
@@ -210,7 +210,7 @@ def test_what_has_no_derivative_is_refused():
 def test_the_reverse_reaches_a_prescribed_velocity(hold):
     """Linear in the knots but for the turning axes; rounding of two integrations."""
     twist = pf.Signal([0.0, 0.1, 0.2], [[0.01, 0.0, 0.5], [0.02, 0.01, -1.0], [0.0, 0.02, 1.0]], hold)
-    scene = pf.scenes.driven(model_of("moments"), twist=twist, t_end=0.3)
+    scene = pf.scenes.driven(model_of("reduced"), twist=twist, t_end=0.3)
     numbers = {"signals": {"velocity": [0.0, 0.05, 0.1, 0.2]}, "initial": ["x", "theta"]}
     forwards = scene_sensitivities(scene, (), **numbers)
     slope = np.random.default_rng(2).normal(size=forwards.motion.shape)
@@ -222,7 +222,7 @@ def test_the_reverse_reaches_a_prescribed_velocity(hold):
 
 def test_a_held_contact_has_no_say():
     """Below breakaway the load moves nothing: a plan that starts from rest finds no slope there."""
-    model = model_of("moments")
+    model = model_of("reduced")
     body = pf.Body(0.4, 6e-4, gravity=(0.0, 0.0))
     scene = pf.Scene(body, [pf.Contact(model, 5.0, mounted_on="body")], 0.1, force=pf.Signal.constant([0.1, 0.0, 0.0]))
     found = scene_gradient(

@@ -57,7 +57,7 @@ def test_jacobians(loaded):
         own = exact.state_state  # of cells [2, 2, N], else [3, 3]
         own = own if own.ndim == 2 else np.block([[np.diag(each) for each in row] for row in own])
         chained = step.jacobian()(state, *given, params, new, np.zeros(3))[0].full()
-        np.testing.assert_allclose(chained, own, atol=1e-9 * max(np.abs(own).max(), 1e-9))
+        np.testing.assert_allclose(chained, own, atol=1e-9 * max(np.abs(own).max(), 1e-6))
         wanted = first @ own
         np.testing.assert_allclose(twice(state, *given, params).full(), wanted, atol=1e-9 * np.abs(first).max())
         ends = [step(state, *given[:2], given[2] * (1.0 + sign * 1e-4), params)[1].full() for sign in (1.0, -1.0)]

@@ -56,8 +56,9 @@ def test_all_speeds(name, precision):
     state = np.minimum(speed, 1e-6)[:, None, None] * rng.normal(size=(len(speed), *made.model.state_shape))
     state[::3] = 0.0
     inputs = [each.astype(made.kind).astype(float) for each in (state, twist, np.ones_like(speed), speed * 0.0 + 1e-4)]
-    found, pressed = run(made, inputs)
+    found, pressed, slopes = run(made, inputs, slopes=True)
     new, wrench = made.model.step(*inputs)
+    assert all(np.isfinite(slopes[field]).all() for field in slopes.dtype.names)
     off, scale = np.abs(pressed - wrench) * [1.0, 1.0, 100.0], np.abs(wrench * [1.0, 1.0, 100.0])
     assert np.all(off.max(axis=1) <= (1e-11 if precision == "double" else 1e-3) * scale.max(axis=1))
     assert np.abs(found - new).max() < (1e-11 if precision == "double" else 1e-4) * LAW.largest_deflection

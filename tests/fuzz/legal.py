@@ -17,6 +17,7 @@ import planarfriction as pf
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"
 LAW = pf.LuGre(mu_c=1.0, mu_s=1.2, elasto_plastic=0.9)
 PATCH = pf.ContactPatch.disc(0.01, 5)
+DISCS = pf.ReducedModel(PATCH, LAW, cells=4)
 SOFT = pf.ContactPatch.disc(0.01, 5, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
 TWISTS = np.linspace([0.0, 0.0, 0.1], [0.01, 0.005, 1.0], 20)
 TIMES = np.linspace(0.0, 0.19, 20)
@@ -114,7 +115,7 @@ def objects() -> dict[str, Any]:
         "load": 1, "speed": 0.01, "spin": 1.0, "segments": 5, "samples": 20, "save_every": 0.01, "stop_speed": 1e-4,
         "controller": None, "start": "rest", "margin": 0.5, "ramp": 0.01, "fall": 2.0,
         "rtol": 1e-4, "atol": 1e-3, "t": 0.05, "elasto_plastic": 0.9, "creep_speed": 1e-5, "relaxation_time": 0.01,
-        "breakaway_ratio": 0.5, "k_per_newton": None, "radius_max": 0.02, "error": None, "speeds": 6,
+        "breakaway_ratio": 0.5, "k_per_newton": None, "radius_max": 0.02, "error": None,
         "load_error": 0.01,
         "arm": 0.06, "share": 0.5, "forefoot": model,
         "times_repeated": 2, "gravity": (0.0, -9.81), "size": (0.15, 0.08), "fingers": 2, "phase": 0.0,
@@ -138,9 +139,8 @@ def objects() -> dict[str, Any]:
         # instances, for their methods
         "ContactPatch": SOFT, "Coulomb": pf.Coulomb(0.5), "CoulombStribeck": pf.CoulombStribeck(), "Dahl": pf.Dahl(),
         "LuGre": LAW, "DistributedModel": pf.DistributedModel(PATCH, LAW),
-        "MomentModel": pf.models.MomentModel(PATCH, LAW, segments=8, speeds=6),
         "ReducedModelPublished": soft,
-        "ReducedModel": pf.ReducedModel(PATCH, LAW, segments=8, speeds=6, parts=1), "Signal": signal, "Scene": scene,
+        "ReducedModel": DISCS, "Signal": signal, "Scene": scene,
         "Solution": solution, "Grid": pf.patch.Grid.around_origin(0.02, 0.02, 5, 5), "SoftFinger": SOFT.pressure,
         "Slide": pf.identify.Slide(time, pose), "Log": log, "Uniform": pf.Uniform(),
         "LinearGradient": pf.LinearGradient((5.0, 2.0)), "PressureMaps": pf.PressureMaps([1.0, 2.0], np.ones((2, 3))),
@@ -199,8 +199,8 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "PressureMaps": {"values": np.ones((2, 3))},
     "patch.PerCell": {"values": [1.0, 2.0, 3.0]},
     "ContactPatch.from_pressure": {"pressure": np.ones((3, 3)), "loads": None},
-    "ContactPatch.compressed": {"cells": None},
-    "ContactPatch": {"pressure": None, "metric": None, "asymmetry": None, "cell_size": None, "point_shares": None},
+    "ContactPatch.discs": {"n": None},
+    "ContactPatch": dict.fromkeys(("pressure", "metric", "asymmetry", "cell_size", "point_shares", "radii")),
     "ContactPatch.moments": {"about": None},
     "Scene.from_dict": {"data": Fresh(lambda: objects()["scene"].to_dict())},
     "Signal.from_dict": {"data": Fresh(lambda: {"times": [0.0, 1.0], "values": [1.0, 2.0]})},
@@ -209,7 +209,8 @@ SPECIAL: dict[str, dict[str, Any]] = {
         for name in ("patch.Pressure", "patch.PerCell", "SoftFinger", "Uniform", "LinearGradient", "PressureMaps")
     },
     **{
-        f"DistributedModel.{name}": {"state": Fresh(lambda: np.zeros((2, PATCH.cells)))}
+        f"{model}.{name}": {"state": Fresh(lambda shape=shape: np.zeros(shape))}
+        for model, shape in (("DistributedModel", (2, PATCH.cells)), ("ReducedModel", DISCS.state_shape))
         for name in ("rate", "wrench", "step", "jacobians", "step_jacobians")
     },
     **{
@@ -249,7 +250,6 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "identify.candidate_motions": {"duration": 0.5, "rate": 500.0},
     "identify.fit_start": {"body": Fresh(lambda: pf.identify.SlidingBody(0.2, 1e-4)), "noise": (1e-3, 1e-3, 0.02)},
     "identify.predict_slide": {"body": Fresh(lambda: pf.identify.SlidingBody(0.2, 1e-4))},
-    "patch.surface_error": {"normal_force": None},
     "scenes.in_hand": {"normal_force": None},
     "scenes.free_slide": {"normal_force": None, "twist": (1.0, 0.0, 10.0), "inertia": None},
     "scenes.drift": {"load": "normal"},

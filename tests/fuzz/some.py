@@ -13,7 +13,7 @@ import planarfriction as pf
 
 MODELS: dict[str, Callable[..., pf.models.FrictionModel]] = {
     "distributed": pf.DistributedModel,
-    "reduced": functools.partial(pf.ReducedModel, segments=8, speeds=6),
+    "reduced": functools.partial(pf.ReducedModel, cells=8),
     "published": pf.ReducedModelPublished,
 }
 """Models by name; the maps of the second are small, for the sake of time."""

@@ -58,7 +58,7 @@ def test_models_of_mujoco_that_change(draw: random.Random) -> None:
     from planarfriction_studies.bench import mujoco_scenes
 
     scene, law = mujoco_scenes.grip(), pf.LuGre(mu_c=draw.uniform(0.2, 0.45), sigma_0=some.spread(draw, 4, 6))
-    pad = pf.ReducedModel(pf.ContactPatch.disc(draw.uniform(0.005, 0.02), 9), law, parts=1)
+    pad = pf.ReducedModel(pf.ContactPatch.disc(draw.uniform(0.005, 0.02), 9), law)
     (m, d, friction), (another, there, own) = scene.ours(), scene.ours(model=pad)
     d.ctrl[:] = there.ctrl[:] = scene.control(0.0)
     CASES["models of MuJoCo that change"] += 1

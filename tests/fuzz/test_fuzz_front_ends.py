@@ -54,7 +54,7 @@ def plain(values) -> list[np.ndarray]:
 def pair(name: str, draw: random.Random):
     """The same model in NumPy and in the front end, or None where it knows no such law."""
     kind, patch, law = draw.choice(MODELS), draw.choice(PATCHES), some.law(draw)
-    options = {"segments": 8, "speeds": 6} if kind == "ReducedModel" else {}
+    options = {"cells": 8} if kind == "ReducedModel" else {}
     make = getattr(front_end(name), kind)
     front_end(name), arrays(name, 0.0)  # a front end takes its memory when it is loaded
     double = {"dtype": importlib.import_module("torch").float64} if name == "torch" else {}

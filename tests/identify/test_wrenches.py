@@ -322,7 +322,7 @@ def test_bad_logs_are_named(log):
     with pytest.raises(InvalidValueError, match="normal_force must be >= 0"):
         Log(log.time, log.twist, log.wrench, -1.0)
     with pytest.raises(InvalidValueError, match="patch must be a ContactPatch, got ReducedModel"):
-        identify(log, pf.ReducedModel(PATCH, pf.LuGre(mu_s=1.2), segments=4, speeds=5, parts=1))
+        identify(log, pf.ReducedModel(PATCH, pf.LuGre(mu_s=1.2)))
     with pytest.raises(InvalidValueError, match=r"surface must be a class of limit surfaces, got .*ReducedModel"):
         identify(log, PATCH, surface=pf.ReducedModel)
     with pytest.raises(InvalidValueError, match="log must be a Log"):

@@ -8,30 +8,14 @@ from numba import njit
 
 import planarfriction as pf
 from planarfriction import derivatives
-from planarfriction.compiled.shapes_by_load import places_of
 from planarfriction.derivatives.inputs import checked
-from planarfriction.kernels import coupling, lanes, published_step, reduced_step
+from planarfriction.kernels import coupling
 
 PATCH, LAW = pf.ContactPatch.disc(radius=0.01, cells=9), pf.LuGre()
 MODELS = {
-    "parts": pf.ReducedModel(PATCH, LAW, parts=3, segments=6, speeds=6),
     "published": pf.ReducedModelPublished(PATCH, LAW),
     "cells": pf.DistributedModel(PATCH, LAW),
 }
-
-
-def test_the_array_at_the_first_map_reaches_to_the_end_of_the_last():
-    maps = [np.full(n, n, dtype=np.float32) for n in (300, 7, 4000)]
-    begin, data = places_of([*maps, maps[1]])
-    assert begin.min() == 0 and begin[1] == begin[3]
-    for first, each in zip(begin, maps, strict=False):
-        np.testing.assert_array_equal(data[first : first + len(each)], each)
-    del maps[:]
-    assert data[begin[1]] == 7.0  # the array keeps the maps alive
-
-
-def test_there_is_room_for_the_numbers_of_every_contact():
-    assert max(len(published_step.NAMES), len(reduced_step.NAMES)) <= lanes.NUMBERS
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -41,7 +25,7 @@ def test_roll_outs_of_all_models_add_to_what_comes_in(name):
     family, compiled, found = inputs.model.family, inputs.compiled(), []
     for start in (0.0, 5.0):
         wrenches = np.full(twist.shape, start)
-        family.rollout(compiled, (0, 2), inputs.state.copy(), wrenches, np.empty((len(inputs.state), 2, 0, 3)))
+        family.rollout(compiled, (0, 2), inputs.state.copy(), wrenches, np.empty((2, 0, inputs.state.shape[1])))
         found.append(wrenches - start)
     np.testing.assert_allclose(found[1], found[0], atol=1e-14)  # rounding of 5 N
     assert np.abs(found[0]).max() > 0.1

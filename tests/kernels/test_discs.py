@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planarfriction import LuGre, formulas
+from planarfriction import ContactPatch, DistributedModel, LuGre, formulas
 from planarfriction.kernels import disc_cells, disc_passes, discs, distributed_step
 from planarfriction.kernels.cell_blocks import LANES
 from planarfriction.kernels.twins import twin
@@ -113,31 +113,18 @@ def test_numbers_stay_finite_at_any_speed(speed):
 def test_passes_step_as_the_function_they_come_from(count):
     """Sums run in another order, and functions are polynomials: 1e-12 of the largest term."""
     rng = np.random.default_rng(count)
-    cells, z = rng.normal(size=(3, count)) * 5e-3, rng.normal(size=(3, count)) * 5e-7
-    weights = rng.uniform(size=count)
-    twist, dt = tuple(rng.normal(size=3) * (1e-3, 1e-3, 0.2)), 1e-4
-    new, wrench = _stepped(cells, weights, z, twist, dt)
-    for i in range(count):
-        u = twin(disc_cells._seen)(cells[:, i], twist)
-        expected, traction = step(LAW, tuple(z[:, i]), u, dt)
+    law = LuGre(mu_c=1.0, mu_s=1.2, v_s=1e-3, sigma_0=1e6, sigma_1=8e2, sigma_2=0.2, elasto_plastic=0.9)
+    places, radii, pressure = rng.normal(size=(count, 2)) * 5e-3, rng.uniform(size=count) * 3e-3, rng.uniform(size=count)
+    patch = ContactPatch(places, np.full(count, 1e-6), pressure, radii=radii)
+    twist, z = tuple(rng.normal(size=3) * (1e-3, 1e-3, 0.2)), rng.normal(size=(3, count)) * 5e-7
+    new, wrench = DistributedModel(patch, law).step(z, twist, 2.0, 1e-4)
+    total = np.zeros(3)
+    for i, (x, y) in enumerate(places):
+        cell = x, y, KAPPA * radii[i]
+        expected, traction = step(LAW, tuple(z[:, i]), twin(disc_cells._seen)(cell, twist), 1e-4)
         assert new[:, i] == pytest.approx(expected, rel=1e-11, abs=1e-18)
-        wrench -= weights[i] * np.array(twin(disc_cells._wrench)(cells[:, i], traction))
-    assert np.abs(wrench).max() <= 1e-12 * count
-
-
-def _stepped(cells, weights, z, twist, dt):
-    from planarfriction.compiler.calls import address_of
-    from planarfriction.compiler.memory import place_of, row_of
-    from planarfriction.kernels.cells import CellsContact
-    from planarfriction.kernels.steps import WORDS, Parts, step_one
-
-    contact = row_of(CellsContact(LAW, len(weights), np.ascontiguousarray(cells), weights))
-    address = address_of(disc_passes.STEPS.step, WORDS)
-    size = 3 * len(weights)
-    table = row_of(Parts(address, 1, size, 3 * size, 1, np.array([[place_of(contact)]]), np.ones((1, 1))))
-    result = np.empty(size + 9)
-    assert step_one(table, z.ravel(), *twist, 1.0, dt, result)
-    return result[:size].reshape(3, -1), result[size : size + 3]
+        total += 2.0 * patch.weights()[i] * np.array(twin(disc_cells._wrench)(cell, traction))
+    assert wrench == pytest.approx(total, rel=1e-11, abs=1e-13)
 
 
 def test_passes_hand_little_on():

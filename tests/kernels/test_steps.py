@@ -1,4 +1,4 @@
-"""Derivatives of the steps of bristles, cells and moments against 60 digits, also where the cap and rounding meet."""
+"""Derivatives of steps of bristles, cells and the published model against 60 digits, also where cap and rounding meet."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import bristle_step, distributed_step, leaning_cells, published_step, reduced_step
+from planarfriction.kernels import bristle_step, distributed_step, leaning_cells, published_step
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.published_contact import PublishedPatch
-from planarfriction.kernels.reduced import Quartic, rate
 from tests.support.referee import exact, misfit
 
 LAW = LawNumbers(1e5, 300.0, 0.4, 0.5, 0.8, 1e-3, 1.7, 1.0, 0.3, 0.0)
@@ -25,7 +24,6 @@ GRIP = LAW.sigma_0 / 0.6
 BRISTLE = derive(bristle_step.step, ("z", "u", "v", "per_h", "q", "law.breakaway_ratio"), ("z", "u"))
 CELL = derive(distributed_step.cell, ("z", "u"), ("z", "u"))
 LEANING = derive(leaning_cells.step, ("z", "u"), ("lean.a", "z", "u"))
-RATE = derive(rate, ("z", "u", "q"), ("z", "u", "q"))
 
 TURNS = 0.0, 1e-8, 1e-4, 0.5, 1.0, 0.5 * math.pi, 3.0, math.pi - 1e-8
 """Angles between a bristle and its velocity [rad]."""
@@ -95,29 +93,5 @@ def test_derivatives_of_the_published_step(law):
         )
         arguments = law, shape, tuple(twist.tolist()), 3.0 * v, tuple((v * u).tolist()), state
         return misfit(published_step.DERIVATIVE, (*arguments, _far(rng) / (v * GRIP)))
-
-    assert _worst(draw, 40) < 1e-8
-
-
-ROWS = ((1.3, 0.1, 0.4, 0.2, 0.1, 0.3), (1.7, 0.5, 0.1, 0.2, 0.4), (2.1, 0.3, 0.1, 0.2))
-"""Coefficients of a fourth moment."""
-
-
-@laws
-def test_derivatives_of_the_reduced_step_and_rate(law):
-    exact_rate = exact(rate)
-
-    def in_one(*arguments):
-        return (exact_rate(*arguments),)
-
-    def draw(rng):
-        z, v = rng.normal(size=3), 0.01
-        z *= _deflection(rng) / np.linalg.norm(z) / GRIP
-        u = np.array([0.6, 0.64, 0.48])
-        steady = (u + rng.uniform(-0.4, 0.4, 3)) / GRIP  # dissipates: less than 60 degrees from the twist
-        u, steady, z = (tuple(each.tolist()) for each in (v * u, steady, z))
-        quartic = Quartic(ROWS, ROWS, 0.0)
-        step = law, quartic, u, steady, z, _far(rng) / (v * GRIP)
-        return max(misfit(reduced_step.DERIVATIVE, step), misfit(RATE, (law, quartic, z, u, steady), in_one))
 
     assert _worst(draw, 40) < 1e-8

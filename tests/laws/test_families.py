@@ -208,16 +208,13 @@ def test_grooves_turn_and_scale_the_friction_of_a_law(law):
 
 
 def test_the_reduced_model_takes_dahl_and_refuses_creep():
-    small = {"segments": 8, "speeds": 5}
     reduced, same = (
-        pf.ReducedModel(DISC, law, **small) for law in (DAHL, pf.LuGre(mu_c=0.4, sigma_0=2e4, sigma_1=0.0, sigma_2=0.0))
+        pf.ReducedModel(DISC, law) for law in (DAHL, pf.LuGre(mu_c=0.4, sigma_0=2e4, sigma_1=0.0, sigma_2=0.0))
     )
     twist = (1e-3, 2e-3, 0.3)
     assert reduced.step(reduced.rest(), twist, LOAD, 1e-2)[1] == pytest.approx(
         same.step(same.rest(), twist, LOAD, 1e-2)[1], rel=1e-12
     )
-    with pytest.raises(InvalidValueError, match=r"^law must have no creep_speed for ReducedModel .*got Coulomb[^\n]*$"):
-        pf.ReducedModel(DISC, CREEPING, parts=1)
     leaning = DISC.with_friction_metric(None, (0.1, 0.0))
     with pytest.raises(InvalidValueError, match="no creep_speed for patches with an asymmetry"):
         pf.DistributedModel(leaning, CREEPING)
@@ -248,10 +245,10 @@ class Halved(pf.LuGre):
 
 def test_a_subclass_is_what_its_numbers_say():
     halved, plain = Halved(mu_c=0.8, mu_s=1.0), pf.LuGre(mu_c=0.4, mu_s=0.5)
-    twist, small = (1e-2, 2e-3, 0.3), {"segments": 8, "speeds": 5}
+    twist = 1e-2, 2e-3, 0.3
     for make in (
         lambda law: pf.DistributedModel(DISC, law),
-        lambda law: pf.ReducedModel(DISC, law, **small),
+        lambda law: pf.ReducedModel(DISC, law),
         lambda law: pf.ReducedModelPublished(DISC, law),
     ):
         of_halved, of_plain = make(halved), make(plain)

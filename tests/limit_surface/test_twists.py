@@ -155,10 +155,10 @@ def test_a_twist_that_is_not_found_is_an_error():
 
 def test_what_is_no_number_is_no_certificate():
     surface = pf.LimitSurfaceCells(pf.ContactPatch.disc(0.01, cells=5))
-    levers, weights = surface._cell_rows
+    levers, spins, weights = surface._cell_rows
     wrenches, found = np.array([[0.3, 0.1, 1e-3]]), np.empty((1, 3))
-    assert cell_twists(levers, weights, surface._scaling, wrenches, found) < 1e-12
-    assert np.isnan(cell_twists(levers, np.full_like(weights, np.nan), surface._scaling, wrenches, found))
+    assert cell_twists(levers, spins, weights, surface._scaling, wrenches, found) < 1e-12
+    assert np.isnan(cell_twists(levers, spins, np.full_like(weights, np.nan), surface._scaling, wrenches, found))
 
 
 def test_a_bad_wrench_among_good_ones_is_named():

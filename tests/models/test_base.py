@@ -351,7 +351,7 @@ def test_jacobians_have_batch_axes(kind):
 def test_batches_at_rest(front):
     patch, law = pf.ContactPatch.disc(0.01, 5), pf.LuGre()
     module = pf if front is None else pytest.importorskip(front, exc_type=ImportError)
-    for model in (module.DistributedModel(patch, law), module.ReducedModel(patch, law, parts=1)):
+    for model in (module.DistributedModel(patch, law), module.ReducedModel(patch, law)):
         for batch, axes in (((), ()), (64, (64,)), ((64,), (64,)), ([2, 3], (2, 3)), (0, (0,))):
             assert tuple(model.rest(batch).shape) == (*axes, *model.state_shape)
         for wrong in (-1, 1.5, "many", (2, -1), 10**9, (1,) * 40, None):

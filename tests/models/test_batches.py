@@ -41,8 +41,8 @@ MODELS = {
     "distributed, metrics": lambda law: pf.DistributedModel(CELLS, law),
     "distributed, soft": lambda law: pf.DistributedModel(SOFT, law),
     "distributed, maps over load": lambda law: pf.DistributedModel(LOADED, law),
-    "reduced": lambda law: pf.ReducedModel(MAP, law, segments=8, parts=1),
-    "reduced, metric": lambda law: pf.ReducedModel(METRIC, law, segments=8, parts=1),
+    "reduced": lambda law: pf.ReducedModel(MAP, law, cells=12),
+    "reduced, metric": lambda law: pf.ReducedModel(METRIC, law, cells=12),
     "published": lambda law: pf.ReducedModelPublished(MAP, law),
     "published, metric": lambda law: pf.ReducedModelPublished(
         ONE_METRIC, law, surface=pf.LimitSurfaceTable(ONE_METRIC, segments=8)

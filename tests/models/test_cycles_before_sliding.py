@@ -14,7 +14,7 @@ LEG, STEPS, DT, CYCLES = 1e-7, 50, 1e-3, 6
 
 SPRINGS = {
     "distributed": pf.DistributedModel(PATCH, LAW),
-    "moments": pf.ReducedModel(PATCH, LAW, parts=1),
+    "reduced": pf.ReducedModel(PATCH, LAW),
     "published, ellipsoid": pf.ReducedModelPublished(PATCH, LAW, pf.LimitSurfaceEllipsoid(PATCH)),
 }
 

@@ -14,7 +14,7 @@ PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 LAWS = {"plain": pf.LuGre(mu_s=1.2), "elasto-plastic": pf.LuGre(mu_s=1.2, elasto_plastic=0.9)}
 KINDS = {
     "distributed": pf.DistributedModel,
-    "reduced": lambda patch, law: pf.ReducedModel(patch, law, segments=6, parts=1),
+    "reduced": lambda patch, law: pf.ReducedModel(patch, law),
     "published": pf.ReducedModelPublished,
 }
 DIRECTIONS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.3, -0.7, 0.5], [-8e-4, -2e-3, -1.0]])

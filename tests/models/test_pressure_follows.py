@@ -13,12 +13,12 @@ SOFT = pf.ContactPatch.disc(0.01, 9, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=
 LEANING = PATCH.with_friction_metric(np.diag([2.0, 1.0]), asymmetry=(0.1, 0.0))
 MODELS = {
     "distributed": pf.DistributedModel(PATCH, LAW),
-    "reduced": pf.ReducedModel(PATCH, LAW, parts=1),
-    "four parts": pf.ReducedModel(PATCH, LAW, parts=4),
+    "reduced": pf.ReducedModel(PATCH, LAW),
     "published": pf.ReducedModelPublished(PATCH, LAW),
     "leaning": pf.DistributedModel(LEANING, LAW),
     "soft distributed": pf.DistributedModel(SOFT, LAW),
-    "soft reduced": pf.ReducedModel(SOFT, LAW, parts=1),
+    "soft reduced": pf.ReducedModel(SOFT, LAW),
+    "soft published": pf.ReducedModelPublished(SOFT, LAW, pf.LimitSurfaceTablePublished(SOFT, normal_force=2.0)),
 }
 
 
@@ -34,7 +34,7 @@ def moments_at(centre, load) -> np.ndarray:
 
 @pytest.mark.parametrize("load", [1e-20, 1e-61, 1e-300, 5e-324])
 def test_moments_of_hardly_any_load_give_numbers(model, load):
-    """Its centre lies further away than any patch: one part went to 1e99 m, and then to infinity."""
+    """Its centre lies further away than any patch: one that moves as a whole went to 1e99 m, then to infinity."""
     state = model.rest()
     for _ in range(2):
         state, wrench = model.step(state, (0.005, 0.002, 0.5), load, 1e-3, moments=(1e-3, -2e-3))
@@ -42,7 +42,7 @@ def test_moments_of_hardly_any_load_give_numbers(model, load):
 
 
 def test_translation_pulls_at_the_centre_of_pressure(model):
-    """Friction of a translation acts at the centre of pressure: within the kern, beyond it, beyond parts' centres."""
+    """Friction of a translation acts at the centre of pressure: within the kern and beyond it."""
     size = model.patch.positions.max()
     for share in ((0.1, 0.0), (0.3, -0.2), (0.5, 0.4)):
         x, y = size * np.array(share)
@@ -119,7 +119,7 @@ def test_friction_takes_energy_while_the_pressure_moves(model):
 
 def test_coupled_patches_follow_by_the_same_rule():
     """The wrenches of a coupled step are those of the models' own steps at the twists, loads and moments."""
-    models = [MODELS[name] for name in ("distributed", "reduced", "four parts", "published")]
+    models = [MODELS[name] for name in ("distributed", "reduced", "leaning", "published")]
     patches, rng = CoupledPatches(models), np.random.default_rng(5)
     twist, load = rng.normal(size=(4, 3)) * (0.01, 0.01, 0.1), rng.uniform(1.0, 3.0, 4)
     moments = 0.03 * rng.normal(size=(4, 2))
@@ -132,8 +132,8 @@ def test_coupled_patches_follow_by_the_same_rule():
         np.testing.assert_allclose(patches.states(step.state)[p], new, rtol=1e-9, atol=1e-18)
 
 
-def test_coupled_parts_that_change_with_the_load_refuse_moments():
-    patches = CoupledPatches([MODELS["soft reduced"]])
+def test_a_coupled_patch_without_cells_refuses_moments_of_loads():
+    patches = CoupledPatches([MODELS["soft published"]])
     host = HostStep(np.zeros((1, 3)), np.ones(1), np.zeros((1, 3)), np.eye(3), moments=np.zeros((1, 2)))
     with pytest.raises(InvalidValueError, match="moments"):
         patches.step(patches.rest(), host, 1e-3)

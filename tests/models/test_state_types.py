@@ -17,7 +17,7 @@ LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 MODELS = {
     "distributed": pf.DistributedModel(PATCH, LAW),
     "grain": pf.DistributedModel(PATCH.with_friction_metric(np.diag([1.0, 2.0])), LAW),
-    "reduced": pf.ReducedModel(PATCH, LAW, segments=6, parts=1),
+    "reduced": pf.ReducedModel(PATCH, LAW),
     "published": pf.ReducedModelPublished(PATCH, LAW),
 }
 TWIST, LOAD, DT = (2e-3, -1e-3, 0.3), 2.0, 1e-4

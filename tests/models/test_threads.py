@@ -21,15 +21,13 @@ PLAIN = pf.LuGre(mu_s=1.2)
 FINGER = pf.SoftFinger(c=6 * 0.02 / 9, n=1 / 3, k_per_newton=2.0, radius_max=0.01)
 SOFT = pf.ContactPatch.rectangle(0.02, cells=9, pressure=FINGER)
 FIXED = pf.ContactPatch.disc(0.01, cells=7)
-SMALL = {"segments": 4, "speeds": 5}
 LOADS = np.geomspace(0.7, 6.0, 160)
 
 MODELS: dict[str, Callable[[], Any]] = {
     "distributed": lambda: pf.DistributedModel(FIXED, LAW),
     "distributed soft": lambda: pf.DistributedModel(SOFT, LAW),
-    "reduced": lambda: pf.ReducedModel(FIXED, PLAIN, **SMALL),
-    "reduced soft": lambda: pf.ReducedModel(SOFT, LAW, **SMALL, load_error=1e-2),
-    "reduced soft, a map for each load": lambda: pf.ReducedModel(SOFT, LAW, **SMALL, load_error=0.0),
+    "reduced": lambda: pf.ReducedModel(FIXED, PLAIN, cells=12),
+    "reduced soft": lambda: pf.ReducedModel(SOFT, LAW, cells=12),
     "published": lambda: pf.ReducedModelPublished(FIXED, LAW),
     "published soft": lambda: pf.ReducedModelPublished(SOFT, LAW, pf.LimitSurfaceTablePublished(SOFT, segments=4)),
     "published soft, smooth": lambda: pf.ReducedModelPublished(SOFT, LAW, pf.LimitSurfaceTable(SOFT, segments=3)),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -21,7 +23,7 @@ def test_a_cell_beside_the_centre_of_rotation_pulls_with_all_its_load(cells):
 @pytest.mark.parametrize("cells", [5, 11])
 def test_the_force_on_a_line_errs_by_the_loads_on_both_sides(cells):
     """About a point of the line the force is the difference of the loads on both sides: `-2 y/L` of an even line."""
-    line = pf.ContactPatch.line(0.02, cells)
+    line = dataclasses.replace(pf.ContactPatch.line(0.02, cells), radii=None)
     near = line.positions[np.abs(line.positions[:, 1]) < 0.02 / 4, 1]
     turns = np.concatenate([near - 0.01 * 0.02 / cells, near + 0.01 * 0.02 / cells])
     sides = np.sign(line.positions[:, 1] - turns[:, None]) @ line.weights() + 2.0 * turns / 0.02
@@ -56,6 +58,15 @@ def test_finer_cells_have_smaller_errors(patch):
     assert fine.cells == 9 * coarse.cells
     for name in ("force", "torque", "breakaway"):
         assert getattr(fine, name) < 0.2 * getattr(coarse, name)
+
+
+def test_errors_of_cells_as_discs_stand_beside_those_of_points():
+    for patch in (pf.ContactPatch.disc(0.01, 9), dataclasses.replace(pf.ContactPatch.line(0.02, 9), radii=None)):
+        error = patch.grid_error()
+        assert error.as_discs == patch.discs().grid_error() and error.as_discs.as_discs is None
+        for name in ("force", "torque", "breakaway"):
+            assert getattr(error.as_discs, name) < 0.9 * getattr(error, name)
+        assert str(error).endswith(f"; as discs {error.as_discs}".partition(" (")[0])
 
 
 def test_a_shape_that_follows_its_load_is_compared_at_that_load():

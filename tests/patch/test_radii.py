@@ -34,7 +34,7 @@ def test_a_disc_far_from_the_centre_adds_its_mean_distance():
 
 def test_radii_of_zero_are_points_to_the_last_bit():
     same = with_radii(SQUARE, 0.0)
-    assert same == SQUARE and not same.has_discs and "radii" not in same.to_dict()
+    assert same == dataclasses.replace(SQUARE) and not same.has_discs and "radii" not in same.to_dict()
     assert same.contact_radius() == SQUARE.contact_radius() and same.second_moment() == SQUARE.second_moment()
     np.testing.assert_array_equal(same.levers(), SQUARE.levers())
 

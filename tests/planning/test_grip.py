@@ -17,7 +17,7 @@ from tests.support.repository import script
 
 LAW = pf.LuGre(mu_c=1.0, mu_s=1.2, elasto_plastic=0.9)
 PATCH = pf.ContactPatch.disc(0.01, cells=11)
-MODEL = pf.ReducedModel(PATCH, LAW, parts=1)
+MODEL = pf.ReducedModel(PATCH, LAW)
 SOFT = pf.ContactPatch.disc(0.02, cells=11, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
 HALF = math.radians(30.0)
 
@@ -88,7 +88,7 @@ def test_the_report_says_what_friction_does():
     """Its frictions are those of scenes whose law is scaled, and one percent is the slope between them."""
     report = turning().report
     law = dataclasses.replace(LAW, mu_c=1.05, mu_s=1.2 * 1.05)
-    contact = dataclasses.replace(turning().scene.contacts[0], model=pf.ReducedModel(PATCH, law, parts=1))
+    contact = dataclasses.replace(turning().scene.contacts[0], model=pf.ReducedModel(PATCH, law))
     changed = pf.simulate(dataclasses.replace(turning().scene, contacts=[contact]))
     assert report.frictions.tolist() == [0.95, 0.99, 1.0, 1.01, 1.05]
     assert report.angles[-1] == pytest.approx(float(changed.data.theta[-1]), abs=1e-9)

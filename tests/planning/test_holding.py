@@ -89,6 +89,6 @@ def test_what_cannot_be_held_or_does_not_hold_is_refused_in_one_line():
 
 
 def test_a_ramp_shorter_than_times_tell_apart_is_a_step():
-    model = pf.ReducedModel(pf.ContactPatch.disc(0.01, 9), pf.LuGre(mu_s=1.2), parts=1)
+    model = pf.ReducedModel(pf.ContactPatch.disc(0.01, 9), pf.LuGre(mu_s=1.2))
     step, ramp = (dynamic_holding_load((1.0, 0.0, 0.001), model, ramp=ramp) for ramp in (0.0, 5e-324))
     assert ramp == step

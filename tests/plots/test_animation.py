@@ -119,7 +119,7 @@ def test_the_way_of_a_contact_is_that_of_its_twist(mounted_on, moves):
 
 
 def field(displacements: np.ndarray, cells: int = 21):
-    model = bristles_of(pf.ReducedModel(pf.ContactPatch.disc(0.01, cells), LAW, parts=1))
+    model = bristles_of(pf.ReducedModel(pf.ContactPatch.disc(0.01, cells), LAW))
     times, loads = 0.01 * np.arange(len(displacements) + 1), np.full(len(displacements) + 1, 2.0)
     return model.patch, slip_field(
         model, model.rest(), times, np.asarray(displacements), loads, np.arange(len(times)), np.zeros(3)
@@ -145,7 +145,7 @@ def test_a_patch_that_turns_slips_outside_and_sticks_inside():
 
 @pytest.mark.parametrize("speed", [0.0, 1e-2])
 def test_at_first_slips_what_moves(speed):
-    model = bristles_of(pf.ReducedModel(pf.ContactPatch.disc(0.01, 5), LAW, parts=1))
+    model = bristles_of(pf.ReducedModel(pf.ContactPatch.disc(0.01, 5), LAW))
     displacements, twist = np.full((2, 3), [1e-3, 0.0, 0.0]), np.array([speed, 0.0, 0.0])
     _, slips = slip_field(model, model.rest(), np.arange(3.0), displacements, np.full(3, 2.0), np.arange(3), twist)
     assert slips[1:].all()
@@ -181,7 +181,7 @@ def test_a_law_without_bristles_leaves_the_cells_plain():
 
 @pytest.mark.parametrize("start", ["equilibrium", "sliding"])
 def test_bristles_start_as_those_of_the_scene(start):
-    model, moving = pf.ReducedModel(pf.ContactPatch.disc(0.01, 7), LAW, parts=1), (0.05, 0.0, 0.0)
+    model, moving = pf.ReducedModel(pf.ContactPatch.disc(0.01, 7), LAW), (0.05, 0.0, 0.0)
     scene = synthetic.scene()
     body = dataclasses.replace(scene.body, velocity=moving if start == "sliding" else (0.0, 0.0, 0.0))
     contacts = [dataclasses.replace(scene.contacts[0], model=model, normal_force=4.0)]

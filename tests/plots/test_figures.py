@@ -563,11 +563,9 @@ def test_nothing_is_wrong_with_the_picture_of_a_patch(name):
 def test_a_model_has_its_colour_in_every_figure():
     patch, law = pf.ContactPatch.disc_published(0.01, 7), pf.LuGre(mu_s=1.2)
     models = {
-        "a": pf.ReducedModel(patch, law, parts=1),
-        "b": pf.DistributedModel(patch, law),
-        "c": pf.ReducedModelPublished(patch, law),
-        "d": pf.ReducedModel(patch, law, parts=2),
-        "e": pf.ReducedModel(patch, law),
+        "a": pf.DistributedModel(patch, law),
+        "b": pf.ReducedModelPublished(patch, law),
+        "c": pf.ReducedModel(patch, law),
     }
     scene = synthetic.scene()
     runs = {
@@ -575,8 +573,8 @@ def test_a_model_has_its_colour_in_every_figure():
         for name, model in models.items()
     }
     drawn = [line.get_color() for line in plots.plot_histories(runs).axes[0].get_lines()]
-    assert drawn == [style.MOMENTS, style.DISTRIBUTED, style.PUBLISHED, style.PARTS, style.FEW]
-    assert tuple(drawn) == (looks.MOMENTS, looks.DISTRIBUTED, looks.REDUCED, looks.PARTS, looks.FEW)
+    assert drawn == [style.DISTRIBUTED, style.PUBLISHED, style.FEW]
+    assert tuple(drawn) == (looks.DISTRIBUTED, looks.REDUCED, looks.FEW)
 
 
 def test_a_body_that_is_tiny_beside_its_path_is_drawn_larger_and_says_so():

@@ -17,7 +17,7 @@ LAW = pf.LuGre(mu_c=0.4, mu_s=0.5, v_s=5e-3, sigma_0=1e5, sigma_1=50.0, sigma_2=
 PATCH = pf.ContactPatch.disc(0.012, cells=5)
 MODELS = {
     "distributed": pf.DistributedModel(PATCH, LAW),
-    "reduced": pf.ReducedModel(PATCH, LAW, segments=8, speeds=6, parts=1),
+    "reduced": pf.ReducedModel(PATCH, LAW),
     "published": pf.ReducedModelPublished(PATCH, LAW),
 }
 SWAY = pf.Signal.sampled(

@@ -20,8 +20,7 @@ FIXED = pf.ContactPatch.disc(0.01, cells=5)
 MODELS = {
     "distributed": lambda: pf.DistributedModel(SOFT, LAW),
     "distributed, measured": lambda: pf.DistributedModel(MAPS, LAW),
-    "reduced": lambda: pf.ReducedModel(SOFT, LAW, segments=4, speeds=5, load_error=1e-2, parts=1),
-    "reduced, a map for each load": lambda: pf.ReducedModel(SOFT, LAW, segments=4, speeds=5, load_error=0.0, parts=1),
+    "reduced": lambda: pf.ReducedModel(SOFT, LAW, cells=12),
     "published": lambda: pf.ReducedModelPublished(SOFT, LAW, pf.LimitSurfaceTablePublished(SOFT, segments=4)),
 }
 

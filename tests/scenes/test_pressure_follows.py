@@ -188,7 +188,7 @@ def test_what_cannot_follow_is_refused():
         "height of contact 'contact'": lambda: pf.Contact(model, 1.0, "body", pressure="follows", height=-1.0),
         "height of contact 'contact' must be 0": lambda: pf.Contact(model, 1.0, "body", height=0.01),
         "only a patch of the body": lambda: pf.Contact(model, 1.0, pressure="follows"),
-        "bristles on cells": lambda: pf.Contact(pf.ReducedModel(FACE, LAW, parts=1), 1.0, "body", pressure="follows"),
+        "bristles on cells": lambda: pf.Contact(pf.ReducedModelPublished(FACE, LAW), 1.0, "body", pressure="follows"),
         "statics leaves open": lambda: dataclasses.replace(
             slide(model), contacts=[*slide(model).contacts, pf.Contact(model, 1.0, name="other")]
         ),

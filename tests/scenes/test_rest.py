@@ -69,7 +69,7 @@ def test_a_body_in_free_fall_never_rests(each):
 
 @pytest.mark.parametrize("each", LAWS)
 def test_a_body_without_load_never_rests_however_slow(each):
-    solution = run(pf.ReducedModel(PATCH, each, parts=1), level(1e-5), 0.0, 0.1)
+    solution = run(pf.ReducedModel(PATCH, each), level(1e-5), 0.0, 0.1)
     assert solution.status == "success"
     assert float(solution.data.x[-1]) == pytest.approx(1e-6, rel=1e-9)
 

@@ -15,8 +15,7 @@ LAW = pf.LuGre(mu_c=0.5, sigma_0=1e5, sigma_1=300.0, sigma_2=0.0, elasto_plastic
 SOFT = pf.ContactPatch.rectangle(0.02, cells=7, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
 MODELS = [
     pf.DistributedModel(PATCH, LAW),
-    pf.ReducedModel(PATCH, LAW, parts=1),
-    pf.ReducedModel(PATCH, LAW, parts=3),
+    pf.ReducedModel(PATCH, LAW, cells=16),
     pf.ReducedModelPublished(PATCH, LAW),
     pf.DistributedModel(SOFT, LAW),
     pf.ReducedModelPublished(SOFT, LAW),
@@ -55,7 +54,7 @@ def test_bristles_that_give_way_are_no_slip():
     """Plain LuGre at 0.7 of what friction holds: most of each small motion is lost, but none goes a full deflection."""
     force = pf.Signal([0.0, 0.02, 0.05], np.outer([0.7, 0.8, 0.7], [0.5 * G, 0.0, 0.0]))
     plain = dataclasses.replace(LAW, elasto_plastic=None)
-    table = pf.Contact(pf.ReducedModel(PATCH, plain, parts=1), G, name="table")
+    table = pf.Contact(pf.ReducedModel(PATCH, plain), G, name="table")
     body = pf.Body(1.0, 1e-3, gravity=(0.0, 0.0))
     scene = pf.Scene(body, [table], 0.1, force=force, save_every=5e-4, start="equilibrium")
     assert pf.simulate(scene, bristles="all").slip_events() == ()
@@ -64,7 +63,7 @@ def test_bristles_that_give_way_are_no_slip():
 def test_slow_is_not_stuck():
     """A contact that is dragged at a hundredth of v_s slips from its first full deflection on."""
     speed = 1e-5
-    scene = pf.scenes.driven(pf.ReducedModel(PATCH, LAW, parts=1), twist=(speed, 0.0, 0.0), t_end=3.0)
+    scene = pf.scenes.driven(pf.ReducedModel(PATCH, LAW), twist=(speed, 0.0, 0.0), t_end=3.0)
     (event,) = pf.simulate(scene, bristles="all").slip_events()
     full = 0.5 / 1e5 / speed
     assert 0.9 * full < event.onset < full * 1.1

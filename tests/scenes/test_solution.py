@@ -239,3 +239,14 @@ def test_what_is_no_file_is_no_solution(tmp_path, name):
     with pytest.raises(FileError) as caught:
         Solution.load(tmp_path / name)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("make", "units"),
+    [(pf.ReducedModel, "m"), (pf.ReducedModelPublished, "m, m, m^2"), (pf.DistributedModel, "m")],
+)
+def test_recorded_states_have_the_units_of_their_model(make, units):
+    model = make(pf.ContactPatch.disc(0.01, cells=5), pf.LuGre())
+    data = pf.simulate(pf.scenes.free_slide(model, t_end=0.01), bristles="all").data
+    (name,) = [each for each in data if each.startswith("bristles")]
+    assert data[name].attrs["units"] == units

@@ -20,21 +20,17 @@ BRUSHED = PATCH.with_friction_metric(pf.friction_metric(0.3, 0.7, 1.0), (0.2, 0.
 WEIGHT = 0.2 * 9.81
 
 
-def three_parts(patch, law):
-    return pf.ReducedModel(patch, law, parts=3)
-
-
 def model_name(model) -> str:
     return f"{type(model).__name__}-{model.state_shape}-{model.patch.name}-{model.law.elasto_plastic is not None}"
 
 
 PLAIN = dataclasses.replace(LAW, elasto_plastic=None)
 MODELS = [
-    *(kind(PATCH, law) for law in (LAW, PLAIN) for kind in (pf.DistributedModel, three_parts, pf.ReducedModel)),
+    *(kind(PATCH, law) for law in (LAW, PLAIN) for kind in (pf.DistributedModel, pf.ReducedModel)),
     pf.ReducedModelPublished(PATCH, LAW),
     *(kind(SOFT, LAW) for kind in (pf.DistributedModel, pf.ReducedModel, pf.ReducedModelPublished)),
     pf.DistributedModel(BRUSHED, LAW),
-    pf.ReducedModel(BRUSHED, LAW, parts=1),
+    pf.ReducedModel(BRUSHED, LAW),
     pf.ReducedModelPublished(GRAINED, LAW, surface=pf.LimitSurfaceEllipsoid(GRAINED)),
 ]
 
@@ -62,7 +58,7 @@ def test_contacts_share_the_load_by_their_stiffness():
     soft = dataclasses.replace(LAW, sigma_0=0.5e5)
     feet = [
         pf.Contact(pf.DistributedModel(PATCH, LAW), 4.0, position=(-0.05, 0.0), name="hard"),
-        pf.Contact(pf.ReducedModel(PATCH, soft, parts=1), 2.0, "body", position=(0.05, 0.0), count=2, name="soft"),
+        pf.Contact(pf.ReducedModel(PATCH, soft), 2.0, "body", position=(0.05, 0.0), count=2, name="soft"),
     ]
     body = pf.Body(1.0, 1e-3, gravity=(0.0, 0.0))
     scene = pf.Scene(body, feet, 0.02, force=(1.5, 0.0, 0.0), start="equilibrium")
@@ -111,7 +107,7 @@ def test_a_block_that_slides_goes_as_far_as_friction_lets_it():
     """`v^2 / (2 mu g)`, to a hundredth of a full deflection; the damping of empty bristles would stop it at once."""
     way, deflection = {}, 0.5 / 1e5
     for start in ("rest", "sliding"):
-        scene = pf.scenes.free_slide(pf.ReducedModel(PATCH, COULOMB, parts=1), twist=(0.05, 0.0, 0.0), save_every=1e-4)
+        scene = pf.scenes.free_slide(pf.ReducedModel(PATCH, COULOMB), twist=(0.05, 0.0, 0.0), save_every=1e-4)
         data = pf.simulate(dataclasses.replace(scene, start=start), t_end=0.02, rtol=1e-8).data
         way[start] = float(data.x.max()) - 0.05**2 / (2 * 0.5 * 9.81)
     assert abs(way["sliding"]) < 0.01 * deflection
@@ -152,7 +148,7 @@ def held_by_two(change: str = "", by: float = 0.0) -> pf.Scene:
     more = {name: by * (name == change) for name in ("grip", "push", "mass")}
     grip = pf.Signal([0.0, 0.02, 0.06], [2.6 + more["grip"], 1.0, 3.6], "linear")
     pads = [
-        pf.Contact(pf.ReducedModel(PATCH, LAW, parts=1), grip, count=2, name="grip"),
+        pf.Contact(pf.ReducedModel(PATCH, LAW), grip, count=2, name="grip"),
         pf.Contact(pf.DistributedModel(PATCH, PLAIN), 0.3, position=(0.05, 0.01), name="other"),
     ]
     body = pf.Body(0.2 * (1.0 + more["mass"]), 4e-4, (0.015, 0.0))
@@ -176,7 +172,7 @@ def test_derivatives_follow_an_equilibrium():
 
 
 def test_derivatives_to_what_moves_the_start_are_refused():
-    scene, knots = held(pf.ReducedModel(PATCH, LAW, parts=1)), np.array([0.0, 0.05])
+    scene, knots = held(pf.ReducedModel(PATCH, LAW)), np.array([0.0, 0.05])
     with pytest.raises(InvalidValueError, match="start must be 'rest' for the derivative with respect to mu"):
         pf.derivatives.scene_sensitivities(scene, ["mass", "mu"])
     thrown = dataclasses.replace(pf.scenes.free_slide(scene.contacts[0].model, twist=(0.1, 0.0, 1.0)), start="sliding")
@@ -188,7 +184,7 @@ def test_derivatives_to_what_moves_the_start_are_refused():
 
 @pytest.mark.parametrize("load", [5e-324, 1e-310, 1e-300])
 def test_loads_too_small_to_divide_by_hold_nothing(load):
-    model = pf.ReducedModel(pf.ContactPatch.disc(0.01, cells=5), pf.LuGre(), parts=1)
+    model = pf.ReducedModel(pf.ContactPatch.disc(0.01, cells=5), pf.LuGre())
     scene = pf.scenes.pivot(model, normal_force=load, t_end=0.01)
     with pytest.raises(InvalidValueError, match="start must be 'rest' or 'sliding' if the contacts do not hold"):
         pf.simulate(scene)

@@ -89,7 +89,7 @@ def test_a_foot_turns_where_the_torque_passes_the_least_dissipation(part, turns)
 
 
 def test_a_foot_walks_sideways_on_heel_and_forefoot():
-    model = pf.ReducedModel(PAD, COULOMB, parts=1)
+    model = pf.ReducedModel(PAD, COULOMB)
     data = pf.simulate(foot(model)).data
     x, y, theta = (np.asarray(data[name]) for name in ("x", "y", "theta"))
     heel = np.stack([x - 0.08 * np.cos(theta), y - 0.08 * np.sin(theta)])
@@ -169,14 +169,13 @@ def test_the_closed_form_has_the_published_ratios():
     assert terminal_ratio(1.0, 0.999) == pytest.approx(1.0, abs=2e-3)
 
 
-@pytest.mark.parametrize("kind", [pf.DistributedModel, pf.models.MomentModel])
 @pytest.mark.parametrize("patch", [DISC, RING], ids=["disc", "ring"])
-def test_discs_and_rings_stop_sliding_and_turning_together(patch, kind):
+def test_discs_and_rings_stop_sliding_and_turning_together(patch):
     """From a tenth more, the same or a tenth less, they come closer to the ratio of the closed form."""
     inner, gyration = (0.0, math.sqrt(0.5)) if patch is DISC else (0.98, math.sqrt(0.5 * (1.0 + 0.98**2)))
     final = terminal_ratio(gyration, inner)
     for start in (0.9, 1.0, 1.1):
-        speed, ratio = ratios(patch, gyration, start * final, kind)
+        speed, ratio = ratios(patch, gyration, start * final, pf.DistributedModel)
         late = ratio[speed > 0.02][-1]  # LuGre is Coulomb down to there: bristles of 2 um
         assert abs(late / final - 1.0) < 0.006 + 0.12 * abs(start - 1.0)  # 31 cells across stand for a disc
 
@@ -184,7 +183,7 @@ def test_discs_and_rings_stop_sliding_and_turning_together(patch, kind):
 @pytest.mark.parametrize("gyration", [0.4, 0.6, 0.9])
 def test_the_radius_of_gyration_decides_what_lasts_longer(gyration):
     """Below 1/2 the spin dies first, above sqrt(2/3) the slide, between them they die together (uniform disc)."""
-    speed, ratio = ratios(DISC, gyration, 1.0, pf.models.MomentModel)
+    speed, ratio = ratios(DISC, gyration, 1.0, pf.DistributedModel)
     early, late = ratio[speed > 0.3][-1], ratio[speed > 0.01][-1]
     if gyration < 0.5:
         assert late > 2.0 * early > 2.0

@@ -1,4 +1,4 @@
-"""Beyond the paper: exact surfaces, `ReducedModel`, few cells, loads and grooves, each against our own reference."""
+"""Beyond the paper: exact surfaces, few discs, loads and grooves, each against our own reference."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceExact
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction_studies.experiments import EXPERIMENTS
-from planarfriction_studies.experiments.beyond import contacts, ladder
+from planarfriction_studies.experiments.beyond import cells, contacts, ladder
 from planarfriction_studies.experiments.beyond import run as beyond
 from planarfriction_studies.experiments.beyond import surfaces as beyond_surfaces
 from planarfriction_studies.experiments.beyond.tables import FAMILIES
@@ -75,20 +75,50 @@ def test_the_exact_surface_is_the_limit_of_ever_finer_sums():
     assert misses[1] < misses[0] / 2.0 and misses[2] < misses[1] / 2.0
 
 
-def test_moments_are_nearer_than_the_published_one(result):
+def test_discs_are_nearer_than_the_published_model(result):
     assert set(result.numbers["driven"]) == set(beyond.QUICK_SHAPES)
-    for ratios in (*result.numbers["driven ratios"].values(), *result.numbers["driven ratios, auto"].values()):
-        # found: medians up to 0.13, third quartiles to 0.15, maxima to 0.93; 1 is a model that is no better
-        assert ratios["median"] < 0.25 and ratios["third quartile"] < 0.4
-        assert ratios["maximum"] < 1.0 and ratios["torque maximum"] < 1.0
     for ratios in result.numbers["driven ratios"].values():
-        assert ratios["torque median"] < 0.05
+        # 1 is a model that is no better: a thin line slides on the published table within 4 mN of 1 N most of the time
+        assert ratios["maximum"] < 0.6 and ratios["torque maximum"] < 0.6 and ratios["torque third quartile"] < 0.25
 
 
-def test_parts_beat_the_published_model_on_patches_of_no_table(result):
+def test_a_disc_for_every_cell_is_nearer_than_points_of_the_same_cells(result):
+    for each in result.numbers["driven"].values():
+        for name in ladder.STATISTICS:
+            assert each[ladder.ALL][name] < each["full"][name]
+
+
+def test_discs_beat_the_published_model_on_patches_of_no_table(result):
     for each in result.numbers["new shapes"].values():
-        for ratios in each[ladder.AUTO].values():
-            assert max(ratios) < 1.0
+        for ratios in each["reduced"].values():
+            assert max(ratios) < 0.6
+
+
+def test_errors_fall_at_every_doubling_of_discs(result):
+    found = [result.numbers["few discs"][name] for name in (*(f"{n} discs" for n in cells.RUNGS), "all")]
+    for words in ("force, median run", "rms", "load of slip, median"):
+        assert (np.diff([each[words] for each in found]) < 0.0).all(), words
+
+
+def test_the_default_is_far_below_the_published_model(result):
+    few, published = (result.numbers["few discs"][name] for name in (f"{ladder.DEFAULT} discs", "published"))
+    assert few["force, median run"] < 2.0 and few["worst run"] < 0.3 * published["worst run"]
+    assert few["steady, force"] < 1.0 and few["largest"] < 0.35
+
+
+def test_contacts_that_hold_creep_as_far_with_few_discs_as_with_fine_cells(result):
+    for level, found in result.numbers["creep"]["disc"].items():
+        few, fine = found[f"{ladder.DEFAULT} discs"], found["refined(2)"]
+        assert abs(few - fine) < (1e-9 if float(level) < 0.7 else 2e-8), level
+
+
+def test_no_motion_returns_more_work_than_was_put_in(result):
+    assert max(result.numbers["work returned"].values()) <= 0.0
+
+
+def test_gains_are_what_comes_back_beyond_what_went_in():
+    assert cells.gain(np.array([[1.0, -0.5], [2.0, -1.0]])) < 0.0
+    assert cells.gain(np.array([[1.0, -0.5], [1.0, -2.0]])) == pytest.approx(1.0 / 3.0)
 
 
 def test_a_table_of_the_exact_surface_is_nearer_than_the_sum_over_cells(result):
@@ -104,7 +134,7 @@ def test_plateaus(result):
     expected = angles["closed form"] * moment / radius**2
     assert angles["published reduced"] == pytest.approx(expected, rel=0.03)
     swapped = angles | {"ReducedModel": angles["published reduced"]}
-    assert [row.holds for row in contacts.plateau_comparisons(swapped)] == [False, False]
+    assert [row.holds for row in contacts.plateau_comparisons(swapped)] == [True, False]
 
 
 def test_a_drift_a_tenth_of_a_degree_off_would_be_noticed(result):
@@ -115,18 +145,19 @@ def test_a_drift_a_tenth_of_a_degree_off_would_be_noticed(result):
 
 
 def test_soft_finger(result):
-    family = result.numbers["load family"]
-    assert family["maps"] > 1
-    assert family["force from rebuilding [N]"] < 4e-3
-    assert family["torque from rebuilding [N m]"] < 4e-5
+    found = result.numbers["soft finger"]
+    assert found["reduced [m]"] < 1e-5
+    # points of the same cells are as far from finer ones: 1 % of the load
+    assert found["steady force [N]"] < 2.5e-2
+    assert found["steady torque [N m]"] < 2e-4
 
 
 def test_in_hand_ends_are_those_of_two_simulations(result):
     case = Case("LineGrad", 2)
     ends = result.numbers["in hand"][case.words]
-    assert ends["reduced"] == 0.0 < ends["one part"] < ends["published"]  # 21 cells all have bristles
+    assert ends["reduced"] == ends[ladder.ALL] < ends["published"]  # 21 cells are 21 discs
     rows = ladder.in_hand_rows((case,))
-    assert {row.model: row.errors["end"] for row in rows}["one part"] == pytest.approx(ends["one part"], rel=1e-9)
+    assert {row.model: row.errors["end"] for row in rows}["reduced"] == pytest.approx(ends["reduced"], rel=1e-9)
     assert ends[ladder.SHIFT] == pytest.approx(ladder.friction_shift(case), rel=1e-9)
 
 
@@ -138,12 +169,11 @@ def test_every_published_in_hand_run_is_there():
     assert all(len(ladder.cases_of(shape)) % 2 == 0 for shape in beyond.SHAPES)
 
 
-def test_few_cells_are_a_rung_between_three_bristles_and_the_grid(result):
+def test_few_discs_are_a_rung_between_three_bristles_and_the_grid(result):
     ends = result.numbers["in hand"][f"{IN_WORDS['NonConvex2']}, load 1"]
-    for few in ("degree 5", "reduced"):
-        assert ends[few] < 0.1 * min(ends["one part"], ends["published"])
-        # few cells are off by less than 0.1 % of friction would do, three bristles by more, but less than 2 % would
-        assert ends[few] < ends[ladder.SHIFT] < ends["one part"] < 20.0 * ends[ladder.SHIFT]
+    assert ends["reduced"] < 0.1 * ends["published"]
+    # few discs are off by less than 0.1 % of friction would do, three bristles by more
+    assert ends["reduced"] < ends[ladder.SHIFT] < ends["published"]
 
 
 def test_score_counts_by_load():
@@ -161,7 +191,7 @@ def test_references_are_finer_than_the_grids():
 
 
 def test_tables_and_pictures_are_complete(result):
-    assert len(result.pictures) == 6
+    assert len(result.pictures) == 7
     for table in result.tables:
         assert {len(row) for row in table.rows} == {len(table.headings)}, table.title
     assert all("nan" not in paragraph for paragraph in result.findings)
@@ -190,15 +220,7 @@ def test_the_ladder_draws_every_family_that_was_run(result):
     assert len(figure.axes) == 6  # patches of many cells and of few; velocity-driven, and two loads in hand
     shown = {text.get_text() for axes in figure.axes for text in axes.texts}
     assert shown == {"", *(words for family in FAMILIES for words, _ in family.rungs.values())}
-    for axes in figure.axes:
-        (first, last), (left, right) = axes.dataLim.intervalx, axes.get_xlim()
+    for column in (figure.axes[0::2], figure.axes[1::2]):  # which share their axis of times
+        first, last = (find(axes.dataLim.intervalx[i] for axes in column) for i, find in enumerate((min, max)))
+        left, right = column[0].get_xlim()
         assert np.log(right / left) < 2.0 * np.log(last / first)  # an axis of times without an empty half
-
-
-def test_parts_are_looked_at_as_many_as_auto_takes(result):
-    for shape in beyond.QUICK_SHAPES:
-        models = ladder.models(shape)
-        assert models[ladder.AUTO] is models["6 parts"]
-        assert len(models["16 parts"].rest()) == 16
-    for each in result.numbers["in hand"].values():
-        assert each[ladder.AUTO] == each["6 parts"]

@@ -64,7 +64,7 @@ def test_tables_of_the_page_are_made(capsys):
 
 
 def test_absolute_tolerance_follows_the_relative_one():
-    scene = pf.scenes.in_hand(pf.ReducedModel(PUBLISHED_PATCHES["NonConvex1"](), LAW, parts=1), normal_force=8.0)
+    scene = pf.scenes.in_hand(pf.ReducedModel(PUBLISHED_PATCHES["NonConvex1"](), LAW), normal_force=8.0)
     given = pf.simulate(scene, t_end=0.1, rtol=10.0 * scene.rtol, atol=10.0 * scene.atol)
     followed = pf.simulate(scene, t_end=0.1, rtol=10.0 * scene.rtol)
     assert followed.statistics.steps == given.statistics.steps

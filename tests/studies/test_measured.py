@@ -137,7 +137,7 @@ def test_surfaces_explain_the_pushes_they_made(cases):
     asked = replace(case.question, wrenches=-4.0 * surface.wrench(twists))
     exact = models.SurfaceModel(pf.LimitSurfaceExact)(asked)
     assert angles(exact, twists, pushes.LENGTH).max() < 0.01
-    reduced = models.BristleModel(pf.ReducedModel)(asked)
+    reduced = models.BristleModel(pf.ReducedModelPublished)(asked)
     # its map smooths the kinks where a foot stands still, and the search ends 0.1 deg away or so
     assert np.median(angles(reduced, twists, pushes.LENGTH)) < 1.0
     ellipsoid = models.SurfaceModel(pf.LimitSurfaceEllipsoid)(asked)
@@ -219,7 +219,7 @@ def test_the_static_friction_of_made_breakaways_comes_back(cases):
     """Straight pushes of a flat square: all cells break away at once, and the whole ratio is seen."""
     every = [case for case in cases["onsets"] if case.board == "feet"][:3]
     made = [touched(cases["onsets"][0], stiffness=k) for k in (1e4, 2e4, 4e4)]
-    model = models.BristleModel(pf.models.MomentModel)
+    model = models.BristleModel(pf.ReducedModelPublished)
     flat = model._peaks([case.question for case in made], (1.0, 1.3))
     feet = model._peaks([case.question for case in every], (1.15, 1.0))
     # bristles and damper add 0.03, with static friction and without

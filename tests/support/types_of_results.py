@@ -15,7 +15,7 @@ assert_type(patch.second_moment(2.0), float)
 assert_type(patch.area(np.array([1.0, 2.0])), np.ndarray)
 assert_type(holding_load(np.array([0.0, -1.0, 0.0]), patch, 0.5), float)
 
-model = pf.ReducedModel(patch, pf.LuGre(mu_c=0.5), parts=1)
+model = pf.ReducedModel(patch, pf.LuGre(mu_c=0.5))
 state, wrench = model.step(model.rest(), [0.01, 0.0, 1.0], normal_force=np.float64(2.0), dt=1e-3)
 run = pf.rollout(model, state, np.tile(wrench, (100, 1)), 1.0, 1e-3)
 assert_type(run.wrenches, np.ndarray)
@@ -27,7 +27,7 @@ print(solution.status.upper(), solution.statistics.steps + 1, float(solution.dat
 
 
 def make(mu: float, grip: float) -> pf.Scene:
-    return pf.scenes.in_hand(pf.ReducedModel(patch, pf.LuGre(mu_c=mu), parts=1), normal_force=grip)
+    return pf.scenes.in_hand(pf.ReducedModel(patch, pf.LuGre(mu_c=mu)), normal_force=grip)
 
 
 def measure(run: pf.Solution) -> dict[str, float]:

@@ -28,7 +28,7 @@ from planarfriction.sweeps import keys, records
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 PATCH = pf.ContactPatch.disc(0.01, cells=7)
-MODEL = pf.ReducedModel(PATCH, LAW, segments=4, speeds=5, parts=1)
+MODEL = pf.ReducedModel(PATCH, LAW, cells=8)
 FRESH = multiprocessing.get_context("spawn")
 """Forks of a process in which other tests have started JAX can hang."""
 
@@ -545,9 +545,7 @@ def test_models_are_built_once_for_equal_scenes():
     seen = set()
 
     def make(grip: float) -> pf.Scene:
-        return pf.scenes.in_hand(
-            pf.ReducedModel(PATCH, LAW, segments=4, speeds=5, parts=1), normal_force=grip, t_end=0.01
-        )
+        return pf.scenes.in_hand(pf.ReducedModel(PATCH, LAW, cells=8), normal_force=grip, t_end=0.01)
 
     def look(solution: pf.Solution) -> float:
         seen.add(id(solution.scene.contacts[0].model))

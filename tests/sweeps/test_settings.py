@@ -36,7 +36,7 @@ mu_c = 1.0
 mu_s = 1.2
 elasto_plastic = 0.9
 """
-SMALL = '{ kind = "reduced", segments = 4, speeds = 5 }'
+SMALL = '{ kind = "reduced", cells = 8 }'
 
 
 @pytest.fixture
@@ -76,14 +76,18 @@ def test_values_of_a_scene_are_changed_too(file):
     scene = pf.Scene.from_file(file)
     make = Settable(scene)
     assert make() == scene
-    changed = make(**{"fingers.law.mu_c": 0.5, "body.mass": 0.4, "fingers.model.segments": 6})
-    assert changed.body.inertia == scene.body.inertia and changed.contacts[0].model.segments == 6
+    changed = make(**{"fingers.law.mu_c": 0.5, "body.mass": 0.4, "fingers.model.cells": 6})
+    assert changed.body.inertia == scene.body.inertia and changed.contacts[0].model.cells == 6
     assert changed.contacts[0].model.patch == scene.contacts[0].model.patch
 
 
 def test_a_model_that_is_only_named_gets_keys(file):
     Path(file).write_text(SCENE.format(model='"reduced"'))
-    assert Settable(file)(**{"fingers.model.parts": 2}).contacts[0].model.parts == 2
+    assert Settable(file)(**{"fingers.model.cells": 2}).contacts[0].model.cells == 2
+    for old in ("parts", "segments", "speeds", "load_error"):
+        with pytest.raises(pf.FrictionError, match=f"{old} must be left out: write cells=") as caught:
+            Settable(file)(**{f"fingers.model.{old}": 2})
+        assert "\n" not in str(caught.value)
 
 
 def test_contacts_are_called_what_they_are_called_in_results():
@@ -143,7 +147,7 @@ def test_paths_that_lead_nowhere_say_what_there_is(file, path, value, words):
         ("g=[0, -9.81],[0.0,0.0]", "g", [[0, -9.81], [0.0, 0.0]]),
         ('n="a,b"', "n", ["a,b"]),
         ("n=1:2", "n", ["1:2"]),
-        ("m={ kind = 'reduced', parts = 2 }", "m", [{"kind": "reduced", "parts": 2}]),
+        ("m={ kind = 'reduced', cells = 2 }", "m", [{"kind": "reduced", "cells": 2}]),
     ],
 )
 def test_texts_are_values(text, path, values):

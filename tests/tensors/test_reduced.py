@@ -32,6 +32,6 @@ def test_it_is_that_of_numpy(front, cells):
 
 @pytest.mark.parametrize("option", ["parts", "segments", "speeds", "load_error"])
 def test_an_option_that_it_had_says_what_to_write_instead(front, option):
-    with pytest.raises(pf.FrictionError, match=f"^{option} must be replaced by cells=n") as caught:
+    with pytest.raises(pf.FrictionError, match=f"^{option} must be left out: write cells=") as caught:
         front.ReducedModel(pf.ContactPatch.disc(0.02), LAW, **{option: 1})
     assert "\n" not in str(caught.value)

@@ -30,10 +30,10 @@ def contact_of(kind: str):
     """Return the equations of a model, its contact over NumPy, and the model itself."""
     numbers = LAW_OF_TEST.numbers
     if kind == "distributed":
-        cells = distributed.cells_of(PATCH, None, "numpy")
+        cells = distributed.cells_of(PATCH, LAW_OF_TEST, None)
         return distributed, Contact(numbers, cells), pf.DistributedModel(PATCH, LAW_OF_TEST)
     shape = published.shape_of(PATCH, LAW_OF_TEST, None)
-    values = {name: np.array([value]) for name, value in published.values_of(LAW_OF_TEST, shape).items()}
+    values = {name: np.array([[value]]) for name, value in published.values_of(LAW_OF_TEST, shape).items()}
     numeric = published.numbers_of(NUMPY, values, shape.surface.numbers, None)
     return published, Contact(numbers, numeric), pf.ReducedModelPublished(PATCH, LAW_OF_TEST)
 

@@ -33,7 +33,7 @@ def inputs(model) -> tuple[torch.Tensor, ...]:
     """State, twists, loads and parameters."""
     t = 1e-4 * torch.arange(T, dtype=torch.float64)
     twists = torch.stack([2e-3 * torch.sin(900 * t) + 1e-4, 1e-3 * torch.cos(600 * t), 0.3 * torch.sin(450 * t)], -1)
-    size = [[1e-7], [2e-7]] if len(model.state_shape) > 1 else [1e-7, 2e-7, 1e-9]
+    size = [[1e-7], [2e-7], [1e-8]] if len(model.state_shape) > 1 else [1e-7, 2e-7, 1e-9]
     state = torch.tensor(size, dtype=torch.float64) * torch.ones(model.state_shape, dtype=torch.float64)
     return state, twists, 1.0 + torch.cos(500 * t), model.physical().detach()
 

@@ -116,14 +116,14 @@ def test_moments(name):
 def test_shapes():
     """Contacts have patches and laws of their own; which one can be written between steps."""
     rough = dataclasses.replace(LAW, mu_c=1.1, mu_s=1.3)
-    models = [pf.ReducedModel(DISC, LAW), pf.ReducedModel(pf.ContactPatch.rectangle(0.02, 0.01), rough)]
+    models = [pf.ReducedModel(DISC, LAW), pf.ReducedModel(pf.ContactPatch.rectangle(0.02, 0.01), rough, cells=20)]
     friction = Model(models, contacts=3, which=[1, 0, 1], device="cpu", dtype=wp.float64)
     twist, load = np.array([[1e-3, 2e-3, 0.3]] * 3), np.array([1.0, 2.0, 3.0])
     given = arrays(wp.float64, twist, load)
     moments = np.array([[1e-3, 2e-3]] * 3)
 
     def expected(i, kind, law):
-        own = pf.ReducedModel(kind.patch, law)
+        own = pf.ReducedModel(kind.patch, law, cells=kind.cells)
         return own.step(own.rest(), twist[i], load[i], 1e-2, moments=moments[i])[1]
 
     def found():
@@ -211,7 +211,7 @@ def test_bad_numbers(place, value):
     """A contact with bad numbers keeps its state and has no wrench; its neighbours do not see it."""
     model = MODELS["few"]()
     friction = Model(model, contacts=3, parameters={"mu_s": np.full(3, 1.2)}, device="cpu", dtype=wp.float64)
-    given = {"state": np.zeros((3, 2, 56)), "twist": np.full((3, 3), 0.01), "load": np.ones(3)}
+    given = {"state": np.zeros((3, *model.state_shape)), "twist": np.full((3, 3), 0.01), "load": np.ones(3)}
     if place in given:
         given[place].reshape(3, -1)[1, 0] = value
     else:

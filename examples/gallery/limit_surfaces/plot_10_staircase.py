@@ -2,9 +2,11 @@
 The staircase of a sum over cells
 =================================
 
-Sum the friction over cells, and each cell that the centre of rotation crosses turns its force round: the wrench moves
-in steps. Integrated exactly, it is smooth.
+Sum the friction over points, and each point that the centre of rotation crosses turns its force round: the wrench moves
+in steps. Integrated exactly, it is smooth; over cells that are small discs nearly so.
 """
+
+import dataclasses
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -16,7 +18,8 @@ centres = np.linspace(-0.012, 0.012, 601)  # of rotation, along the line
 twists = np.stack([centres, np.zeros_like(centres), np.ones_like(centres)], axis=1)  # about (0, y): vx = y omega
 figure, ax = plt.subplots(figsize=(6.0, 3.6), layout="constrained")
 for name, style, surface in (
-    ("sum over 9 cells", "-", pf.LimitSurfaceCells(line)),
+    ("sum over 9 points", "-", pf.LimitSurfaceCells(dataclasses.replace(line, radii=None))),
+    ("sum over 9 discs", "-", pf.LimitSurfaceCells(line)),
     ("exact", "-", pf.LimitSurfaceExact(line)),
     ("table of the exact surface", "k:", pf.LimitSurfaceTable(line)),
 ):

@@ -14,12 +14,9 @@ from planarfriction.cli.commands import Commands
 from planarfriction.cli.doctor import doctor
 from planarfriction.cli.identify_plan import FitOrPlan, complete_log
 from planarfriction.cli.online import online
-from planarfriction.cli.options import FILE, complete_scene, patch_option, width_option
+from planarfriction.cli.options import FILE, cells_option, complete_scene, patch_option, width_option
 from planarfriction.cli.sweep import sweep
 from planarfriction.families import MODELS, SCENES, SURFACES, Family
-
-AUTO_PARTS = "as many as the shape of the patch asks for, 4 to 8"
-
 
 class MemberOf(click.Choice):
     """A choice among the members of a family, those that are registered later too, and a few words more."""
@@ -43,11 +40,6 @@ class MemberOf(click.Choice):
         return [CompletionItem(name, help=help) for name, help in words.items() if name.startswith(incomplete)]
 
 
-def complete_parts(context: object, parameter: object, incomplete: str) -> list[CompletionItem]:
-    """Return completions of `--parts`."""
-    return [CompletionItem("auto", help=AUTO_PARTS)] if "auto".startswith(incomplete) else []
-
-
 @click.group(
     cls=Commands,
     name="planarfriction",
@@ -69,7 +61,7 @@ def app() -> None:
     Examples:
       planarfriction run in-hand --model both --out out/ --plot
       planarfriction run drift --model reduced --patch Square --t-end 2
-      planarfriction run in-hand --model both --parts auto
+      planarfriction run in-hand --model both --cells 64
       planarfriction run in-hand --patch pad.csv --cell-size 0.001 --animate
       planarfriction run scene.toml --rtol 1e-7 --out results/
       planarfriction run scene.toml --set body.mass=0.3 --set fingers.law.mu_c=0.5
@@ -83,12 +75,7 @@ def app() -> None:
     help="Friction model; may be repeated; both: distributed and reduced. Default: both for in-hand, else distributed"
     " or the file's.",
 )
-@click.option(
-    "--parts",
-    metavar="COUNT|auto",
-    shell_complete=complete_parts,
-    help=f"Number of parts of the reduced model; auto: {AUTO_PARTS}. Default: few cells, or the file's.",
-)
+@cells_option
 @patch_option("Default: the scene's (mostly Circle), or the file's.")
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
 @click.option("--t-end", type=float, help="Duration in s. Default: the scene's.")
@@ -201,7 +188,7 @@ def export(file: Path, **options: Any) -> None:
 @click.option("--noise", metavar="FX,FY,TAU", help="Noise of the measured wrench in N and N m. Default: estimated.")
 @click.option("--plain", is_flag=True, help="Use plain LuGre bristles instead of elasto-plastic ones.")
 @click.option("--steady", is_flag=True, help="The logs begin in steady sliding, not at rest.")
-@click.option("--model", default="auto", show_default=True, help="reduced-published, distributed, reduced, or auto.")
+@click.option("--model", default="auto", show_default=True, help="reduced-published, reduced, distributed, or auto.")
 @click.option("--nuisance", metavar="NAMES", help="Rig disturbances: delay,bias,load,twist or none. Default: all.")
 @click.option("--starts", type=int, default=4, show_default=True, help="Number of starting points of the search.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Random seed of the starting points.")

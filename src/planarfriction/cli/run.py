@@ -123,7 +123,7 @@ def scene_makers(
     name: str,
     models: Sequence[str],
     *,
-    parts: str | None = None,
+    cells: int | None = None,
     patch: str | None = None,
     cell_size: float | None = None,
     t_end: float | None = None,
@@ -133,7 +133,7 @@ def scene_makers(
         validation.positive("--t-end", t_end)
     kinds = list(dict.fromkeys(kind for each in models for kind in (BOTH if each == "both" else [each])))
     if Path(name).suffix.lower() in (".toml", ".json"):
-        return _makers_from_file(name, kinds, _parts(parts), patch, cell_size)
+        return _makers_from_file(name, kinds, cells, patch, cell_size)
     validation.choice("scene", name, [*SCENES, "a scene file (.toml, .json)"])
     of_scene = _USUAL.get(name, Usual())
     if patch is None and cell_size is None and of_scene.patch is not None:
@@ -142,11 +142,11 @@ def scene_makers(
         contact_patch = find_patch(patch, cell_size=cell_size, width=of_scene.width)
     law = of_scene.law()
     kinds = kinds or (list(BOTH) if name == "in-hand" else ["distributed"])
-    _check_parts(parts, [MODELS[kind] for kind in kinds])
+    _check_cells(cells, [MODELS[kind] for kind in kinds])
     options: dict[str, Any] = {} if t_end is None else {"t_end": t_end}
     if name == "free-slide":
         options["save_every"] = SLIDE_SAMPLING
-    made = {kind: _make(MODELS[kind], contact_patch, law, _parts(parts)) for kind in kinds}
+    made = {kind: _make(MODELS[kind], contact_patch, law, cells) for kind in kinds}
     return {kind: functools.partial(_ready, SCENES[name], model, options) for kind, model in made.items()}
 
 
@@ -174,33 +174,27 @@ def one_each(settings: Sequence[str]) -> dict[str, Any]:
     return {path: next(iter(values.values())) for path, values in several.items()}
 
 
-def _parts(text: str | None) -> int | str | None:
-    """Parse a count, "auto" or nothing, as a model takes it."""
-    if text is None or text == "auto":
-        return text
-    if not (text.isdecimal() and len(text) < 10):
-        raise InvalidValueError("--parts", "be auto or an integer >= 1", text)
-    return validation.count("--parts", int(text))
+def _has_cells(make: Any) -> bool:
+    """Return True if models of a class stand on a number of cells."""
+    return "cells" in inspect.signature(make).parameters
 
 
-def _in_parts(make: Any) -> bool:
-    """Return True if models of a class have parts."""
-    return "parts" in inspect.signature(make).parameters
+def _check_cells(cells: int | None, makes: Iterable[Any]) -> None:
+    if cells is None:
+        return
+    validation.count("--cells", cells)
+    if not any(map(_has_cells, makes)):
+        kinds = ", ".join(kind for kind, make in MODELS.items() if _has_cells(make))
+        raise InvalidValueError("--cells", f"be given only for a model that has a number of cells ({kinds})", cells)
 
 
-def _check_parts(parts: Any, makes: Iterable[Any]) -> None:
-    if parts is not None and not any(map(_in_parts, makes)):
-        kinds = ", ".join(kind for kind, make in MODELS.items() if _in_parts(make))
-        raise InvalidValueError("--parts", f"be given only for a model that has parts ({kinds})", parts)
-
-
-def _make(make: Any, patch: pf.ContactPatch, law: Any, parts: int | str | None) -> Any:
-    """Make a model of a class, in `parts` where it has some."""
-    return make(patch, law, **({"parts": parts} if parts is not None and _in_parts(make) else {}))
+def _make(make: Any, patch: pf.ContactPatch, law: Any, cells: int | None) -> Any:
+    """Make a model of a class, of so many `cells` if it has a number of them."""
+    return make(patch, law, **({"cells": cells} if cells is not None and _has_cells(make) else {}))
 
 
 def _makers_from_file(
-    path: str, kinds: Sequence[str], parts: int | str | None, patch: str | None, cell_size: float | None
+    path: str, kinds: Sequence[str], cells: int | None, patch: str | None, cell_size: float | None
 ) -> dict[str, Callable[..., pf.Scene]]:
     from planarfriction.sweeps.settings import Settable
 
@@ -208,13 +202,13 @@ def _makers_from_file(
     if patch is None and cell_size is not None:
         raise InvalidValueError("--cell-size", "be given only if --patch is a pressure map", cell_size)
     contact_patch = None if patch is None else find_patch(patch, cell_size=cell_size)
-    if not kinds and contact_patch is None and parts is None:
+    if not kinds and contact_patch is None and cells is None:
         return {"": make}
     if kinds:
-        _check_parts(parts, [MODELS[kind] for kind in kinds])
+        _check_cells(cells, [MODELS[kind] for kind in kinds])
 
     def changed(kind: str) -> Callable[..., pf.Scene]:
-        return lambda **values: _with_models(make(**values), kind, contact_patch, parts)
+        return lambda **values: _with_models(make(**values), kind, contact_patch, cells)
 
     return {kind: changed(kind) for kind in kinds or [""]}
 
@@ -225,23 +219,23 @@ def _label(scene: pf.Scene) -> str:
     return (kinds.pop() if len(kinds) == 1 else None) or "mixed"
 
 
-def _with_models(scene: pf.Scene, kind: str, patch: pf.ContactPatch | None, parts: int | str | None) -> pf.Scene:
+def _with_models(scene: pf.Scene, kind: str, patch: pf.ContactPatch | None, cells: int | None) -> pf.Scene:
     """Return the scene with models of one kind on its own patches or on `patch`, laws as they are.
 
-    The kind is "" for that of the scene, "mixed" for each as it is. In `parts` where they have some.
+    The kind is "" for that of the scene, "mixed" for each as it is; `cells` goes to models that have a number of them.
     """
     if not kind:
         kind = _label(scene)
-        _check_parts(parts, [type(contact.model) for contact in scene.contacts])
+        _check_cells(cells, [type(contact.model) for contact in scene.contacts])
     contacts = []
     for contact in scene.contacts:
         model = contact.model
         if patch is not None or kind not in ("mixed", MODELS.name_of(model)):
             make = type(model) if kind == "mixed" else MODELS[kind]
-            wanted = getattr(model, "parts", None) if parts is None else parts
+            wanted = getattr(model, "cells", None) if cells is None else cells
             model = _make(make, model.patch if patch is None else patch, model.law, wanted)
-        elif parts is not None and _in_parts(type(model)):
-            model = dataclasses.replace(model, parts=parts)
+        elif cells is not None and _has_cells(type(model)):
+            model = dataclasses.replace(model, cells=cells)
         contacts.append(dataclasses.replace(contact, model=model))
     return dataclasses.replace(scene, contacts=tuple(contacts))
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from planarfriction.cli.options import FILE, complete_scene, load_function, patch_option
+from planarfriction.cli.options import FILE, cells_option, complete_scene, load_function, patch_option
 from planarfriction.families import SCENES
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ KINDS = {"m": "length", "m/s": "speed", "rad": "angle", "N": "force", "N m": "to
     help="START:STOP:COUNT, both ends included, or VALUE,VALUE,...; may be repeated.",
 )
 @click.option("--model", metavar="NAME", help="Friction model. Default: the file's, or reduced.")
-@click.option("--parts", metavar="COUNT|auto", help="Number of parts of the reduced model. Default: 1, or the file's.")
+@cells_option
 @patch_option("Default: Circle, or the file's.")
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
 @click.option("--t-end", type=float, help="Duration of a ready scene in s.")

@@ -106,7 +106,7 @@ class CompiledModel:
     def pressed(
         self, load: np.ndarray, centre: np.ndarray | None
     ) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
-        """Yield what `at_each_load` does with pressures about the centres `[..., 2]` [m], and how far patches have moved.
+        """Yield what `at_each_load` does, with pressures about the centres `[..., 2]` [m], and how far patches moved.
 
         Patches move `[rows, 2]` [m] whose pressure keeps its shape; None if none does.
         """
@@ -120,7 +120,7 @@ class CompiledModel:
         raise NotImplementedError
 
     def points(self) -> tuple[np.ndarray, int]:
-        """Return the cells that share the load, `[n, 2]` [m], and the words of their record; or one point that bears it.
+        """Return the cells that share the load, `[n, 2]` [m], and the words of their record, or one point that has all.
 
         The last word is the address of the weights of cells; a point, which has none, moves as a whole. There is no
         point where it would change with the load: such a patch cannot follow moments in `coupling`.

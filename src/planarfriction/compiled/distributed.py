@@ -19,7 +19,7 @@ from planarfriction.kernels import disc_cells, disc_passes, fixed_stiffness
 from planarfriction.kernels import distributed_step as steps
 from planarfriction.kernels.contacts import ModelFunctions
 from planarfriction.kernels.discs import KAPPA
-from planarfriction.kernels.general_cells import MATRICES
+from planarfriction.kernels.general_cells import LINEAR, MATRICES, A, C, E, F
 from planarfriction.kernels.leaning_cells import RATES_OF_LEANING, STEPS_OF_LEANING
 from planarfriction.kernels.steps import StepFunctions
 from planarfriction.patch.tilt import tilted
@@ -57,17 +57,17 @@ class CompiledDistributed(CompiledModel):
             if self.patch.asymmetric:
                 return disc_cells.RATES_OF_LEANING_DISCS, disc_cells.STEPS_OF_LEANING_DISCS
             if turned:
-                return disc_cells.RATES_OF_TURNED_DISCS, disc_passes.TURNED_STEPS
-            return disc_cells.RATES_OF_DISCS, disc_passes.STEPS
+                return disc_passes.TURNED_SOLVED, disc_passes.TURNED_STEPS
+            return disc_passes.SOLVED, disc_passes.STEPS
         if self.patch.asymmetric:
             return RATES_OF_LEANING, STEPS_OF_LEANING
         return (contacts.TURNED, steps.TURNED) if turned else (contacts.ISOTROPIC, steps.ISOTROPIC)
 
     def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         """Return the record of a contact, and how many numbers of a linearisation each cell has."""
-        general = self.size == 3 or self.patch.asymmetric or self.reference > 0.0
-        rows = MATRICES * self.size**2 if general else contacts.LINEAR_ROWS
-        rows += fixed_stiffness.ROWS_BEHIND if self.reference > 0.0 else 0
+        rows = LINEAR * self.size**2 if self.size == 3 or self.patch.asymmetric else contacts.LINEAR_ROWS
+        if self.reference > 0.0:
+            rows = MATRICES * self.size**2 + fixed_stiffness.ROWS_BEHIND
         return contacts.CellsContact(self.law.numbers, numbers.shape[1], numbers, weights), rows
 
     # ------------------------------------------------------------------ at given loads
@@ -103,14 +103,19 @@ class CompiledDistributed(CompiledModel):
 
         Four arrays `[..., d, d, N]` of d bristles a cell; the velocity is that which a cell sees.
         """
-        law, identity, lin = self.law.numbers, np.eye(2)[:, :, None], self.linearisation(state, twist, load)
-        d = self.size
-        if lin.shape[-2] >= MATRICES * d * d:
-            four = lin[..., : 4 * d * d, :].reshape(*load.shape, 4, d, d, -1)
-            return np.moveaxis(four, -4, 0)
-        k, k_z, k_v = lin[..., :1, None, :], lin[..., None, 1:3, :], lin[..., None, 3:5, :]
-        by_state = -k * identity - state[..., :, None, :] * k_z
-        by_velocity = identity - state[..., :, None, :] * k_v
+        law, d, lin = self.law.numbers, self.size, self.linearisation(state, twist, load)
+        if self.reference > 0.0:
+            lin = lin[..., : MATRICES * d * d, :]
+        identity = np.eye(d)[:, :, None]
+        if lin.shape[-2] == contacts.LINEAR_ROWS:
+            k, k_z, k_v = lin[..., :1, None, :], lin[..., None, 1:3, :], lin[..., None, 3:5, :]
+            by_state = -k * identity - state[..., :, None, :] * k_z
+            by_velocity = identity - state[..., :, None, :] * k_v
+        else:
+            matrices = np.moveaxis(lin.reshape(*load.shape, -1, d, d, lin.shape[-1]), -4, 0)
+            by_state, by_velocity = matrices[A], matrices[F]
+            if len(matrices) == MATRICES:
+                return by_state, by_velocity, matrices[C], matrices[E]
         pull_state, pull_velocity = law.sigma_0 * identity + law.sigma_1 * by_state, law.sigma_2 * identity
         return by_state, by_velocity, -pull_state, -(pull_velocity + law.sigma_1 * by_velocity)
 

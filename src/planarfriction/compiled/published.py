@@ -15,8 +15,7 @@ from planarfriction.compiled.packed import PackedModel
 from planarfriction.compiled.rates import linearised
 from planarfriction.compiler.memory import place_of, rows_of
 from planarfriction.kernels import published_contact
-from planarfriction.kernels.moments import LINEAR
-from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, Root
+from planarfriction.kernels.published_contact import LINEAR, PublishedContact, PublishedPatch, Root
 from planarfriction.kernels.published_step import STEPS
 
 _VELOCITY_SCALE = 0.01
@@ -68,7 +67,7 @@ class CompiledPublished(CompiledModel):
             yield rows, self._at(shape), centre[rows] - shape.place
 
     def linearisation(self, shape: Any, state: np.ndarray, twist: np.ndarray) -> np.ndarray:
-        """Return linearisations `[B, L]` at flat states and twists (see `kernels.moments.LinearMoments`)."""
+        """Return linearisations `[B, L]` at flat states and twists (see `kernels.published_contact.LinearPublished`)."""
         return linearised(self._at(shape), state, twist)
 
     def _at(self, shape: Any) -> PackedModel:

@@ -1,7 +1,7 @@
 """Memory shared by Python and compiled code: records, arrays by their addresses, and layouts of scratch memory.
 
 A record is a `NamedTuple` whose fields are numbers (`float`), counts and addresses of functions (`int`), arrays
-(`Doubles`, `Integers`, `Floats`) or records. In memory it is a row of 8-byte words, an array being the address of its
+(`Doubles`, `Integers`) or records. In memory it is a row of 8-byte words, an array being the address of its
 first number; compiled code reads the row as the same `NamedTuple`, whose arrays are then pointers: `own.twist[i]`.
 """
 
@@ -25,16 +25,13 @@ from numba.extending import infer_getattr, intrinsic, models, register_model
 Doubles = Annotated[np.ndarray, types.float64]
 """Field of a record that holds a contiguous array of doubles; in compiled code a pointer."""
 
-Floats = Annotated[np.ndarray, types.float32]
-"""Field of a record that holds a contiguous array of single precision."""
-
 Integers = Annotated[np.ndarray, types.int64]
 """Field of a record that holds a contiguous array of 64-bit integers."""
 
 _WORD = 8
 """Bytes of a word."""
 
-_DTYPES = frozenset(map(np.dtype, (np.float32, np.float64, np.int64)))
+_DTYPES = frozenset(map(np.dtype, (np.float64, np.int64)))
 """Types of the numbers of arrays in records."""
 
 # ---------------------------------------------------------------------- records as rows of words

@@ -16,6 +16,7 @@ from planarfriction.geometry import transformed
 from planarfriction.kernels import cells_rollout, cells_sensitivities, disc_passes, published_step
 from planarfriction.kernels.cell_blocks import divided
 from planarfriction.kernels.law import LAW
+from planarfriction.kernels.published_rollouts import gradient, rollout, sensitivities, tangent
 from planarfriction.kernels.rollouts import Inputs
 from planarfriction.laws.base import is_rate_law, refuse_fixed_stiffness
 from planarfriction.models import DistributedModel, ReducedModelPublished
@@ -62,10 +63,10 @@ class Family(NamedTuple):
 PUBLISHED = Family(
     PARAMETERS,
     np.array([published_step.NAMES.index(name) for name in PARAMETERS]),
-    published_step.rollout,
-    published_step.gradient,
-    published_step.sensitivities,
-    published_step.tangent,
+    rollout,
+    gradient,
+    sensitivities,
+    tangent,
 )
 """`ReducedModelPublished`."""
 
@@ -238,7 +239,7 @@ def pack_cells(elasto_plastic: bool, positions: np.ndarray, weights: np.ndarray)
     """
     levers, shares = np.asarray(positions, dtype=float), np.asarray(weights, dtype=float)[None]
     family = {2: CELLS, 3: DISCS, 5: TURNED_CELLS, 6: TURNED_DISCS}[len(levers)]
-    inner = 3 if family in (DISCS, TURNED_DISCS) else 2, len(weights)
+    inner = 3 if len(levers) in (3, 6) else 2, len(weights)
     if len(levers) > 3:
         levers = np.vstack([levers, np.zeros((2, levers.shape[1]))])  # no asymmetry
     return Packed(family, np.array(_any_law(elasto_plastic)), cells_by_load(levers, shares, None), inner=inner)

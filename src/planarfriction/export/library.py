@@ -142,7 +142,7 @@ def export_c(
         raise InvalidValueError("precision", "be double for CasADi and controllers", precision)
     grip = {} if controller is None else {"grip": grip_of(controller, name)}
     folder, ends = validation.path("folder", folder), FILES | (CASADI if casadi else {}) | (GRIP if grip else {})
-    texts = _texts(model, pieces_of(model, fixed=False), name, precision, grip, tuple(ends))
+    texts = _texts(model, pieces_of(model, precision, fixed=False), name, precision, grip, tuple(ends))
     writing.make_folder(folder)
     files = tuple(folder / f"{name}{end}" for end in ends.values())
     with contextlib.ExitStack() as stack:  # all can be written, or none is

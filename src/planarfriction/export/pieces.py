@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,14 +23,16 @@ from planarfriction.kernels.twins import twin
 from planarfriction.kernels.vectors import norm, times
 from planarfriction.laws.base import is_rate_law, refuse_fixed_stiffness
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
-from planarfriction.models.reduced import loads_of_change
 from planarfriction.patch import ContactPatch
+from planarfriction.patch.shared import loads_of_change
 
 ERROR = 2e-3
 """Largest share of the load that stands on other cells than it should, halfway between two rungs [-]."""
 
 MOST_RUNGS = 512
 
+NARROW = 1e-3
+"""Relative distance of rungs [-] between which nothing is put: a shape that jumps there stays as it is."""
 
 class Ladder(NamedTuple):
     """Shares of the load at some loads, linear in the load between them and constant beyond."""
@@ -40,7 +44,7 @@ class Ladder(NamedTuple):
 
 
 def ladder_of(patch: ContactPatch) -> Ladder:
-    """Return rungs so close that shares between them err by `ERROR` at most.
+    """Return rungs so close that shares between them err by `ERROR` at most, or `NARROW` ones where shares jump.
 
     Raises InvalidValueError if more than `MOST_RUNGS` are needed.
     """
@@ -48,9 +52,10 @@ def ladder_of(patch: ContactPatch) -> Ladder:
     while True:
         shares, between = patch.weights(rungs), 0.5 * (rungs[1:] + rungs[:-1])
         off = 0.5 * np.abs(patch.weights(between) - 0.5 * (shares[1:] + shares[:-1])).sum(axis=1)
-        if not (off > ERROR).any():
+        coarse = (off > ERROR) & (np.diff(rungs) > NARROW * between)
+        if not coarse.any():
             return Ladder(rungs, shares)
-        rungs = np.union1d(rungs, between[off > ERROR])
+        rungs = np.union1d(rungs, between[coarse])
         if len(rungs) > MOST_RUNGS:
             rule = f"have a patch whose shape {MOST_RUNGS} loads describe within {ERROR:g}"
             raise InvalidValueError("model", rule, patch.name or "a patch")
@@ -80,8 +85,11 @@ class Pieces(NamedTuple):
     """Number of loads, the table `rungs`, that `share` [rungs, count] is for; 0 for a fixed shape."""
 
 
-def pieces_of(model: Any, *, fixed: bool = True) -> Pieces:
-    """Take a model apart; only one of a `fixed` shape, or also cells whose pressure follows the load.
+def pieces_of(model: Any, precision: str = "double", *, fixed: bool = True, count: int = 0) -> Pieces:
+    """Take a model apart for a `precision` of `library.PRECISIONS`.
+
+    Only one of a `fixed` shape, or also cells whose pressure follows the load. If it has fewer cells than `count`,
+    others without load follow.
 
     Raises InvalidValueError for models without straight-line source: laws of the user's own, other patches whose shape
     depends on the load, friction that differs from cell to cell in other ways than by a metric.
@@ -93,7 +101,7 @@ def pieces_of(model: Any, *, fixed: bool = True) -> Pieces:
             if whole.patch.depends_on_load and (fixed or kind is not DistributedModel):
                 rule = "have a patch whose shape does not depend on the load" + ("" if fixed else ", or cells")
                 raise InvalidValueError("model", rule, model.patch.name or "a patch that does")
-            return taken_apart(whole)
+            return taken_apart(whole, precision, count)
     names = ", ".join(kind.__name__ for kind in (*_KINDS, ReducedModel))
     given = f"{type(model).__name__}, {type(law).__name__}"
     raise InvalidValueError("model", f"be one of {names} with a law of LuGre bristles", given)
@@ -128,11 +136,37 @@ _TWIST = "v[0]", "v[1]", "v[2]"
 # ---------------------------------------------------------------------- kinds of models
 
 
-def _distributed(model: DistributedModel) -> Pieces:
+def _sliding(u: Any) -> Any:
+    """Return what `discs.sliding` does, of a point."""
+    return 1.0, 1.0, norm(u), u
+
+
+def _sliding_of_disc(u: Any) -> Any:
+    """Return what `discs.sliding` does, from the direction of u: fourth powers of speeds leave single precision."""
+    spin = math.sqrt(2.0) * u[2]
+    size = norm((u[0], u[1], spin))
+    turned = ratio(spin, size)
+    turned = turned * turned
+    c_t, c_s, m = formulas.disc_friction_above(1.0 - turned, turned, 0.0)
+    return c_t, c_s, size * math.sqrt(1.0 - turned + m * turned), (c_t * u[0], c_t * u[1], c_s * u[2])
+
+
+def _with(function: Any, **others: Any) -> Any:
+    """Return a function that calls others in place of those of its module."""
+    own = function.py_func
+    return FunctionType(own.__code__, own.__globals__ | others, own.__name__)
+
+
+def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     if model.patch.asymmetry is not None:
         raise InvalidValueError("model", "have no asymmetry", model.patch.asymmetry)
-    numbers, n, law, size = model.compiled.numbers(), model.patch.cells, model.law.numbers, model.compiled.size
-    kind, cell = (disc_cells, discs.step) if size == 3 else (cells, distributed_step.cell)
+    numbers, law, size = model.compiled.numbers(), model.law.numbers, model.compiled.size
+    more = max(count - model.patch.cells, 0)
+    n = model.patch.cells + more
+    kind, cell, sliding = cells, distributed_step.cell, _sliding
+    if size == 3:
+        kind, sliding = disc_cells, discs.sliding if precision == "double" else _sliding_of_disc
+        cell = _with(discs.step, sliding=sliding)
     lever = twin(kind.LEVERS if model.patch.anisotropic else kind.POSITIONS)
     names = (
         ["lever_xx", "lever_xy", "lever_yy", "lever_x", "lever_y"]
@@ -149,7 +183,7 @@ def _distributed(model: DistributedModel) -> Pieces:
     def steady(trace: Trace) -> Any:
         own, given = _vector(trace, *(f"{name}[k]" for name in names)), _law(trace, law)
         u = lever.seen(own, _vector(trace, *_TWIST))
-        speed, pull = twin(discs.sliding)(u)[2:] if size == 3 else (twin(norm)(u), u)
+        speed, pull = twin(sliding)(u)[2:]
         z = twin(times)(twin(ratio)(1.0, speed * twin(grip)(given, speed)), pull)
         return lever.wrench(own, twin(cell)(given, z, u, 0.0)[1])
 
@@ -165,22 +199,22 @@ def _distributed(model: DistributedModel) -> Pieces:
         rows = tuple((by_z, lever.wrench(own, by_u), *(by_law[i] for i in kept)) for by_z, by_u, *by_law in bars)
         return new, lever.wrench(own, traction), rows
 
-    tables, rungs = dict(zip(names, numbers, strict=False)), 0
+    tables, rungs = dict(zip(names, np.pad(numbers, [(0, 0), (0, more)], mode="edge"), strict=False)), 0
     if model.patch.depends_on_load:
         ladder = ladder_of(model.patch)
         tables |= {"share": ladder.shares, "rungs": ladder.rungs}
         rungs = len(ladder.rungs)
     else:
-        tables["share"] = model.patch.weights()
+        tables["share"] = np.pad(model.patch.weights(), (0, more))
     return Pieces(n, size, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes), rungs)
 
 
-def _published(model: ReducedModelPublished) -> Pieces:
+def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
     """Trace `moment_steps` of the record of the contact."""
-    (part,), law = next(iter(model.compiled.shapes.at([None]))), model.law.numbers
-    surface, root, shape = part.shape.surface.numbers, part.shape.root, PublishedPatch(*part.shape.numbers)
+    found, law = model.compiled.shapes.shape_at(None), model.law.numbers
+    surface, root, shape = found.surface.numbers, found.root, PublishedPatch(*found.numbers)
     if surface.kind == CELLS:
-        raise InvalidValueError("surface", "be an ellipsoid or a table", type(part.shape.surface).__name__)
+        raise InvalidValueError("surface", "be an ellipsoid or a table", type(found.surface).__name__)
     root = Root(float(root[0, 0]), float(root[0, 1]), float(root[1, 1]))
     steps = published_step
     frame, hold, taped_step = (twin(each) for each in (steps._FRAME, steps.MODEL.hold, steps.MODEL.taped_step))

@@ -22,8 +22,8 @@ turn are slower, and less than that is noise."""
 LEAST, MOST = 20, 120
 """Least number of sliding samples that a check needs, and most that it takes, evenly chosen."""
 
-MOST_CELLS = 500
-"""Number of cells of a patch above which a check uses a compressed one."""
+MOST_CELLS = 100
+"""Number of cells of a patch above which a check uses so many discs."""
 
 AGAINST = 0.7
 """Largest share of the work with which friction may drive the motion: bristles give some work back."""
@@ -127,8 +127,8 @@ class Sliding:
     """Wrenches [N, N, N m], `[S, 3]`."""
     turned: np.ndarray
     """Angle since the begin of the log [rad], `[S]`."""
-    cells: np.ndarray
-    """Positions of the cells [m], `[N, 2]`."""
+    levers: np.ndarray
+    """Velocities of the cells per twist, `[N, 2 or 3, 3]` (see `ContactPatch.levers`)."""
     weights: np.ndarray
     """Shares of the load [-], `[N]`."""
     channels: np.ndarray
@@ -137,8 +137,7 @@ class Sliding:
     @classmethod
     def of(cls, log: Log, patch: ContactPatch) -> Sliding:
         """Select the fast samples under load, at most `MOST` of them."""
-        many = patch.cells > MOST_CELLS and not patch.depends_on_load and not patch.anisotropic
-        few = patch.compressed() if many else patch
+        few = patch.discs(MOST_CELLS) if patch.cells > MOST_CELLS else patch
         weights = few.weights(_load(log)) if few.depends_on_load else few.weights()
         size = size_of(log, patch)
         speed, force = (np.linalg.norm(each, axis=1) for each in (log.twist * [1, 1, size], log.wrench / [1, 1, size]))
@@ -148,7 +147,7 @@ class Sliding:
         since = log.twist[1:, 2] if log.held else log.twist[:-1, 2]
         steps = 0.5 * (log.twist[1:, 2] + since) * np.diff(log.time)
         turned = np.concatenate([[0.0], np.cumsum(steps)])
-        return cls(log.twist[rows], log.wrench[rows], turned[rows], few.positions, weights, log.channels)
+        return cls(log.twist[rows], log.wrench[rows], turned[rows], few.levers(), weights, log.channels)
 
     @property
     def power(self) -> np.ndarray:
@@ -157,15 +156,15 @@ class Sliding:
 
     def friction(self, twist: np.ndarray, scale: float) -> np.ndarray:
         """Compute wrenches `[S, 3]` of dry friction under a load of 1 at the twists, on the patch times `scale`."""
-        x, y = scale * self.cells.T
-        vx, vy = twist[:, :1] - twist[:, 2:] * y, twist[:, 1:2] + twist[:, 2:] * x
-        speed = np.hypot(vx, vy)
-        weights = -self.weights / np.where(speed > 0.0, speed, 1.0)
-        return np.stack([(weights * each).sum(axis=1) for each in (vx, vy, x * vy - y * vx)], -1)
+        levers = self.levers * [1.0, 1.0, scale]
+        velocities = twist @ levers.transpose(1, 2, 0)
+        speed = np.linalg.norm(velocities, axis=0)
+        tractions = velocities * (-self.weights / np.where(speed > 0.0, speed, 1.0))
+        return np.einsum("isn,nij->sj", tractions, levers, optimize=True)
 
     def angle(self, twist: np.ndarray, wrench: np.ndarray, scale: float) -> float:
         """Compute the median angle [deg] between wrenches and those of dry friction."""
-        size = float(np.sqrt((self.weights * (self.cells**2).sum(axis=1)).sum()))
+        size = float(np.sqrt(np.einsum("n,ni->", self.weights, self.levers[:, :, 2] ** 2)))
         a, b = ((each / [1.0, 1.0, size])[:, self.channels] for each in (self.friction(twist, scale), wrench))
         lengths = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
         cosines = np.einsum("si,si->s", a, b) / np.where(lengths > 0.0, lengths, 1.0)

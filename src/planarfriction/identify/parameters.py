@@ -189,9 +189,10 @@ def scaled_patch(patch: ContactPatch, scale: float, centre: Any = None) -> Conta
         size = {"cell_width": scale * grid.cell_width, "cell_height": scale * grid.cell_height}
         grid = dataclasses.replace(grid, x_min=float(x), y_min=float(y), **size)
     positions = new + scale * (patch.positions - old)
-    shares = patch.point_shares
-    pressure = patch.weights() / patch.areas if shares is None else None
-    return ContactPatch(positions, scale**2 * patch.areas, pressure, grid, patch.name, point_shares=shares)
+    pressure = patch.weights() / patch.areas if patch.point_shares is None else None
+    sizes = {"cell_size": None if patch.cell_size is None else tuple(scale * each for each in patch.cell_size)}
+    sizes |= {"areas": scale**2 * patch.areas, "radii": scale * patch.radii, "grid": grid}
+    return dataclasses.replace(patch, positions=positions, pressure=pressure, **sizes)
 
 
 class VectorMap:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -139,7 +140,7 @@ class LogProblem(Problem):
         self.fixed_patch = patch
         if patch.depends_on_load:
             density = patch.weights(self.reference_load) / patch.areas
-            self.fixed_patch = ContactPatch(patch.positions, patch.areas, density, patch.grid, patch.name)
+            self.fixed_patch = dataclasses.replace(patch, pressure=density)
         self.maps = self._maps(loads)
         self.rig = Rig(logs, options.nuisance)
         self.twists = [smoothed(log) if "twist" in options.nuisance else as_measured(log) for log in logs]

@@ -66,7 +66,7 @@ def identify_lugre(
         Names of what to estimate: fields of `LuGre`, `breakaway_ratio`, `contact_radius`, `centre_x`, `centre_y`, and
         `c`, `n`, `k` or `k_per_newton` of a `SoftFinger`. All others keep the values of `start`.
     model
-        "reduced-published", "distributed", "reduced", or "auto": the one of them that predicts held-out parts best;
+        "reduced-published", "reduced", "distributed", or "auto": the one of them that predicts held-out parts best;
         models whose fit would take minutes are left out.
     start
         Initial guess, and the values of parameters that are not estimated: a law, or values by name. Missing values are
@@ -253,7 +253,7 @@ def _fitted_model(problem: LogProblem, values: np.ndarray, law: LuGre) -> Any:
     finger = {name: given[name] for name in known.SOFT_FINGER if name in given}
     if finger:
         pressure = dataclasses.replace(problem.patch.pressure, **finger)
-        fitted = ContactPatch(problem.patch.positions, problem.patch.areas, pressure, problem.patch.grid, patch.name)
+        fitted = dataclasses.replace(problem.patch, pressure=pressure)
         return ReducedModelPublished(fitted, law, surface=surface(fitted, normal_force=problem.reference_load))
     if any(name in known.SHAPE for name in given):
         centre, vector = patch.centre_of_pressure(), problem.maps[0].base

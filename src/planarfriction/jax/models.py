@@ -56,6 +56,11 @@ class DistributedModel(FrictionPytree):
         """Shape of the state of one contact, `(2, N)` of points, `(3, N)` of discs."""
         return distributed.KINDS[len(self.positions)].bristles, self.positions.shape[1]
 
+    @property
+    def obstacle(self) -> str:
+        """Reason why compiled rollouts do not take the model, or an empty text."""
+        return distributed.obstacle(self.positions)
+
     def compiled(self) -> Packed:
         """Return the model as compiled rollouts take it."""
         return pack_cells(self.elasto_plastic, self.positions, self.weights)  # pyright: ignore[reportArgumentType]
@@ -134,5 +139,7 @@ class ReducedModel(DistributedModel):
         cells: int = Reference.cells,
         **options: Any,
     ) -> None:
-        self.refuse(patch, law, "jax.ReducedModel", options)
-        super().__init__(Reference(patch, law, cells=cells).reduction.patch, law, normal_force, **options)
+        self.refuse(patch, law, "jax.ReducedModel")
+        replaced = {name: options.pop(name) for name in Reference.REPLACED if name in options}
+        discs = Reference(patch, law, cells=cells, **replaced).reduction.patch
+        super().__init__(discs, law, normal_force, **options)

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from planarfriction.derivatives import Rollout
+from planarfriction.errors import InvalidValueError
 from planarfriction.jax import adjoint
 from planarfriction.jax.adjoint import HostScene
 from planarfriction.jax.base import FrictionPytree
@@ -71,7 +72,9 @@ def rollout(
     shape = jnp.broadcast_shapes(twist.shape[:-1], load.shape, (*state.shape[: state.ndim - len(inner)], 1))
     state = jnp.broadcast_to(state, (*shape[:-1], *inner))
     twist, load = jnp.broadcast_to(twist, (*shape, 3)), jnp.broadcast_to(load.astype(twist.dtype), shape)
-    if method == "adjoint" or (method is None and jax.default_backend() == "cpu"):
+    if method == "adjoint" and model.obstacle:
+        raise InvalidValueError("method", f"be 'eager' {model.obstacle}", repr(method))
+    if method == "adjoint" or (method is None and not model.obstacle and jax.default_backend() == "cpu"):
         return Rollout(*adjoint.rollout(model, state, twist, load, dt, strict=method == "adjoint"))
     return Rollout(*model.rollout(state, twist, load, dt))
 

@@ -43,7 +43,7 @@ COLUMNS = tuple(LawNumbers._fields.index(name) for name in PARAMETERS)
 """Their places in a row."""
 
 BY = ("z", "u", *(f"law.{name}" for name in PARAMETERS))
-"""What steps of cells are differentiated by."""
+"""Arguments by which steps of cells are differentiated."""
 
 
 def pushed_of(step: Any) -> Any:

@@ -115,7 +115,8 @@ def layout(patches: int, states: int, points: int, copies: int) -> Layout:
     k, n = patches, 3 * patches
     shapes = dict.fromkeys(Problem._fields, n)
     shapes |= dict.fromkeys(("dt", "tolerance", "most", "again", "iterations", "residual", "converged"), 1)
-    shapes |= dict.fromkeys(("free_load", "load", "load_0", "best_load", "kept_load", "follows", "records", "acting"), k)
+    shapes |= dict.fromkeys(("free_load", "load", "load_0", "best_load", "kept_load"), k)
+    shapes |= dict.fromkeys(("follows", "records", "acting"), k)
     shapes |= dict.fromkeys(("moments", "moved"), 2 * k) | {"weights": points, "copies": copies, "support": 7 * patches}
     shapes |= dict.fromkeys(("state", "new"), states)
     shapes |= dict.fromkeys(("unit_slopes", "slopes"), 9 * k) | dict.fromkeys(("response", "matrix"), n * n)

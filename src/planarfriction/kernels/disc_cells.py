@@ -117,13 +117,11 @@ def step_leaning(lean, z, u, dt):
 
 # ---------------------------------------------------------------------- bound to the levers
 
-BRISTLE = bristle(discs.evaluate, discs.step, 3)
+BRISTLE = bristle(discs.evaluate, discs.step, 3, linear=True)
 _LEANING = {
     "lever": LEVERS._replace(law=_leaning_law),
-    "bristle": bristle(evaluate_leaning, step_leaning, 3),
+    "bristle": bristle(evaluate_leaning, step_leaning, 3, linear=True),
     "read": cells.read,
 }
-RATES_OF_DISCS = functions_of("discs", RATES, lever=POSITIONS, bristle=BRISTLE, read=cells.read)
-RATES_OF_TURNED_DISCS = functions_of("turned_discs", RATES, lever=LEVERS, bristle=BRISTLE, read=cells.read)
 RATES_OF_LEANING_DISCS = functions_of("leaning_discs", RATES, **_LEANING)
 STEPS_OF_LEANING_DISCS = step_functions("leaning_discs", STEPS, **_LEANING)

@@ -11,19 +11,26 @@ from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import at
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import cells, cells_rollout, cells_sensitivities, disc_cells, discs, distributed_step
-from planarfriction.kernels.cell_blocks import BAR, BLOCK, BY_LOAD, LANES, WEIGHT, Z, Kind, room
+from planarfriction.kernels.cell_blocks import BAR, BLOCK, BY_LOAD, LANES, WEIGHT, Z, Kind, divided, room
 from planarfriction.kernels.cell_slopes import StepBars
 from planarfriction.kernels.cells import Lever
 from planarfriction.kernels.cells_rollout import BY, bound
+from planarfriction.kernels.contacts import ModelFunctions, functions_of
 from planarfriction.kernels.derive import derive
+from planarfriction.kernels.general_cells import RATES
 from planarfriction.kernels.passes import Passes, passes
 from planarfriction.kernels.steps import StepFunctions, step_functions
 from planarfriction.kernels.trace import Number, Trace, traced
 from planarfriction.kernels.twins import twin
-from planarfriction.kernels.vectors import plus, reader_of
+from planarfriction.kernels.vectors import plus, put, reader_of, three
 
 FORWARD, BACKWARD = {"count": 8, "short": 2}, {"count": 6, "short": 6}
-"""Division into passes that is fastest for a few dozen discs (see `passes`)."""
+RATE, SLOPES = {"count": 5, "short": 0}, {"count": 4, "short": 2}
+"""Division into passes that is fastest for a few dozen discs (see `passes`): of a step, its adjoint, a rate, its
+derivatives."""
+
+RATES_AT, SLOPES_AT = LANES * 11, LANES * 14
+"""Fields of a block of the solver behind its weights: rates [3], and derivatives by state and velocity [2, 3, 3]."""
 
 
 class _Symbols(NamedTuple):
@@ -90,6 +97,33 @@ def backward_passes(lever: Lever, numbers: int) -> Passes:
     return passes("discs_back", traced(adjoint), sources, list(bar.values()), **BACKWARD)
 
 
+def rate_passes(lever: Lever, numbers: int) -> Passes:
+    """Write the rates of discs, and their wrench."""
+
+    def rate(trace: Trace) -> Any:
+        s = _symbols(trace, numbers)
+        zdot, traction = twin(discs.evaluate)(s.law, s.z, twin(lever.seen)(s.cell, s.v))
+        return zdot, twin(lever.wrench)(s.cell, tuple(s.weight * each for each in traction))
+
+    stores = [f"block[{RATES_AT + m * LANES} + i]" for m in range(3)]
+    return passes("rates of discs", traced(rate), _sources(numbers), stores, **RATE)
+
+
+def slope_passes(lever: Lever, numbers: int) -> Passes:
+    """Write the derivatives of the rates of discs, by state and velocity."""
+    written = derive(discs.evaluate, ("z", "u"), ("z", "u"))
+
+    def slopes(trace: Trace) -> Any:
+        s = _symbols(trace, numbers)
+        _, tape = twin(written.forth)(s.law, s.z, twin(lever.seen)(s.cell, s.v))
+        units, none = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, 0.0)
+        rows = [twin(written.back)(tape, (unit, none)) for unit in units]
+        return tuple(by_z for by_z, _ in rows), tuple(by_u for _, by_u in rows)
+
+    stores = [f"block[{SLOPES_AT + m * LANES} + i]" for m in range(18)]
+    return passes("slopes of discs", traced(slopes), _sources(numbers), stores, **SLOPES)
+
+
 def kind_of(lever: Lever, numbers: int) -> Kind:
     """Return the functions of discs with a lever of so many numbers."""
     forth, back = forward_passes(lever, numbers), backward_passes(lever, numbers)
@@ -112,6 +146,56 @@ def kind_of(lever: Lever, numbers: int) -> Kind:
 
 
 DISCS, TURNED_DISCS = kind_of(disc_cells.POSITIONS, 3), kind_of(disc_cells.LEVERS, 6)
+
+
+def _run(written: Passes) -> Any:
+    """Return `(law, v, block, lanes)`, which runs passes in memory of their own."""
+    run, numbers = written.run, LANES * written.rows
+
+    @kernel
+    def passed(law, v, block, lanes):
+        return run(law, v, (0.0,), block, room(numbers), lanes)
+
+    return passed
+
+
+def evaluate(lever, rate, contact, z, v, zdot, w):
+    """Write `z'`, and `W`."""
+    own, twist, total, block = cells.read(contact), three(v), (0.0, 0.0, 0.0), room(SOLVER_BLOCK)
+    n, (_, lanes) = own.count, divided(own.count)
+    for first in range(0, n, lanes):
+        count = min(lanes, n - first)
+        distributed_step.fill(lever, 3, own, z, first, count, lanes, block)
+        total = plus(total, 1.0, rate(own.law, twist, block, lanes))
+        for m in range(3):
+            distributed_step.copy(count, at(block, RATES_AT + m * LANES), at(zdot, m * n + first))
+    put(w, total)
+
+
+def linearise(lever, slope, contact, z, v, lin):
+    """Write A and F of each cell (see `general_cells`)."""
+    own, twist, block = cells.read(contact), three(v), room(SOLVER_BLOCK)
+    n, (_, lanes) = own.count, divided(own.count)
+    for first in range(0, n, lanes):
+        count = min(lanes, n - first)
+        distributed_step.fill(lever, 3, own, z, first, count, lanes, block)
+        slope(own.law, twist, block, lanes)
+        for m in range(18):
+            distributed_step.copy(count, at(block, SLOPES_AT + m * LANES), at(lin, m * n + first))
+
+
+SOLVER_BLOCK = SLOPES_AT + LANES * 18
+"""Numbers of a block of the solver."""
+
+
+def _rates(lever: Lever, numbers: int, name: str) -> ModelFunctions:
+    """Return the functions of discs for the solver: rates and slopes in passes, the rest disc by disc."""
+    model = {"lever": lever, "bristle": disc_cells.BRISTLE, "read": cells.read}
+    vector = {"rate": _run(rate_passes(lever, numbers)), "slope": _run(slope_passes(lever, numbers))}
+    return functions_of(name, (evaluate, linearise, *RATES[2:]), **model, **vector)
+
+
+SOLVED, TURNED_SOLVED = _rates(disc_cells.POSITIONS, 3, "discs"), _rates(disc_cells.LEVERS, 6, "turned_discs")
 
 
 def _steps(kind: Kind, name: str) -> StepFunctions:

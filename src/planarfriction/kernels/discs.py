@@ -27,6 +27,9 @@ from planarfriction.kernels.vectors import norm
 KAPPA = math.sqrt(0.5)
 """Radius of gyration of a disc, over its radius."""
 
+STILL = 1e-100
+"""Speed [m/s] up to which the ratio of two speeds counts as that at rest: its slopes leave the range of numbers."""
+
 
 @kernel
 def sliding(u):
@@ -47,7 +50,8 @@ def mean_speed(u):
 def _per_h(speed, pull):
     """Return `S/|W|`; 1 at rest, which is about its value near it."""
     size = norm(pull)
-    return xp.where(size > 0.0, speed, 1.0) / xp.where(size > 0.0, size, 1.0)
+    moves = size > STILL
+    return xp.where(moves, speed, 1.0) / xp.where(moves, size, 1.0)
 
 
 @kernel

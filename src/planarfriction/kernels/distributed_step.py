@@ -33,13 +33,14 @@ def cell(law, z, u, dt):
 
 
 @kernel
-def _copy(count, of, to):
+def copy(count, of, to):
+    """Copy numbers."""
     for i in range(count):
         to[i] = of[i]
 
 
 @kernel
-def _fill(lever, size, own, z, first, count, lanes, block):
+def fill(lever, size, own, z, first, count, lanes, block):
     """Copy cells into a block, and fill its lanes up with cells without load at the origin."""
     n, numbers = own.count, len(lever.of(own, first))
     for i in range(count, lanes):
@@ -49,16 +50,16 @@ def _fill(lever, size, own, z, first, count, lanes, block):
             block[Z + m * LANES + i] = 0.0
         block[WEIGHT + i] = 0.0
     for m in range(size):
-        _copy(count, at(z, m * n + first), at(block, Z + m * LANES))
-    _copy(count, at(own.weights, first), at(block, WEIGHT))
+        copy(count, at(z, m * n + first), at(block, Z + m * LANES))
+    copy(count, at(own.weights, first), at(block, WEIGHT))
     for m in range(numbers):
-        _copy(count, at(own.cells, m * n + first), at(block, m * LANES))
+        copy(count, at(own.cells, m * n + first), at(block, m * LANES))
 
 
 @kernel
 def _empty(size, block, first, count, n, new):
     for m in range(size):
-        _copy(count, at(block, Z + m * LANES), at(new, m * n + first))
+        copy(count, at(block, Z + m * LANES), at(new, m * n + first))
 
 
 @kernel
@@ -67,7 +68,7 @@ def _step(lever, advance, size, law, own, z, twist, dt, new, out):
     _, lanes = divided(n)
     for first in range(0, n, lanes):
         count = min(lanes, n - first)
-        _fill(lever, size, own, z, first, count, lanes, block)
+        fill(lever, size, own, z, first, count, lanes, block)
         all_of = plus(all_of, 1.0, advance(lever, law, block, 1, lanes, twist, dt))
         _empty(size, block, first, count, n, new)
     put(out, all_of)

@@ -58,8 +58,9 @@ def linearise(lever, bristle, read, contact, z, v, lin):
     for i in range(n):
         bent, u = times(factor, bristle.vector(z, i, n)), lever.seen(lever.of(own, i), twist)
         found = bristle.linearise(lever.law(own, i), bent, u)
-        by_z = times(factor, found.new_z), found.new_u, times(factor, found.traction_z), found.traction_u
-        scatter(lin, i, n, by_z)
+        place = C * bristle.size * bristle.size * n + i
+        scatter(lin, i, n, (times(factor, found.new_z), found.new_u))
+        scatter(lin, place, n, (times(factor, found.traction_z), found.traction_u))
     lin[MATRICES * bristle.size * bristle.size * n] = factor
 
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import arrays_at, at
-from planarfriction.kernels.contacts import ROWS
+from planarfriction.kernels.contacts import ROWS, traction
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.steps import SLOPES
 from planarfriction.kernels.vectors import (
@@ -29,9 +29,12 @@ from planarfriction.kernels.vectors import (
 )
 
 MATRICES = 5
-"""Matrices [d, d] of a cell in a linearisation: A, F, C, E and the inverse of D; number by number, [5 d d, n]."""
+"""Matrices [d, d] of a cell in a linearisation: A, F, the inverse of D, C and E; number by number, [5 d d, n]."""
 
-A, F, C, E, INVERSE = range(MATRICES)
+LINEAR = 3
+"""Matrices of a cell whose bristle is `Bristle.linear`: the first of these."""
+
+A, F, INVERSE, C, E = range(MATRICES)
 
 
 class CellSlopes(NamedTuple):
@@ -63,16 +66,20 @@ class Bristle(NamedTuple):
     """`(row, first, stride)`: return d numbers."""
     matrix: Any
     """`(row, first, stride)`: return d^2 numbers."""
+    add_diagonal: Any
+    """`(a, x)`: return `A + x I`."""
     inverse: Any
     """`(shift, a)`: return the inverse of `shift I - A`."""
+    linear: bool
+    """True if the traction is `-(sigma_0 z + sigma_1 z' + sigma_2 u)`: C and E then follow from A and F."""
 
 
-def bristle(evaluate: Any, step: Any, size: int = 2) -> Bristle:
+def bristle(evaluate: Any, step: Any, size: int = 2, linear: bool = False) -> Bristle:
     """Return the functions of a bristle, with the derivatives that `derive` writes."""
     linearise = slopes_of(evaluate, size) if evaluate else None  # not needed for steps alone, nor steps for rates
     readers = reader_of(size), reader_of(size * size)
     of_step = slopes_of(step, size) if step else None
-    return Bristle(evaluate, step, linearise, of_step, size, *readers, _INVERSES[size])
+    return Bristle(evaluate, step, linearise, of_step, size, *readers, *_ALGEBRA[size], linear)
 
 
 def slopes_of(function: Any, size: int) -> Any:
@@ -129,7 +136,17 @@ def _inverse_3(shift, m):
     return times(1.0 / (a * r + b * p + c * w), cofactors)
 
 
-_INVERSES = {2: _inverse_2, 3: _inverse_3}
+@kernel
+def _add_diagonal_2(a, x):
+    return a[0] + x, a[1], a[2], a[3] + x
+
+
+@kernel
+def _add_diagonal_3(a, x):
+    return a[0] + x, a[1], a[2], a[3], a[4] + x, a[5], a[6], a[7], a[8] + x
+
+
+_ALGEBRA = {2: (_add_diagonal_2, _inverse_2), 3: (_add_diagonal_3, _inverse_3)}
 
 
 @kernel
@@ -157,7 +174,10 @@ def linearise(lever, bristle, read, contact, z, v, lin):
     for i in range(n):
         u = lever.seen(lever.of(own, i), twist)
         found = bristle.linearise(lever.law(own, i), bristle.vector(z, i, n), u)
-        scatter(lin, i, n, (found.new_z, found.new_u, found.traction_z, found.traction_u))
+        scatter(lin, i, n, (found.new_z, found.new_u))
+        if not bristle.linear:
+            place = C * bristle.size * bristle.size * n + i
+            scatter(lin, place, n, (found.traction_z, found.traction_u))
 
 
 def factor(lever, bristle, read, contact, z, shift, lin, stiffness):
@@ -168,7 +188,10 @@ def factor(lever, bristle, read, contact, z, shift, lin, stiffness):
         inverse = bristle.inverse(shift, _matrix(bristle, lin, A, i, n))
         scatter(lin, INVERSE * bristle.size * bristle.size * n + i, n, inverse)
         driven = matrix_product(inverse, _matrix(bristle, lin, F, i, n))
-        p = plus(matrix_product(_matrix(bristle, lin, C, i, n), driven), 1.0, _matrix(bristle, lin, E, i, n))
+        if bristle.linear:
+            p = bristle.add_diagonal(times(-own.law.sigma_0 - own.law.sigma_1 * shift, driven), -own.law.sigma_2)
+        else:
+            p = plus(matrix_product(_matrix(bristle, lin, C, i, n), driven), 1.0, _matrix(bristle, lin, E, i, n))
         total = plus(total, own.weights[i], lever.around(lever.of(own, i), p))
     put_all(stiffness, total)
 
@@ -178,8 +201,12 @@ def eliminate(lever, bristle, read, contact, z, shift, r, lin, w):
     own, total = read(contact), (0.0, 0.0, 0.0)
     n = own.count
     for i in range(n):
-        moved = matrix_applied(_matrix(bristle, lin, INVERSE, i, n), bristle.vector(r, i, n))
-        t = matrix_applied(_matrix(bristle, lin, C, i, n), moved)
+        residual = bristle.vector(r, i, n)
+        moved = matrix_applied(_matrix(bristle, lin, INVERSE, i, n), residual)
+        if bristle.linear:
+            t = plus(times(own.law.sigma_1, residual), -own.law.sigma_0 - own.law.sigma_1 * shift, moved)
+        else:
+            t = matrix_applied(_matrix(bristle, lin, C, i, n), moved)
         total = plus(total, own.weights[i], lever.wrench(lever.of(own, i), t))
     put(w, total)
 
@@ -202,9 +229,13 @@ def change(lever, bristle, read, contact, z, zdot, lin, dz, dzdot, rows, frictio
         cell, b = lever.of(own, i), bristle.vector(z, i, n)
         u, a = lever.seen(cell, twist), plus(bristle.vector(dz, i, n), -friction, b)
         rate = matrix_applied(_matrix(bristle, lin, A, i, n), a)
-        scatter(dzdot, i, n, plus(rate, 1.0, matrix_applied(_matrix(bristle, lin, F, i, n), u)))
-        t = matrix_applied(_matrix(bristle, lin, C, i, n), a)
-        t = plus(t, 1.0, matrix_applied(_matrix(bristle, lin, E, i, n), u))
+        rate = plus(rate, 1.0, matrix_applied(_matrix(bristle, lin, F, i, n), u))
+        scatter(dzdot, i, n, rate)
+        if bristle.linear:
+            t = traction(own.law, a, rate, u)
+        else:
+            t = matrix_applied(_matrix(bristle, lin, C, i, n), a)
+            t = plus(t, 1.0, matrix_applied(_matrix(bristle, lin, E, i, n), u))
         total = plus(total, own.weights[i], lever.wrench(cell, plus(t, -friction * own.law.sigma_0, b)))
     put(rows.d_wrench, plus(total, size * rows.wrench[2], (0.0, 0.0, 1.0)))
 
@@ -223,10 +254,14 @@ def pull_back(lever, bristle, read, contact, z, lin, dzdot, rows, out):
     for i in range(n):
         cell, rate = lever.of(own, i), bristle.vector(dzdot, i, n)
         t = times(own.weights[i], lever.seen(cell, wrench))
-        by_z = matrix_applied_back(_matrix(bristle, lin, A, i, n), rate)
-        scatter(out, i, n, plus(by_z, 1.0, matrix_applied_back(_matrix(bristle, lin, C, i, n), t)))
-        by_u = matrix_applied_back(_matrix(bristle, lin, F, i, n), rate)
-        by_u = plus(by_u, 1.0, matrix_applied_back(_matrix(bristle, lin, E, i, n), t))
+        if bristle.linear:
+            rate = plus(rate, -own.law.sigma_1, t)
+            by_z, by_u = times(-own.law.sigma_0, t), times(-own.law.sigma_2, t)
+        else:
+            by_z = matrix_applied_back(_matrix(bristle, lin, C, i, n), t)
+            by_u = matrix_applied_back(_matrix(bristle, lin, E, i, n), t)
+        scatter(out, i, n, plus(by_z, 1.0, matrix_applied_back(_matrix(bristle, lin, A, i, n), rate)))
+        by_u = plus(by_u, 1.0, matrix_applied_back(_matrix(bristle, lin, F, i, n), rate))
         total = plus(total, 1.0, lever.wrench(cell, by_u))
     put(rows.d_twist, total)
 

@@ -28,9 +28,3 @@ def squared(law):
 def grip(law, speed):
     """Return `sigma_0/g(v)` [1/m]: one over the steady deflection of a bristle."""
     return law.sigma_0 / formulas.stribeck(xp, speed, law)
-
-
-@kernel
-def grip_slope(law, speed, grip):
-    """Return the derivative of `sigma_0/g(v)` with respect to the speed [s/m^2]."""
-    return -grip * grip * (1.0 / law.sigma_0) * formulas.stribeck_slope(xp, speed, law)

@@ -51,6 +51,6 @@ def step(lean, z, u, dt):
     return plus(new, 1.0, c), plus(pull, -lean.law.sigma_0, c)
 
 
-_MODEL = {"lever": cells.LEVERS._replace(law=_law), "bristle": bristle(evaluate, step), "read": cells.read}
+_MODEL = {"lever": cells.LEVERS._replace(law=_law), "bristle": bristle(evaluate, step, linear=True), "read": cells.read}
 RATES_OF_LEANING = functions_of("leaning", RATES, **_MODEL)
 STEPS_OF_LEANING = step_functions("leaning", STEPS, **_MODEL)

@@ -16,7 +16,7 @@ class Contact(NamedTuple):
     law: tuple
     shape: tuple
     surface: tuple
-    """Kind, offset and size of the limit surface or maps, as the model reads them: three integers."""
+    """Kind, offset and size of the limit surface: three integers."""
     data: np.ndarray
     """Their numbers, flat."""
 
@@ -46,7 +46,7 @@ class StepModel(NamedTuple):
 
 
 class Framed(NamedTuple):
-    """Functions that read the record of a part, which may step in other axes: `V' = T V` goes in, `T' W'` comes out."""
+    """Functions that read the record of a contact that steps in other axes: `V' = T V` goes in, `T' W'` comes out."""
 
     read: Any
     """`(contact)`: return the record, and the `Contact` that steps."""
@@ -55,30 +55,30 @@ class Framed(NamedTuple):
     wrench: Any
     """`(own, W)`: return `T' W`."""
     spins: Any
-    """`(own)`: return 1; 0 of a point, whose third state takes no part and keeps its value."""
+    """`(own)`: return 1; 0 of a point, whose third state has no effect and keeps its value."""
 
 
 def step(frame, hold, taped_step, contact, z, v, dt, new, out):
-    """Step a part (see `steps.StepFunctions`)."""
-    (own, part), z = frame.read(contact), three(z)
+    """Step a contact (see `steps.StepFunctions`)."""
+    (own, framed), z = frame.read(contact), three(z)
     spins = frame.spins(own)
-    done = taped_step(part, hold(part, frame.seen(own, three(v))), (z[0], z[1], spins * z[2]), dt)
+    done = taped_step(framed, hold(framed, frame.seen(own, three(v))), (z[0], z[1], spins * z[2]), dt)
     put(new, (done.new[0], done.new[1], spins * done.new[2] + (1.0 - spins) * z[2]))
     put(out, frame.wrench(own, done.wrench))
 
 
 def slopes(frame, hold_slopes, taped_step, pull_back, whole, contact, z, v, dt, new, out):
-    """Step a part with the slopes of the wrench, or with all derivatives, the rows of the wrench first."""
-    (own, part), z = frame.read(contact), three(z)
+    """Step a contact with the slopes of the wrench, or with all derivatives, the rows of the wrench first."""
+    (own, framed), z = frame.read(contact), three(z)
     spins = frame.spins(own)
-    held, known = hold_slopes(part, frame.seen(own, three(v)), out)
-    done = taped_step(part, held, (z[0], z[1], spins * z[2]), dt)
+    held, known = hold_slopes(framed, frame.seen(own, three(v)), out)
+    done = taped_step(framed, held, (z[0], z[1], spins * z[2]), dt)
     put(new, (done.new[0], done.new[1], spins * done.new[2] + (1.0 - spins) * z[2]))
     put(out, frame.wrench(own, done.wrench))
     for i in range(6 if whole else 3):
         unit = (1.0 if i % 3 == 0 else 0.0), (1.0 if i % 3 == 1 else 0.0), (1.0 if i % 3 == 2 else 0.0)
         of_wrench, (x, y, s) = times(0.0 if i > 2 else 1.0, unit), times(1.0 if i > 2 else 0.0, unit)
-        bar = pull_back(part, done, known, (x, y, spins * s), frame.seen(own, of_wrench))
+        bar = pull_back(framed, done, known, (x, y, spins * s), frame.seen(own, of_wrench))
         put(at(out, 3 + 3 * i), frame.wrench(own, bar.twist))
         if whole:
             x, y, s = plus((bar.state[0], bar.state[1], spins * bar.state[2]), (1.0 - spins) * s, (0.0, 0.0, 1.0))

@@ -44,8 +44,8 @@ class Part(NamedTuple):
     operations: list[Operation]
     reads: set[str]
     """Numbers of the cell, numbers that all cells share, and results of earlier passes."""
-    sums: list[int]
-    """Sums over the cells that the pass makes."""
+    ends: list[int]
+    """Results of the function that the pass stores or sums up."""
 
 
 def passes(
@@ -56,7 +56,7 @@ def passes(
     `inputs` are the sources of its arguments by their names in the trace: those of a cell are read at `[... + i]`, all
     cells share the others. The first results go to the places `stores`, the others are summed up over the cells.
     """
-    parts = _parts(block, inputs, len(stores), count, short)
+    parts = _parts(block, inputs, stores, count, short)
     places, rows = _places(parts)
     texts, calls = [], []
     for k, part in enumerate(parts):
@@ -65,12 +65,12 @@ def passes(
             lines.append(f"{each.name} = {_text(each)}")
             if each.name in places:
                 lines.append(f"{places[each.name]} = {each.name}")
-        if k == len(parts) - 1:
-            lines += [f"{place} = {_name(each)}" for place, each in zip(stores, block.results, strict=False)]
-        total = "".join(f"{_name(block.results[len(stores) + each])}, " for each in part.sums)
-        texts += _loop(k, [*lines, f"return ({total})" if total else "return"], len(part.sums))
-        calls += _call(k, part.sums, any("pow(" in each.text for each in part.operations))
-    sums = "".join(f"sum_{each}, " for each in range(len(block.results) - len(stores)))
+        lines += [f"{stores[each]} = {_name(block.results[each])}" for each in part.ends if each < len(stores)]
+        summed = [each for each in part.ends if each >= len(stores)]
+        total = "".join(f"{_name(block.results[each])}, " for each in summed)
+        texts += _loop(k, [*lines, f"return ({total})" if total else "return"], len(summed))
+        calls += _call(k, summed, any("pow(" in each.text for each in part.operations))
+    sums = "".join(f"sum_{each}, " for each in range(len(stores), len(block.results)))
     texts.append(text_of(f"run({ARGUMENTS}, lanes)", [*calls, f"return ({sums})" if sums else "return"]))
     source = "\n\n".join(texts)
     return Passes(_compiled(name, source, len(parts)), rows, source)
@@ -106,25 +106,24 @@ def _compiled(name: str, source: str, count: int) -> Any:
 # ---------------------------------------------------------------------- division among passes
 
 
-def _parts(block: Block, inputs: Mapping[str, str], stored: int, count: int, short: int) -> list[Part]:
-    """Divide the operations of a function among passes."""
+def _parts(block: Block, inputs: Mapping[str, str], stores: Sequence[str], count: int, short: int) -> list[Part]:
+    """Divide the operations of a function among passes; what takes the place of an input is stored by the last one."""
     operations = _used(block)
     again = _done_again(operations, inputs, short)
     own = [each for each in operations if each.name not in again]
     cuts = _cuts(own, again, block, count)
-    part_of = {each.name: k for k, span in enumerate(zip(cuts, cuts[1:], strict=False)) for each in own[slice(*span)]}
-    last = len(cuts) - 2
-    found: list[Part] = []
-    sums = [max((part_of.get(name, 0) for name in _needed([each], again)), default=0) for each in block.results[stored:]]
-    for k in range(last + 1):
-        here = own[cuts[k] : cuts[k + 1]]
-        made = [i for i, part in enumerate(sums) if part == k]
-        ends = [block.results[stored + i] for i in made] + list(block.results[:stored] if k == last else ())
-        names = _names_needed([*here, *_as_operations(ends)], again)
+    spans = list(zip(cuts, cuts[1:], strict=False))
+    part_of = {each.name: k for k, span in enumerate(spans) for each in own[slice(*span)]}
+    made = [max((part_of.get(name, 0) for name in _needed([each], again)), default=0) for each in block.results]
+    for k, place in enumerate(stores):
+        made[k] = len(spans) - 1 if place in inputs.values() else made[k]
+    parts = []
+    for k, span in enumerate(spans):
+        here, ends = own[slice(*span)], [each for each, part in enumerate(made) if part == k]
+        names = _names_needed([*here, *_as_operations([block.results[each] for each in ends])], again)
         inside = {each.name for each in here} | (names & again.keys())
-        ordered = [each for each in operations if each.name in inside]
-        found.append(Part(ordered, names - inside, made))
-    return found
+        parts.append(Part([each for each in operations if each.name in inside], names - inside, ends))
+    return parts
 
 
 def _as_operations(results: Sequence[Any]) -> list[Operation]:

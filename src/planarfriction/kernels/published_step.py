@@ -1,4 +1,4 @@
-"""The step of the published reduced model with its derivatives, and what is bound to it (see `rollouts`).
+"""The step of the published reduced model with its derivatives, and what is bound to it.
 
 In scaled coordinates, `V_S = S V` at the centre of pressure with `S = diag(1, 1, r)`, the bristle `S^-1 z` steps as in
 `bristle_step`, driven by `u = h(V) |V_S|` with `h = |u|/|V_S|` (docs/physics.md, "The published reduced model").
@@ -12,11 +12,10 @@ from typing import NamedTuple
 
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import jit, kernel
+from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import reader
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import bristle_step, moment_steps, published_contact, rollouts
-from planarfriction.kernels.bind import bind
+from planarfriction.kernels import bristle_step, moment_steps, published_contact
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.moment_steps import Contact, Cotangents, Framed, StepModel
 from planarfriction.kernels.published_contact import PublishedPatch, through
@@ -139,10 +138,6 @@ def pull_back(contact, step, slopes, new, wrench):
 
 
 MODEL = StepModel(shape_of, hold, hold_slopes, taped_step, pull_back)
-rollout = bind(rollouts.rollout, MODEL, "published_rollout", jit)
-gradient = bind(rollouts.gradient, MODEL, "published_gradient", jit)
-sensitivities = bind(rollouts.sensitivities, MODEL, "published_sensitivities", jit)
-tangent = bind(rollouts.tangent, MODEL, "published_tangent", jit)
 
 
 @kernel

@@ -13,12 +13,6 @@ SWEEPS = 5
 
 
 @kernel
-def nine(m):
-    """Return the numbers of a matrix [3, 3] in memory."""
-    return m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8]
-
-
-@kernel
 def applied(m, a):
     """Return `M a` of a matrix [3, 3] in memory."""
     return (

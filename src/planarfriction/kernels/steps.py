@@ -40,8 +40,8 @@ class StepFunctions(NamedTuple):
     """Compiled steps of a contact with S states.
 
     Their arguments are `(contact, z, V, dt, new, out)`: the address of the contact's record (with which the solver
-    calls its `contacts.ModelFunctions`), a number `dt`, and pointers to doubles. They write the new state to `new` and to
-    `out`, per unit load, the wrench W at the end of the step [3] and what follows.
+    calls its `contacts.ModelFunctions`), a number `dt`, and pointers to doubles. They write the new state to `new` and
+    to `out`, per unit load, the wrench W at the end of the step [3] and what follows.
     """
 
     step: Any

@@ -150,13 +150,17 @@ class LimitSurface(ByValue):
 
     @functools.cached_property
     def _scaled_levers(self) -> tuple[np.ndarray, np.ndarray]:
-        """Maps from scaled twists to what the loaded cells see, `[n, 2, 3]`, and their weights."""
+        """Maps from scaled twists to what the loaded cells see, `[n, 2, 3]` (discs: `[n, 3, 3]`), and their weights."""
         x, y, weights = self._loaded_cells()
-        if self._one_metric:
-            root = None
-        else:
-            root = self.patch.root[self.patch.weights(self.normal_force) > 0.0]  # pyright: ignore
-        return scaled_levers(x / self.contact_radius, y / self.contact_radius, root, self._frame()[:2, :2]), weights
+        loaded = self.patch.weights(self.normal_force) > 0.0
+        root = None if self._one_metric else self.patch.root[loaded]  # pyright: ignore[reportOptionalSubscript]
+        radius = self.contact_radius
+        levers = scaled_levers(x / radius, y / radius, root, self._frame()[:2, :2])
+        if not self.patch.has_discs:
+            return levers, weights
+        spin = np.zeros((len(x), 1, 3))
+        spin[:, 0, 2] = math.sqrt(0.5) * self.patch.lever_radii[loaded] / radius
+        return np.concatenate([levers, spin], axis=1), weights
 
     @functools.cached_property
     def _lean(self) -> np.ndarray | None:
@@ -164,7 +168,7 @@ class LimitSurface(ByValue):
         if not self.patch.asymmetric:
             return None
         weights = self._weights()
-        wrench = np.einsum("n,nij,ni->j", weights, self.patch.levers(), self.patch.asymmetries())
+        wrench = np.einsum("n,nij,ni->j", weights, self.patch.levers()[:, :2], self.patch.asymmetries())
         return np.linalg.solve(self._frame().T, wrench)
 
     # ------------------------------------------------------------------ what a surface says of itself

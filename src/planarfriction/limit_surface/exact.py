@@ -80,16 +80,18 @@ class _Elements(_Domain):
 
 @dataclass(frozen=True, eq=False)
 class _Discs(_Domain):
-    """Evenly loaded discs about the centre of pressure; a ring is one less another."""
+    """Evenly loaded discs; a ring about the centre of pressure is one less another."""
 
     radii: np.ndarray
     """Radii `[K]` [m]."""
     loads: np.ndarray
     """Share of the load of each, `[K]` [-]."""
+    places: np.ndarray
+    """Middles about the centre of pressure, `[2, K]` [m]."""
     loop = kernels.disc_sums
 
     def rows(self, unit: float, rules: Rules = EXACT_RULES) -> kernels.Discs:
-        return kernels.Discs(self.radii / unit, self.loads)
+        return kernels.Discs(self.radii / unit, self.places / unit, self.loads)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,8 +118,9 @@ class LimitSurfaceExact(LimitSurface):
 
     Integrated over the patch's outline if the pressure on it is uniform (polygons) or depends on the radius alone
     (discs and rings, `Uniform` or `SoftFinger`), otherwise over its cells, each a rectangle (on lines a segment) of
-    uniform pressure. Points remain points. The wrench is continuous in the twist, and the Jacobian is exact; on lines
-    it has a logarithmic singularity where the centre of rotation meets the line, cut off at 1e-15 of a cell.
+    uniform pressure. Points remain points, and discs that stand for several cells remain discs. The wrench is
+    continuous in the twist, and the Jacobian is exact; on lines it has a logarithmic singularity where the centre of
+    rotation meets the line, cut off at 1e-15 of a cell.
 
     It costs more than a sum over cells; models, whose compiled code cannot evaluate it, store it as a table.
     """
@@ -180,7 +183,7 @@ class LimitSurfaceExact(LimitSurface):
             if isinstance(pressure, Uniform) and outline.inner <= _THICK * outline.outer:
                 radii = np.array([outline.outer, outline.inner] if outline.inner > 0.0 else [outline.outer])
                 squares = radii**2 * [1.0, -1.0][: len(radii)]
-                return _Discs(radii, squares / squares.sum())
+                return _Discs(radii, squares / squares.sum(), np.zeros((2, len(radii))))
             return _Rings(outline.inner, outline.outer, *self._soft)
         if isinstance(outline, PolygonOutline):
             triangles = outline.triangles()
@@ -188,6 +191,8 @@ class LimitSurfaceExact(LimitSurface):
             corners = triangles[:, [0, 1, 2, 2]] - self.centre_of_pressure
             return _Elements(self._lever_corners(corners), areas / areas.sum())
         x, y, weights = self._loaded_cells()
+        if self.patch.has_discs and not self.patch.cell_extents().any():
+            return _Discs(self.patch.lever_radii[self._weights() > 0.0], weights, np.array([x, y]))
         extents = self.patch.cell_extents()[self.patch.weights(self.normal_force) > 0.0]
         sides = int((extents > 0.0).any(axis=0).sum())
         corners = np.stack([x, y], -1)[:, None] + self._lever_corners(extents[:, None] * _CORNERS[sides])
@@ -230,7 +235,7 @@ class LimitSurfaceExact(LimitSurface):
         """Domains for compiled loops: elements, discs and rings, of which only one is not empty."""
         none = np.zeros(0)
         elements = _Elements(np.zeros((0, 2, 2)), none).rows(1.0)
-        discs, rings = kernels.Discs(none, none), kernels.Rings(none, none, 0.0, 1.0, 1.0, 1.0)
+        discs, rings = kernels.Discs(none, np.zeros((2, 0)), none), kernels.Rings(none, none, 0.0, 1.0, 1.0, 1.0)
         rows = self._parts.rows(self.contact_radius)
         if isinstance(rows, kernels.Elements):
             return rows, discs, rings

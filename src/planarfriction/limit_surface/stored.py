@@ -9,6 +9,7 @@ import numpy as np
 
 from planarfriction.kernels import surfaces
 from planarfriction.limit_surface.loops.twists import StoredPotential
+from planarfriction.patch.disc_friction import disc_curvature, disc_friction
 
 if TYPE_CHECKING:
     from planarfriction.limit_surface.base import LimitSurface
@@ -39,6 +40,8 @@ def cell_sums(levers: np.ndarray, weights: np.ndarray, units: np.ndarray) -> np.
 
 def cell_slopes(levers: np.ndarray, weights: np.ndarray, units: np.ndarray) -> np.ndarray:
     """Return `dh/dV_S` of unit scaled twists `[M, 3]`, shape `[M, 3, 3]`."""
+    if levers.shape[1] == 3:
+        return _disc_slopes(levers, weights, units)
     found = []
     for part in _parts(units, levers):
         size, heading = _headings(levers, part)
@@ -48,21 +51,47 @@ def cell_slopes(levers: np.ndarray, weights: np.ndarray, units: np.ndarray) -> n
     return np.concatenate(found)
 
 
+def _disc_slopes(levers: np.ndarray, weights: np.ndarray, units: np.ndarray) -> np.ndarray:
+    """Return `dh/dV_S` of discs: `sum w B' (dW/du - W W'/S^2)/S B`."""
+    found = []
+    for part in _parts(units, levers):
+        seen = np.einsum("ncd,md->mnc", levers, part)
+        c_t, c_s, speed = disc_friction(seen[..., 0] ** 2 + seen[..., 1] ** 2, 2.0 * seen[..., 2] ** 2)
+        moving = speed > _AT_REST
+        share = np.divide(weights, speed, out=np.zeros_like(speed), where=moving)
+        pull = seen * np.stack([c_t, c_t, c_s], -1) * (share / np.where(weights > 0.0, weights, 1.0))[..., None]
+        bent, along = disc_curvature(seen)
+        terms = (share * c_t, levers[:, 0]), (share * c_t, levers[:, 1]), (share * c_s, levers[:, 2])
+        slope = sum(np.einsum("mn,ni,nj->mij", factor, row, row) for factor, row in terms)
+        for factor, each in ((share * bent, along), (-share, pull)):
+            turned = np.einsum("mnc,nci->mni", each, levers)
+            slope = slope + np.einsum("mn,mni,mnj->mij", factor, turned, turned)
+        found.append(slope)
+    return np.concatenate(found)
+
+
 def _parts(units: np.ndarray, levers: np.ndarray) -> list[np.ndarray]:
     rows = max(1, _AT_ONCE // len(levers))
     return [units[start : start + rows] for start in range(0, max(len(units), 1), rows)]
 
 
 def _direction(levers: np.ndarray, weights: np.ndarray, heading: np.ndarray) -> np.ndarray:
-    """Return `h` `[m, 3]` of `u_i/|u_i|` `[m, n, 2]`: sums that run over the cells alike for one twist and for many."""
+    """Return `h` `[m, 3]` of headings `[m, n, 2 or 3]`: sums over the cells are the same for one twist as for many."""
     pull = np.ascontiguousarray((weights[:, None, None] * levers).reshape(-1, 3).T)
     return np.einsum("mk,dk->md", heading.reshape(-1, pull.shape[1]), pull)
 
 
 def _headings(levers: np.ndarray, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return `|u_i|` `[m, n]` and `u_i/|u_i|` `[m, n, 2]` of unit scaled twists, both zero for cells at rest."""
+    """Return speeds `[m, n]` and headings of unit scaled twists, both zero for cells at rest.
+
+    Those of points are `|u_i|` and `u_i/|u_i|` `[m, n, 2]`, those of discs S and `W/S` `[m, n, 3]`.
+    """
     seen = np.einsum("ncd,md->mnc", levers, units)
-    size = np.hypot(seen[..., 0], seen[..., 1])
+    if levers.shape[1] == 3:
+        c_t, c_s, size = disc_friction(seen[..., 0] ** 2 + seen[..., 1] ** 2, 2.0 * seen[..., 2] ** 2)
+        seen *= np.stack([c_t, c_t, c_s], -1)
+    else:
+        size = np.hypot(seen[..., 0], seen[..., 1])
     size[size <= _AT_REST] = 0.0
     return size, seen * np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)[..., None]
 

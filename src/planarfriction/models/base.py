@@ -95,14 +95,15 @@ class FrictionModel(ByValue):
         return dataclasses.replace(self, law=law)
 
     def state_of(self, deflections: ArrayLike, normal_force: ArrayLike) -> np.ndarray:
-        """Return the state of a contact at rest with the `deflections` `[2, N]` [m] of bristles under a load > 0 [N].
+        """Return the state of a contact at rest with the `deflections` `[2, N]` [m] of its cells under a load > 0 [N].
 
-        Its wrench is that of the bristles, `-sum w_i B_i' sigma_0 z_i f_N`, whichever state variables a model uses.
+        Those of a patch of discs are `[3, N]`. The wrench is that of the bristles, `-sum w_i B_i' sigma_0 z_i f_N`,
+        whichever state variables a model uses.
 
         Raises InvalidValueError for deflections of another shape, a load that is not > 0, and a model that cannot start
         with a load.
         """
-        deflections = validation.array("deflections", deflections, (2, len(self.patch.positions)))
+        deflections = validation.array("deflections", deflections, (self.patch.bristles, self.patch.cells))
         return self._state_of(deflections, validation.positive_load("normal_force", normal_force))
 
     def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:

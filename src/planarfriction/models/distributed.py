@@ -41,6 +41,8 @@ class DistributedModel(FrictionModel):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.patch.has_discs:
+            refuse_rate_law(self.law, "patches of discs (dataclasses.replace(patch, radii=None) has points)")
         if self.patch.asymmetric:
             refuse_creep(self.law, "patches with an asymmetry")  # at rest they would push
             refuse_rate_law(self.law, "patches with an asymmetry")
@@ -52,7 +54,7 @@ class DistributedModel(FrictionModel):
     @property
     def state_shape(self) -> tuple[int, ...]:
         """`(2, N)` for the N cells that can carry load; `(3, N)` for discs."""
-        return (3 if self.patch.has_discs else 2, len(self.patch.positions))
+        return (self.patch.bristles, len(self.patch.positions))
 
     @functools.cached_property
     def compiled(self) -> CompiledDistributed:

@@ -13,7 +13,7 @@ from planarfriction.compiled.published import CompiledPublished
 from planarfriction.compiled.remembered import Remembered
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.moments import slopes_in
+from planarfriction.kernels.published_contact import slopes_in
 from planarfriction.kernels.surfaces import ELLIPSOID
 from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import refuse_fixed_stiffness, refuse_rate_law
@@ -230,6 +230,8 @@ class ReducedModelPublished(FrictionModel):
 
         With the rate f, G the map to the centre of pressure and `W = -G' (sigma_0 z + sigma_1 f + sigma_2 H V)`:
         `dW/dz = -G' (sigma_0 + sigma_1 df/dz)`, `dW/dV = -G' (sigma_1 df/dV + sigma_2 H)`.
+
+        Raises InvalidValueError as `step` does.
         """
         state, twist, load, _ = self._inputs(state, twist, normal_force)
         law, count = self.law.numbers, load.size

@@ -1,7 +1,6 @@
 """Contact patches: cells with areas, and a pressure law that may depend on the normal force."""
 
 from planarfriction.families import PUBLISHED_PATCHES, SHAPES
-from planarfriction.patch.compressed import surface_error
 from planarfriction.patch.contact_patch import ContactPatch
 from planarfriction.patch.grid import Grid
 from planarfriction.patch.grid_error import GridError
@@ -24,7 +23,6 @@ __all__ = [
     "friction_metric",
     "read_pressure_map",
     "register",
-    "surface_error",
 ]
 
 register = SHAPES.register

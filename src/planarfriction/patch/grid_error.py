@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -43,9 +44,9 @@ def finer(patch: ContactPatch, parts: int, name: str = "parts") -> ContactPatch:
 NEAREST = 60
 """Largest number of cells, those nearest to the centre of pressure, beside which the centre of rotation is placed."""
 
-BESIDE = 0.01
-"""Distance of the centre of rotation from the middle of a cell, in cells: there the cell pulls with all its load, while
-its continuous friction nearly cancels."""
+BESIDE, BESIDE_DISCS = (0.01,), (0.01, 0.2, 0.35, 0.5)
+"""Distances of the centre of rotation from the middle of a cell, in cells: a point there pulls with all its load, while
+its continuous friction nearly cancels; a disc differs most at its rim."""
 
 FINER = 3
 """Refinement by which a pressure that is given by a law, and not cell by cell, is taken to be continuous."""
@@ -68,10 +69,13 @@ class GridError:
     """Largest relative error of the load at which the patch lets go, over all directions of the load [-]."""
     cells: int
     """Number of cells."""
+    as_discs: GridError | None = None
+    """The same of `ContactPatch.discs()`, each cell a small disc, where cells are points; else None."""
 
     def __str__(self) -> str:
         force, torque, breakaway = (f"{100.0 * each:.2g} %" for each in (self.force, self.torque, self.breakaway))
-        return f"force {force}, torque {torque}, breakaway {breakaway} ({self.cells} cells)"
+        discs = "" if self.as_discs is None else f"; as discs {self.as_discs}".partition(" (")[0]
+        return f"force {force}, torque {torque}, breakaway {breakaway} ({self.cells} cells){discs}"
 
 
 def grid_error(patch: ContactPatch, normal_force: float | None, refined: int) -> GridError:
@@ -80,7 +84,14 @@ def grid_error(patch: ContactPatch, normal_force: float | None, refined: int) ->
         fine = finer(patch, refined, "refined")
     if not patch.cell_extents().any():
         return GridError(0.0, 0.0, 0.0, fine.cells)
-    exact, cells = _continuous(patch, normal_force), SURFACES["cells"](fine, normal_force=normal_force)
+    exact = _continuous(patch, normal_force)
+    discs = None if fine.has_discs else _error(fine.discs(), exact, normal_force)
+    return dataclasses.replace(_error(fine, exact, normal_force), as_discs=discs)
+
+
+def _error(fine: ContactPatch, exact: Any, normal_force: float | None) -> GridError:
+    """Return the errors of the sum over the cells of a patch against an exact surface."""
+    cells = SURFACES["cells"](fine, normal_force=normal_force)
     centre, radius = exact.centre_of_pressure, exact.contact_radius
     x, y = _beside_cells(fine, centre, radius, normal_force)
     turns = np.stack([y, -x, np.ones_like(x)], -1)  # about (x, y) with 1 rad/s
@@ -107,6 +118,7 @@ def _beside_cells(patch: ContactPatch, centre: np.ndarray, radius: float, normal
     distance = np.hypot(*(patch.positions[loaded] - centre).T)
     order = np.argsort(distance, kind="stable")[:NEAREST]
     near = loaded[order[distance[order] <= max(radius, distance.min())]]
-    sides = BESIDE * np.array([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
+    sides = np.array([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
+    sides = np.concatenate([distance * sides for distance in (BESIDE_DISCS if patch.has_discs else BESIDE)])
     points = patch.positions[near, None] + sides * patch.cell_extents()[near, None]
     return points.reshape(-1, 2).T

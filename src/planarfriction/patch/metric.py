@@ -93,6 +93,11 @@ class Anisotropy(ByValue):
         """True if any cell is a disc and not a point."""
         return bool(self.radii.any())  # pyright: ignore[reportAttributeAccessIssue]
 
+    @property
+    def bristles(self) -> int:
+        """Number of components of the bristle of a cell: two of a point; three of all cells if any is a disc."""
+        return 3 if self.has_discs else 2
+
     @functools.cached_property
     def lever_radii(self) -> np.ndarray:
         """Radii `[N]` [m] of the cells in the space of the metric M, `a sqrt(tr M/2)`; those of points are 0."""

@@ -12,7 +12,8 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import formulas, validation
+from planarfriction import validation
+from planarfriction.patch.disc_friction import disc_friction
 from planarfriction.patch.metric import Anisotropy
 
 MOST_DEGREE = 40
@@ -29,7 +30,7 @@ class Moments(Anisotropy):
         For sums that spread the load of a cell over its `cell_extents`. Raises InvalidValueError as `weights` does.
         """
         weights = self.weights(normal_force)
-        if self.point_shares is None:
+        if self.point_shares is None or self.has_discs:
             return weights
         tiles = weights / self.point_shares
         return tiles / tiles.sum(-1, keepdims=True)
@@ -58,14 +59,13 @@ class Moments(Anisotropy):
         """Return the contact radius `r = sum(w |rho - CoP|)` [m]: a spin about the CoP has the torque `mu f_N r`.
 
         With a friction metric `sum(w |L J (rho - CoP)|)`, J a quarter turn; the second moment likewise. A disc counts
-        with the mean distance of its points (see `formulas.disc_friction`).
+        with the mean distance of its points.
         """
         weights, *offset = self._about_centre_of_pressure(normal_force)
         x, y = self.lever_coordinates(*offset)
         if not self.has_discs:
             return (weights * np.hypot(x, y)).sum(-1)
-        slide, spin = x**2 + y**2, self.lever_radii**2
-        return (weights * np.sqrt(slide + formulas.disc_friction(np, slide, spin)[2] * spin)).sum(-1)
+        return (weights * disc_friction(x**2 + y**2, self.lever_radii**2)[2]).sum(-1)
 
     @overload
     def second_moment(self, normal_force: float | None = None) -> float: ...

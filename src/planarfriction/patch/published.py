@@ -40,12 +40,12 @@ def line(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
 
 def line_grad(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return a line along y, `width` [m] long, with weights cells, ..., 2, 1 from the top."""
-    return ContactPatch.line(width, cells, profile=_steps(cells), name="LineGrad")
+    return _even(ContactPatch.line(width, cells, profile=_steps(cells), name="LineGrad"))
 
 
 def line_grad_x(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return a line along x, `width` [m] long, with weights cells, ..., 2, 1 from the left."""
-    return ContactPatch.line(width, cells, direction="x", profile=_steps(cells), name="LineGradX")
+    return _even(ContactPatch.line(width, cells, direction="x", profile=_steps(cells), name="LineGradX"))
 
 
 def non_convex_1(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
@@ -59,10 +59,10 @@ def non_convex_2(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPa
 
 
 def _even(patch: ContactPatch) -> ContactPatch:
-    """Return the patch with weights in proportion to pressure and area alone, as published."""
+    """Return the patch of points with weights in proportion to pressure and area alone, as published."""
     with warnings.catch_warnings():  # that the shape itself has given
         warnings.simplefilter("ignore")
-        return with_outline(dataclasses.replace(patch, point_shares=None), patch.outline)
+        return with_outline(dataclasses.replace(patch, point_shares=None, radii=None), patch.outline)
 
 
 def _steps(cells: int) -> np.ndarray:
@@ -112,8 +112,10 @@ def cells(
     outline: Any = None,
     name: Any = None,
     point_shares: Any = None,
+    radii: Any = None,
 ) -> ContactPatch:
     """Return the patch that `ContactPatch.to_dict` described."""
     given = {"positions": positions, "areas": areas, "pressure": pressure, "grid": grid}
-    given |= {"cell_size": cell_size, "outline": outline, "name": name, "point_shares": point_shares}
+    given |= {"cell_size": cell_size, "outline": outline, "name": name}
+    given |= {"point_shares": point_shares, "radii": radii}
     return ContactPatch.from_dict({key: value for key, value in given.items() if value is not None})

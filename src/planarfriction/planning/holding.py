@@ -88,7 +88,9 @@ def _needed(load: np.ndarray, patch: ContactPatch, mu: float, normal_force: floa
 @functools.lru_cache(maxsize=8)
 def _surface(patch: ContactPatch, normal_force: float | None) -> LimitSurface:
     """Return the limit surface of a patch, whose table for twists is dear: a plan asks several times."""
-    kind: type[LimitSurface] = LimitSurfaceExact if patch.root is None or patch.root.ndim == 2 else LimitSurfaceCells
+    few = patch.has_discs and not patch.cell_extents().any()  # these pull as they do in models
+    cells = few or (patch.root is not None and patch.root.ndim == 3)
+    kind: type[LimitSurface] = LimitSurfaceCells if cells else LimitSurfaceExact
     return kind(patch, normal_force=normal_force)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import EllipseCollection, PolyCollection
 from matplotlib.ticker import MaxNLocator
 
 import planarfriction as pf
@@ -26,7 +26,7 @@ def plot_patch(patch: pf.ContactPatch, *, normal_force: float | None = None) -> 
     """Draw the pressure on a patch, and its centre of pressure.
 
     Cells of a grid are drawn with their true area at their true centroid and coloured by their pressure; a
-    patch without a grid is drawn as points coloured by the force on them, `w f_N`. Without `normal_force` [N] the
+    patch without a grid is drawn as points, or as its discs, coloured by the force on them, `w f_N`. Without `normal_force` [N] the
     colours show both per newton of load. Lengths in mm.
 
     Raises InvalidValueError unless `patch` is a patch, for a load below zero, and without a load that is needed.
@@ -95,9 +95,18 @@ def _draw_cells(axes, patch: pf.ContactPatch, grid: pf.Grid, pressure: np.ndarra
 def _draw_points(axes, patch: pf.ContactPatch, force: np.ndarray, normal_force: float | None):
     share = force / force.max() if force.any() else np.zeros_like(force)
     unit = unit_for("force", force) if normal_force is not None else Unit(1.0, "-")
-    look = {"cmap": style.PRESSURE_MAP, "vmin": 0.0, "edgecolor": "0.3", "linewidth": 0.6}
-    points = axes.scatter(*(1e3 * patch.positions.T), s=30 + 170 * share, c=unit.factor * force, **look)
+    look: Any = {"cmap": style.PRESSURE_MAP, "edgecolor": "0.3", "linewidth": 0.6}
+    places = 1e3 * patch.positions
+    points = axes.scatter(*places.T, s=30 + 170 * share, c=unit.factor * force, vmin=0.0, **look)
     axes.margins(0.2)
+    if patch.has_discs:
+        points.set_sizes(np.where(patch.radii > 0.0, 0.0, points.get_sizes()))
+        wide, options = 2e3 * patch.radii, {"units": "xy", "offsets": places, "offset_transform": axes.transData}
+        discs = EllipseCollection(wide, wide, np.zeros(len(wide)), array=unit.factor * force, **options, **look)
+        discs.set_clim(0.0, unit.factor * float(force.max()) or 1.0)
+        axes.add_collection(discs)
+        axes.update_datalim(np.concatenate([places + side * 1e3 * patch.radii[:, None] for side in (-1.0, 1.0)]))
+        axes.margins(0.08)
     name = "share of the normal force" if normal_force is None else "normal force"
     return points, f"{name} [{unit.label}]"
 
@@ -105,7 +114,7 @@ def _draw_points(axes, patch: pf.ContactPatch, force: np.ndarray, normal_force: 
 def _title(patch: pf.ContactPatch, weights: np.ndarray, normal_force: float | None) -> str:
     loaded = int((weights > 0.0).sum())
     radius = unit_for("length", patch.contact_radius(normal_force))
-    what = ("point" if patch.grid is None else "cell") + "s" * (loaded != 1)
+    what = ("disc" if patch.has_discs else "point" if patch.grid is None else "cell") + "s" * (loaded != 1)
     text = f"{patch.name}: {loaded} loaded {what}, r = {radius.factor * patch.contact_radius(normal_force):.3g} "
     text += radius.label
     if normal_force is not None:

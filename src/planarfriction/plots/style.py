@@ -19,12 +19,9 @@ from planarfriction.shown import unit_for
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Line colours that colour-blind readers tell apart (Okabe and Ito), the most distinct first."""
 
-DISTRIBUTED, PUBLISHED, ELLIPSOID, MOMENTS, PARTS, FEW, EXACT = PALETTE
+DISTRIBUTED, PUBLISHED, ELLIPSOID, OTHER, SECOND, FEW, EXACT = PALETTE
 """Colours in every figure: sums over cells and their model, the published table and its model, the ellipsoid and its
-model, `ReducedModel` with one part, with several, by default, what is exact."""
-
-OTHER = FEW
-"""Colour of something else, where no `ReducedModel` is."""
+model, something else, a second thing else, `ReducedModel` with few discs, what is exact."""
 
 MEASURED = "0.6"
 """Colour of what was measured, drawn as a broad line below the rest."""
@@ -86,10 +83,7 @@ def new_figure(width: float, height: float) -> PlotFigure:
 
 def model_colour(model: Any) -> str | None:
     """Return the colour of a friction model; None if it is not one of the library's."""
-    name = MODELS.name_of(model)
-    if name == "reduced" and model.parts is not None:
-        return PARTS if model.parts > 1 else MOMENTS
-    return OF_MODEL.get(name or "")
+    return OF_MODEL.get(MODELS.name_of(model) or "")
 
 
 def show_lengths(axes: Any, largest: float) -> None:

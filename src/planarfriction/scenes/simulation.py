@@ -151,17 +151,15 @@ def _histories(scene: Scene, batches: SegmentBatches, output: Output) -> dict[st
         for c, contact in enumerate(scene.contacts):
             first, cells = batches.bristles, batches.cells[c]
             part = output.bristles[:, first[c] : first[c + 1]]
-            part = part[:, : 2 * cells.sum()] if cells is not None else part  # no place of the pressure
             name = f"bristles_{contact.name}"
             if cells is not None:
-                full = np.zeros((len(part), 2, len(cells)))
-                full[:, :, cells] = part.reshape(len(part), 2, -1)
-                histories[name] = History(("time", "axis", f"cell_{contact.name}"), full, {"units": "m"})
+                size = contact.model.state_shape[0]
+                full = np.zeros((len(part), size, len(cells)))
+                full[:, :, cells] = part[:, : size * cells.sum()].reshape(len(part), size, -1)  # no place of the pressure
+                axis = "axis" if size == 2 else "component"
+                histories[name] = History(("time", axis, f"cell_{contact.name}"), full, {"units": "m"})
             else:
-                inner = contact.model.state_shape
-                parts = () if len(inner) == 1 else (f"part_{contact.name}",)
-                states = part.reshape(len(part), *inner)
-                histories[name] = History(("time", *parts, "component"), states, {"units": contact.model.state_units})
+                histories[name] = History(("time", "component"), part, {"units": contact.model.state_units})
     histories["time"] = history("time", ("time",), output.time, "s")
     histories["contact"] = History(("contact",), np.array([contact.name for contact in scene.contacts]), {})
     return histories

@@ -149,14 +149,15 @@ def slip_field(
     frames: np.ndarray,
     first: np.ndarray,
 ) -> SlipField:
-    """Compute the slip field of a contact at `frames` (indices into `times`) from the bristles `state` `[2, N]` [m].
+    """Compute the slip field of a contact at `frames` (indices into `times`) from the bristles `state` `[d, N]` [m].
 
     `displacements` `[T - 1, 3]` [m, m, rad] are those of the body on the contact from one of `times` `[T]` [s] to the
     next, in the frame of the contact; `loads` are `[T]` [N]; `first` `[3]` is the first twist [m/s, m/s, rad/s]. A
     cell displaced by `u` while its bristle goes from z_0 to z_1 slips by `u - (z_1 - z_0)`.
     """
     law, count, largest = bristles.law.numbers, len(bristles.patch.positions), bristles.law.largest_deflection
-    levers, lean = bristles.patch.levers(), bristles.patch.asymmetries().T
+    levers, lean = bristles.patch.levers(), np.zeros(state.shape)
+    lean[:2] = bristles.patch.asymmetries().T
     bent, slips = np.zeros((len(frames), count)), np.zeros((len(frames), count), dtype=bool)
     distance, slip, frame = np.zeros(count), np.zeros(count), 1
     factor = bristles.law.stiffness_factor(np.maximum(loads, 0.0))
@@ -167,20 +168,23 @@ def slip_field(
         before = state
         state, _ = bristles.step(state, step / dt, max(0.5 * (loads[k] + loads[k + 1]), 0.0), dt)
         moved = (levers @ step).T
-        length = np.hypot(*moved)
+        length = np.linalg.norm(moved, axis=0)
         distance += length
-        slip += np.hypot(*(moved - (state - before)))
+        slip += np.linalg.norm(moved - (state - before), axis=0)
         if frame < len(frames) and k + 1 == frames[frame]:
             bent[frame] = _bent(factor[k + 1] * state, moved.T / dt, lean, law)
             slips[frame] = (slip > SLIPS * distance) & (distance > AT_REST * largest)
             distance[:], slip[:], frame = 0.0, 0.0, frame + 1
     if len(frames) > 1:  # at first no distance is known: as right after it
         span = times[frames[1]] - times[frames[0]]
-        slips[0] = slips[1] & (np.hypot(*(levers @ first).T) * span > AT_REST * largest)
+        slips[0] = slips[1] & (np.linalg.norm(levers @ first, axis=1) * span > AT_REST * largest)
     return SlipField(bent, slips)
 
 
 def _bent(state: np.ndarray, velocity: np.ndarray, lean: np.ndarray, law: Any) -> np.ndarray:
-    """Return the deflections of bristles `[2, N]` over their largest at the velocities `[N, 2]` of the cells, `[N]`."""
-    steady = formulas.stribeck(np, np.hypot(*velocity.T), law) / law.sigma_0
-    return np.hypot(*(state - lean * steady)) / steady
+    """Return the deflections of bristles `[d, N]` over their largest at the velocities `[N, d]` of the cells, `[N]`.
+
+    The largest of a disc that spins is up to 6 % smaller.
+    """
+    steady = formulas.stribeck(np, np.linalg.norm(velocity, axis=1), law) / law.sigma_0
+    return np.linalg.norm(state - lean * steady, axis=0) / steady

@@ -57,12 +57,12 @@ def first_slopes(scene: Any, shaped: np.ndarray, d_loads: np.ndarray, d_pull: np
 
 
 def _states(scene: Any, shaped: np.ndarray, deflections: np.ndarray, sizes: list[int]) -> list[np.ndarray]:
-    """Return the states `[K, *state_shape]` of each contact with deflections `[K, n, 2]` of the cells of all."""
+    """Return the states `[K, *state_shape]` of each contact with deflections `[K, n, 3]` of the cells of all."""
     found = []
     parts = np.split(deflections, np.cumsum(sizes)[:-1], axis=1)
     for contact, part, load in zip(scene.contacts, parts, shaped, strict=True):
         model = contact.model
-        states = [model.state_of(row.T, load) if load > 0.0 else model.rest() for row in part]
+        states = [model.state_of(row.T[: model.patch.bristles], load) if load > 0.0 else model.rest() for row in part]
         found.append(np.array(states).reshape(len(part), *model.state_shape))
     return found
 
@@ -105,33 +105,39 @@ class _BristleField(NamedTuple):
     """The cells of all contacts."""
 
     levers: np.ndarray
-    """Jacobian of the displacement of each cell by a small motion of the body, `[n, 2, 3]`."""
+    """Jacobian of the displacement of each cell by a small motion of the body, `[n, 3, 3]`."""
     stiffness: np.ndarray
     """`count f_N w_i sigma_0`, or `count f_ref w_i sigma_0`, `[n]` [N/m]."""
     largest: np.ndarray
     """Largest deflection `[n]` [m]."""
     middle: np.ndarray
-    """Deflection of each bristle that is as far from its largest in all directions `[n, 2]` [m]."""
+    """Deflection of each bristle that is as far from its largest in all directions `[n, 3]` [m]."""
     fixed: np.ndarray
     """True for cells whose stiffness does not grow with the load, bool `[n]`."""
 
     def full(self, motion: np.ndarray) -> np.ndarray:
         """Return which cells are bent as far as they can be after a small motion of the body, bool `[n]`."""
-        return np.hypot(*(self.levers @ motion - self.middle).T) > self.largest
+        return _lengths(self.levers @ motion - self.middle) > self.largest
 
     def bent(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the deflections `[n, 2]` after a small motion of the body, and slopes `[n, 2, 2]` by the stretch."""
+        """Return the deflections `[n, 3]` after a small motion of the body, and slopes `[n, 3, 3]` by the stretch."""
         shift = self.levers @ motion - self.middle
-        length = np.hypot(*shift.T)
+        length = _lengths(shift)
         over = length > self.largest
         share = np.where(over, self.largest, 1.0) / np.where(over, length, 1.0)
         along = shift / np.where(length > 0.0, length, 1.0)[:, None]
-        slope = share[:, None, None] * (np.eye(2) - over[:, None, None] * along[:, :, None] * along[:, None, :])
+        slope = share[:, None, None] * (np.eye(3) - over[:, None, None] * along[:, :, None] * along[:, None, :])
         return self.middle + share[:, None] * shift, slope
 
     def load(self, deflections: np.ndarray) -> np.ndarray:
-        """Return the load on the body `[3]` that deflections `[n, 2]` hold."""
+        """Return the load on the body `[3]` that deflections `[n, 3]` hold."""
         return np.einsum("n,nij,ni->j", self.stiffness, self.levers, deflections)
+
+
+def _lengths(vectors: np.ndarray) -> np.ndarray:
+    """Return the lengths of vectors `[n, 3]`, of any size."""
+    x, y, s = vectors.T
+    return np.hypot(np.hypot(x, y), s)
 
 
 def _equilibrium(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> list[np.ndarray]:
@@ -162,10 +168,12 @@ def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _BristleF
     model = contact.model
     patch, law = model.patch, model.law.numbers
     levers = patch.levers() @ contact_map(scene, contact)
+    levers = np.concatenate([levers, np.zeros((len(levers), 3 - levers.shape[1], 3))], axis=1)  # points do not spin
     weights = patch.weights(shaped) if shaped > 0.0 else np.zeros(len(levers))
     sigma_0 = law.sigma_0 * float(model.law.stiffness_factor(load))
     largest = float(formulas.stribeck(np, np.zeros(()), law)) / sigma_0
-    middle = largest * patch.asymmetries() if patch.asymmetric else np.zeros((len(levers), 2))
+    middle = np.zeros((len(levers), 3))
+    middle[:, :2] = largest * patch.asymmetries()
     fixed = np.full(len(levers), model.law.reference_load is not None)
     return _BristleField(levers, contact.count * load * sigma_0 * weights, np.full(len(levers), largest), middle, fixed)
 
@@ -223,5 +231,5 @@ def _bent_to_the_end(cells: _BristleField, pull: np.ndarray, motion: np.ndarray,
 def _held(cells: _BristleField, pull: np.ndarray, motion: np.ndarray) -> float | None:
     """Return a bound below 1 on the share of the load that friction holds, if a motion proves it, or None."""
     shift, power = cells.levers @ motion, float(pull @ motion)
-    most = (cells.stiffness * (cells.largest * np.hypot(*shift.T) + (cells.middle * shift).sum(axis=1))).sum()
+    most = (cells.stiffness * (cells.largest * _lengths(shift) + (cells.middle * shift).sum(axis=1))).sum()
     return float(most / power) if 0.0 <= most < power else None

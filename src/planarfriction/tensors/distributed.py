@@ -1,7 +1,7 @@
 """The distributed model over `xp`: the bristles of `kernels`, in every cell of a patch of points or discs.
 
 A state `[..., d, N]` has d bristles in each of N cells, two in points and three in discs. Twists are `[..., 3]`; the
-law's parameters and time steps are `[..., 1]`, or plain numbers.
+law's parameters and time steps are `[..., 1, 1]`, or plain numbers.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from planarfriction.kernels.leaning_cells import Leaning
 from planarfriction.kernels.vectors import plus
 from planarfriction.models import DistributedModel
 from planarfriction.patch import ContactPatch
-from planarfriction.tensors.elements import over
+from planarfriction.tensors.elements import Vector, joined, over, split
 
 
 def _point(law, z, u):
@@ -63,6 +63,11 @@ def cells_of(patch: ContactPatch, law: Any, normal_force: float | None) -> Cells
     return Cells(numbers, patch.weights(normal_force))
 
 
+def obstacle(levers) -> str:
+    """Return the reason why compiled rollouts do not take cells of such numbers, or an empty text."""
+    return "for friction that is not the same forwards and backwards" if len(levers) > 6 else ""
+
+
 def positions_of(xp, shape: Cells):
     """Return the positions of the cells, x then y [m], `[2, N]`."""
     if len(shape.levers) < 5:
@@ -71,47 +76,52 @@ def positions_of(xp, shape: Cells):
     return xp.stack([xx * y - xy * x, xy * y - yy * x], 0) / (xx * yy - xy * xy)
 
 
-def _lever(shape: Cells) -> tuple[Any, ...]:
+def _numbers(shape: Cells) -> tuple[Any, Any]:
+    """Return the numbers of the levers of the cells, and their asymmetry or None."""
     count = len(shape.levers)
-    return tuple(shape.levers[k] for k in range(count if count < 7 else count - 2))
+    lever = tuple(shape.levers[k] for k in range(count if count < 7 else count - 2))
+    return lever, None if count < 7 else Vector(shape.levers[-2:])
 
 
-def _law(law: LawNumbers, shape: Cells) -> Any:
-    """Return the law as the bristles of the cells read it."""
-    return Leaning(law, (shape.levers[-2], shape.levers[-1])) if len(shape.levers) > 6 else law
+def _bristle(xp, name: str, law: LawNumbers, shape: Cells, z, u, *dt):
+    """Return two arrays `[..., d, N]`, the results of a function of the bristles."""
+    kind, (_, asymmetry) = KINDS[len(shape.levers)], _numbers(shape)
+    vector = Vector if kind.bristles == 2 else split  # the source of discs names components
+    law = law if asymmetry is None else Leaning(law, asymmetry)
+    found = over(xp)(getattr(kind, name))(law, vector(z), vector(u), *dt)
+    return tuple(joined(xp, each) for each in found)
 
 
 # ---------------------------------------------------------------------- steps
 
 
-def split(state) -> tuple[Any, ...]:
-    """Return the bristles of a state as a vector of arrays `[..., N]`."""
-    return tuple(state[..., k, :] for k in range(state.shape[-2]))
+def wide(state):
+    """Return a state as bristles `[..., d, N]`, which it is."""
+    return state
 
 
-def joined(xp, z):
-    """Return a state of a vector of arrays."""
-    return xp.stack(xp.broadcast_arrays(*z), -2)
+def narrow(z):
+    """Return bristles `[..., d, N]` as a state."""
+    return z
 
 
-def drive(xp, law: LawNumbers, shape: Cells, twist) -> tuple[Any, ...]:
-    """Return the velocities that the cells see at a twist."""
-    twist = tuple(twist[..., k, None] for k in range(3))
-    return over(xp)(KINDS[len(shape.levers)].lever.seen)(_lever(shape), twist)
+def drive(xp, law: LawNumbers, shape: Cells, twist) -> tuple[Any]:
+    """Return the velocities that the cells see at a twist `[..., d, N]`, as a tuple of this array."""
+    seen = over(xp)(KINDS[len(shape.levers)].lever.seen)
+    return (joined(xp, seen(_numbers(shape)[0], split(twist[..., None]))),)
 
 
-def evaluate(xp, law: LawNumbers, shape: Cells, z, u):
+def evaluate(xp, law: LawNumbers, shape: Cells, z, by):
     """Return the rates of the bristles, and the tractions per unit load."""
-    return over(xp)(KINDS[len(shape.levers)].evaluate)(_law(law, shape), z, u)
+    return _bristle(xp, "evaluate", law, shape, z, *by)
 
 
-def advance(xp, law: LawNumbers, shape: Cells, z, u, dt):
+def advance(xp, law: LawNumbers, shape: Cells, z, by, dt):
     """Return the bristles after `dt` of a constant twist, and the tractions per unit load."""
-    return over(xp)(KINDS[len(shape.levers)].step)(_law(law, shape), z, u, dt)
+    return _bristle(xp, "step", law, shape, z, *by, dt)
 
 
 def wrench(xp, shape: Cells, pull):
     """Return the wrench about the origin per unit load `[..., 3]`."""
-    pull = tuple(shape.weights * each for each in pull)
-    found = over(xp)(KINDS[len(shape.levers)].lever.wrench)(_lever(shape), pull)
-    return xp.stack([each.sum(-1) for each in found], -1)
+    found = over(xp)(KINDS[len(shape.levers)].lever.wrench)(_numbers(shape)[0], split(shape.weights * pull))
+    return xp.concatenate([each.sum(-1) for each in found], -1)

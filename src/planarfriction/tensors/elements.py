@@ -1,15 +1,16 @@
 """Compiled functions over arrays: the source of a straight-line kernel, run on tensors.
 
-What is written once for a cell, of numbers, `kernels.discs` say, is also what a tensor library needs for all cells at
-once: vectors are tuples of arrays then, and `xp` is the library. Only functions that are not straight lines, or whose
-slopes at a kink have a rule of their own (see `kernels.rules`), have forms for arrays here.
+What is written once for one cell, of numbers, is also what a tensor library needs for all cells at once. Numbers become
+arrays `[..., 1, N]`, with the cells along the last axis; a vector is a `Vector`, or a tuple where the source names its
+components. Only functions that are not straight lines, or whose slopes at a kink have a rule of their own (see
+`kernels.rules`), have forms for arrays here.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
@@ -19,6 +20,29 @@ from planarfriction.kernels import bristle_step, rules, vectors
 
 ROUNDING = 256.0
 """Excess of a deflection over its cap, in units of the rounding error, that counts as rounding: see `bristle_step`."""
+
+
+class Vector:
+    """A vector whose components lie along the last axis but one of an array `[..., d, N]`: sums take one operation."""
+
+    def __init__(self, array: Any) -> None:
+        self.array = array
+
+    def __getitem__(self, i: int) -> Any:
+        return self.array[..., i : i + 1, :]
+
+    def __iter__(self) -> Iterator[Any]:
+        return (self[i] for i in range(self.array.shape[-2]))
+
+
+def split(array: Any) -> tuple[Any, ...]:
+    """Return the components of an array `[..., d, N]`, each `[..., 1, N]`."""
+    return tuple(Vector(array))
+
+
+def joined(xp: Any, vector: Any) -> Any:
+    """Return a vector as an array `[..., d, N]`."""
+    return vector.array if isinstance(vector, Vector) else xp.concatenate(xp.broadcast_arrays(*vector), -2)
 
 
 class _OverArrays(SimpleNamespace):
@@ -60,9 +84,16 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
     """Return functions that arrays take in another form, and these forms."""
 
     def plus(a: Any, c: Any, b: Any) -> Any:
+        if isinstance(a, Vector) and isinstance(b, Vector):
+            return Vector(a.array + c * b.array)
         return tuple(x + c * y for x, y in zip(a, b, strict=True))
 
+    def times(c: Any, a: Any) -> Any:
+        return Vector(c * a.array) if isinstance(a, Vector) else tuple(c * x for x in a)
+
     def dot(a: Any, b: Any) -> Any:
+        if isinstance(a, Vector) and isinstance(b, Vector):
+            return xp.dot(a.array, b.array, -2)
         first, *others = (x * y for x, y in zip(a, b, strict=True))
         return sum(others, first)
 
@@ -78,21 +109,22 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
         """Return the deflection where it is larger by more than rounding, else 0."""
         return xp.where(deflection > (1.0 + ROUNDING * xp.epsilon(deflection)) * largest, deflection, 0.0)
 
-    def disc_friction(_: Any, slide: Any, spin: Any, rest: float) -> Any:
+    def disc_friction(_: Any, slide: Any, spin: Any) -> Any:
         """Return `formulas.disc_friction` in a unit of speed that keeps squares and their slopes in range."""
+        rest = formulas.DISC_REST
         per = 1.0 / xp.stop_gradient(slide + spin + math.sqrt(rest))
-        return formulas.disc_friction(xp, per * slide, per * spin, rest * per * per)
+        return formulas.disc_friction_above(per * slide, per * spin, rest * per * per)
 
     return [
         (compiled_math, xp),
         (math, SimpleNamespace(sqrt=xp.root, inf=math.inf, pi=math.pi)),
         (vectors.plus, plus),
-        (vectors.times, lambda c, a: tuple(c * x for x in a)),
+        (vectors.times, times),
         (vectors.dot, dot),
         (vectors.square, lambda a: dot(a, a)),
         (formulas.disc_friction, disc_friction),
         (rules.per, per),
         (rules.ratio, ratio),
         (bristle_step.cap, lambda deflection, most: formulas.cap(xp, beyond(deflection, most), most)),
-        (bristle_step.reachable, lambda deflection, law: formulas.reachable_deflection(xp, beyond(deflection, 1.0), law)),
+        (bristle_step.reachable, lambda x, law: formulas.reachable_deflection(xp, beyond(x, 1.0), law)),
     ]

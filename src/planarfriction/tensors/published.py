@@ -1,6 +1,6 @@
-"""The published reduced model over `xp`: a bristle `[..., 3]`, as `kernels.published_step` steps it.
+"""The published reduced model over `xp`: a bristle `[..., 3]` that steps as `kernels.bristle_step` says.
 
-State and twist are `[..., 3]`; the parameters of law and shape and time steps are `[..., 1]`, or plain numbers.
+State and twist are `[..., 3]`; the parameters of law and shape and time steps are `[..., 1, 1]`, or plain numbers.
 """
 
 from __future__ import annotations
@@ -9,17 +9,18 @@ import functools
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from planarfriction import models
+from planarfriction import formulas, models
+from planarfriction.compiler import compiled_math
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import published_contact, published_step
-from planarfriction.kernels.contacts import traction
-from planarfriction.kernels.vectors import plus
+from planarfriction.kernels import bristle_step
+from planarfriction.kernels.bristle_step import seen
+from planarfriction.kernels.vectors import norm, plus
 from planarfriction.laws import FrictionLaw
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models.reduced_published import PublishedShape
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import surfaces
-from planarfriction.tensors.elements import over
+from planarfriction.tensors.elements import Vector, joined, over, split
 
 
 class PublishedNumbers(NamedTuple):
@@ -39,17 +40,18 @@ class PublishedNumbers(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """A twist, and what the limit surface makes of it; components `[..., 1]`."""
+    """Velocities that drive the bristle in scaled coordinates, `[..., 3, 1]`, and numbers `[..., 1, 1]`."""
 
-    x: Any
-    """`V_S`"""
-    y: Any
-    s: Any
-    omega: Any
-    u_x: Any
-    """`h(V) |V_S|`"""
-    u_y: Any
-    u_s: Any
+    velocity: Any
+    """`u = h(V) v_n` [m/s]"""
+    speed: Any
+    """`v_n` [m/s]"""
+    per_h: Any
+    """`1/|h|` [-]"""
+    grip: Any
+    """`sigma_0/g(v_n)` [1/m]"""
+    viscous: Any
+    """`U V`: velocity that viscous friction opposes."""
 
 
 def shape_of(patch: ContactPatch, law: FrictionLaw, surface: LimitSurface | None) -> PublishedShape:
@@ -66,7 +68,7 @@ def values_of(law: FrictionLaw, shape: PublishedShape) -> dict[str, float]:
 
 
 def numbers_of(xp, values: Mapping[str, Any], surface: Any, root: Any) -> PublishedNumbers:
-    """Return a shape at values of its parameters `[..., 1]`; `surface` has the `kind`, `size` and `data` of its law."""
+    """Return a shape at values of its parameters `[..., 1, 1]`; `surface` has its `kind`, `size` and `data`."""
     own = {name: values[name] for name in PublishedNumbers._fields[:4]}
     sliding = functools.partial(surfaces.sliding, xp, surface.kind, surface.size, surface.data)
     return PublishedNumbers(**own, surface=sliding, root=root)
@@ -78,7 +80,7 @@ def _through(root, x, y):
 
 def centre(shape: PublishedNumbers) -> tuple[Any, Any]:
     """Return the centre of pressure [m]."""
-    x, y = shape.centre_x[..., 0], shape.centre_y[..., 0]
+    x, y = shape.centre_x[..., 0, 0], shape.centre_y[..., 0, 0]
     if shape.root is None:
         return x, y
     (a, b), (_, d) = shape.root
@@ -87,7 +89,7 @@ def centre(shape: PublishedNumbers) -> tuple[Any, Any]:
 
 
 def scale(xp, shape: PublishedNumbers):
-    """Return `S = diag(1, 1, r)` as a vector `[..., 3]`."""
+    """Return `S = diag(1, 1, r)` as a vector `[..., 3, 1]`: bristles are scaled by 1/S for a step, their rates by S."""
     one = xp.ones_like(shape.contact_radius)
     return joined(xp, (one, one, shape.contact_radius))
 
@@ -95,45 +97,58 @@ def scale(xp, shape: PublishedNumbers):
 # ---------------------------------------------------------------------- steps
 
 
-def split(state) -> tuple[Any, ...]:
-    """Return a state as a vector of arrays `[..., 1]`."""
-    return tuple(state[..., k, None] for k in range(3))
+def wide(state):
+    """Return a state as a bristle `[..., 3, 1]`."""
+    return state[..., None]
 
 
-def joined(xp, z):
-    """Return a state, or a twist, of a vector of arrays."""
-    return xp.concatenate(xp.broadcast_arrays(*z), -1)
+def narrow(z):
+    """Return a bristle `[..., 3, 1]` as a state."""
+    return z[..., 0]
 
 
 def drive(xp, law: LawNumbers, shape: PublishedNumbers, twist) -> Drive:
     """Return the drive of the bristle at a twist."""
-    vx, vy, omega = split(twist)
-    twist = (*_through(shape.root, vx, vy), omega)
-    scaled = joined(xp, over(xp)(published_step.scaled_twist)(shape, twist))
-    u = shape.surface(scaled, xp.norm(scaled, -1))
-    return Drive(*split(scaled), omega, *split(u))
+    vx, vy, omega = split(wide(twist))
+    vx, vy = _through(shape.root, vx, vy)
+    vx, vy = vx - omega * shape.centre_y, vy + omega * shape.centre_x
+    scaled = joined(xp, (vx, vy, shape.contact_radius * omega))
+    speed = xp.norm(scaled, -2)
+    u = wide(shape.surface(narrow(scaled), narrow(speed)))
+    u_norm = xp.norm(u, -2)
+    slides = u_norm > 0.0
+    per_h = xp.where(slides, speed, 1.0) / xp.where(slides, u_norm, 1.0)
+    viscous = joined(xp, (vx, vy, shape.second_moment * omega))
+    return Drive(u, speed, per_h, law.sigma_0 / formulas.stribeck(xp, speed, law), viscous)
 
 
-def _evaluate(law, shape, twist, omega, u, z):
-    """Return the rate of the state and the wrench at V_S = `twist`, where the limit surface gives u."""
-    r = shape.contact_radius
-    scaled = z[0], z[1], z[2] / r
-    rate = plus(u, -published_contact._decay(law, scaled, u, twist), scaled)
-    fx, fy, fs = traction(law, scaled, rate, (twist[0], twist[1], shape.second_moment * omega / r))
-    return (rate[0], rate[1], r * rate[2]), (fx, fy, r * fs + shape.centre_x * fy - shape.centre_y * fx)
+def _rate(law, z, u, speed, per_h, grip):
+    """Return z' of the scaled bristle."""
+    deflection, along = seen(z, norm(z), u, per_h, grip)
+    return plus(u, -formulas.bristle_decay(compiled_math, deflection, along, speed, grip, law), z)
 
 
 def evaluate(xp, law: LawNumbers, shape: PublishedNumbers, z, by: Drive):
-    """Return the rate of the bristle, and the wrench per unit load."""
-    return over(xp)(_evaluate)(law, shape, by[:3], by.omega, by[4:], z)
+    """Return the rate of the bristle, and its pull (see `pull`)."""
+    s = scale(xp, shape)
+    rate = s * over(xp)(_rate)(law, Vector(z / s), Vector(by.velocity), *by[1:4]).array
+    return rate, pull(law, z, rate, by)
 
 
 def advance(xp, law: LawNumbers, shape: PublishedNumbers, z, by: Drive, dt):
-    """Return the bristle after `dt` of a constant twist, and the wrench per unit load."""
-    return over(xp)(published_step._step)(law, shape, by[:3], by.omega, by[4:], z, dt)
+    """Return the bristle after `dt` of a constant twist, and its pull (see `pull`)."""
+    s = scale(xp, shape)
+    new, k = over(xp)(bristle_step.step)(law, Vector(z / s), Vector(by.velocity), *by[1:4], dt)
+    rate = by.velocity - k * new.array
+    return s * new.array, pull(law, s * new.array, s * rate, by)
+
+
+def pull(law: LawNumbers, z, rate, by: Drive):
+    """Return the wrench per unit load about the centre of pressure, in the axes of the metric, `[..., 3, 1]`."""
+    return formulas.traction(z, rate, by.viscous, law)
 
 
 def wrench(xp, shape: PublishedNumbers, pull):
     """Return the wrench about the origin per unit load `[..., 3]`."""
-    fx, fy, tau = pull
-    return joined(xp, (*_through(shape.root, fx, fy), tau))
+    fx, fy, tau = split(pull)
+    return narrow(joined(xp, (*_through(shape.root, fx, fy), tau + shape.centre_x * fy - shape.centre_y * fx)))

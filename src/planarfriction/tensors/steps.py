@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
 
 from planarfriction import validation
 from planarfriction.derivatives.parameters import PARAMETERS
-from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import refuse_creep, refuse_fixed_stiffness, refuse_rate_law
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors.namespace import Namespace, broadcast, finite, non_negative, shaped
 from planarfriction.tensors.pressure import Pressed, centre_of, follow
-
-_REPLACED = "parts", "segments", "speeds", "load_error"
-"""Options that `ReducedModel` had."""
 
 LAW = PARAMETERS[:8]
 """Parameters of the friction law; the others describe the shape of the patch."""
@@ -35,25 +31,29 @@ class Contact(NamedTuple):
 def evaluate(xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, load: Any) -> tuple[Any, Any]:
     """Return the rate of the state, and the wrench `[..., 3]`."""
     by = equations.drive(xp, *contact, twist)
-    rate, pull = equations.evaluate(xp, *contact, equations.split(state), by)
-    return equations.joined(xp, rate), load[..., None] * equations.wrench(xp, contact.shape, pull)
+    rate, pull = equations.evaluate(xp, *contact, equations.wide(state), by)
+    return equations.narrow(rate), load[..., None] * equations.wrench(xp, contact.shape, pull)
 
 
 def step(
     xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, load: Any, dt: Any
 ) -> tuple[Any, Any]:
     """Return the state after `dt` [s] of a constant twist, and the wrench at the end; without load bristles relax."""
-    given, state = (contact.law.sigma_0, state, twist), equations.split(xp.widened(state))
+    given, z = (contact.law.sigma_0, state, twist), equations.wide(xp.widened(state))
     by = equations.drive(xp, *contact, xp.widened(twist))
-    new, pull = equations.advance(xp, *contact, state, by, dt[..., None])
-    new = equations.joined(xp, relaxed(xp, new, load))
-    return xp.narrowed(new, *given), xp.narrowed(load[..., None] * equations.wrench(xp, contact.shape, pull), *given)
+    new, pull = equations.advance(xp, *contact, z, by, inner(dt))
+    new, wrench = relaxed(xp, new, load), load[..., None] * equations.wrench(xp, contact.shape, pull)
+    return xp.narrowed(equations.narrow(new), *given), xp.narrowed(wrench, *given)
 
 
-def relaxed(xp: Any, z: Any, load: Any) -> tuple[Any, ...]:
-    """Return the bristles of contacts with load, and zeros for those without."""
-    loaded = load[..., None] > 0.0
-    return tuple(xp.where(loaded, each, 0.0) for each in z)
+def relaxed(xp: Any, z: Any, load: Any) -> Any:
+    """Return the bristles `[..., d, N]` of contacts with load, and zeros for those without."""
+    return xp.where(inner(load > 0.0), z, 0.0)
+
+
+def inner(value: Any) -> Any:
+    """Return one value for each contact `[...]` with axes of length 1 for those of its bristles."""
+    return value[..., None, None]
 
 
 class TensorModel:
@@ -74,11 +74,8 @@ class TensorModel:
     elasto_plastic: bool
 
     @staticmethod
-    def refuse(patch: ContactPatch, law: FrictionLaw, name: str, options: Iterable[str] = ()) -> None:
-        """Raise InvalidValueError unless patch, law and names of options are such that `name` can be made of them."""
-        for option in options:
-            if option in _REPLACED:
-                raise InvalidValueError(option, "be replaced by cells=n, the number of cells with bristles", "it")
+    def refuse(patch: ContactPatch, law: FrictionLaw, name: str) -> None:
+        """Raise InvalidValueError unless patch and law are ones that the model `name` can be made of."""
         validation.instance("patch", patch, ContactPatch, "a ContactPatch")
         refuse_rate_law(law, name)
         refuse_creep(law, name)
@@ -88,6 +85,11 @@ class TensorModel:
     def state_shape(self) -> tuple[int, ...]:
         """Shape of the state of one contact."""
         return (3,)
+
+    @property
+    def obstacle(self) -> str:
+        """Reason why compiled rollouts do not take the model, or an empty text."""
+        return ""
 
     def rest(self, batch: int | Sequence[int] = ()) -> Any:
         """Return the state of a contact at rest, or of a `batch`: `[*batch, *state_shape]`."""
@@ -144,7 +146,7 @@ class TensorModel:
 
     def _prepared(self, values: Mapping[str, Any]) -> Contact:
         """Return the model at physical values `[...]`."""
-        wide = {name: value[..., None] for name, value in values.items()}
+        wide = {name: inner(value) for name, value in values.items()}
         law = LawNumbers(**{name: wide[name] for name in LAW}, elasto_plastic=float(self.elasto_plastic))
         return Contact(law, self._shape(wide))
 

@@ -128,17 +128,16 @@ class FrictionModule(TensorModel, nn.Module):
         """
         equations, vector = self.equations, self._vector(parameters)
         of_step, contact = (self._prepared(self._named(values)) for values in (vector, vector[..., None, :]))
-        z, v, dt = equations.split(xp.widened(state)), xp.widened(twist), dt[..., None]
-        by = equations.drive(xp, *contact, v)
-        drives, pulls = zip(*(value.unbind(-2) for value in by), strict=True), []
+        z, dt = equations.wide(xp.widened(state)), steps.inner(dt)
+        by = equations.drive(xp, *contact, xp.widened(twist))
+        drives, pulls = zip(*(value.unbind(-3) for value in by), strict=True), []
         for drive, now in zip(drives, normal_force.unbind(-1), strict=True):
             new, pull = equations.advance(xp, *of_step, z, _like(by, drive), dt)
             pulls.append(pull)
             z = steps.relaxed(xp, new, now)
-        pull = tuple(torch.stack(each, -2) for each in zip(*pulls, strict=True))
-        wrenches = normal_force[..., None] * equations.wrench(xp, contact.shape, pull)
+        wrenches = normal_force[..., None] * equations.wrench(xp, contact.shape, torch.stack(pulls, -3))
         given = vector, state, twist
-        return xp.narrowed(equations.joined(xp, z), *given), xp.narrowed(wrenches, *given)
+        return xp.narrowed(equations.narrow(z), *given), xp.narrowed(wrenches, *given)
 
     # ------------------------------------------------------------------ inputs
 

@@ -74,6 +74,11 @@ class DistributedModel(FrictionModule):
         """Shape of the state of one contact, `(2, N)` of points, `(3, N)` of discs."""
         return distributed.KINDS[len(self.positions)].bristles, self.positions.shape[1]
 
+    @property
+    def obstacle(self) -> str:
+        """Reason why compiled rollouts do not take the model, or an empty text."""
+        return distributed.obstacle(self.positions)
+
     def compiled(self) -> Compiled:
         """Return the model as compiled rollouts take it."""
         return Compiled(functools.partial(pack_cells, self.elasto_plastic), (self.positions, self.weights))
@@ -167,6 +172,8 @@ class ReducedModel(DistributedModel):
         cells: int = Reference.cells,
         **options: Any,
     ):
-        self.refuse(patch, law, "torch.ReducedModel", options)
-        super().__init__(Reference(patch, law, cells=cells).reduction.patch, law, normal_force, **options)
+        self.refuse(patch, law, "torch.ReducedModel")
+        replaced = {name: options.pop(name) for name in Reference.REPLACED if name in options}
+        discs = Reference(patch, law, cells=cells, **replaced).reduction.patch
+        super().__init__(discs, law, normal_force, **options)
         self.patch = patch

@@ -119,7 +119,7 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         Raises InvalidValueError for what is not a tensor of numbers.
         """
         law, speed = self._contact_at(None).law, self._number("speed", speed)
-        return formulas.stribeck(xp, speed[..., None].abs(), law)[..., 0]
+        return formulas.stribeck(xp, speed[..., None, None].abs(), law)[..., 0, 0]
 
     def steady_state_z(self, v_scaled: Tensor) -> Tensor:
         """Return the bristles of steady sliding, `z_ss = S h g/sigma_0` `[..., 3]`, zero at rest.
@@ -131,7 +131,8 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         v_scaled = self._number("v_scaled", v_scaled)
         (law, shape), speed = self._contact_at(None), xp.norm(v_scaled, -1)
         h = shape.surface(v_scaled, speed) / torch.where(speed > 0.0, speed, 1.0)  # zero at rest
-        return published.scale(xp, shape) * h * formulas.stribeck(xp, speed, law) / law.sigma_0
+        most = formulas.stribeck(xp, published.wide(speed), law) / law.sigma_0
+        return published.narrow(published.scale(xp, shape) * published.wide(h) * most)
 
     def bristle_rate(self, z: Tensor, v: Tensor) -> Tensor:
         """Return `z_dot = S h |v_s| - sigma_0 |v_s|/g z` `[..., 3]` [m/s, m/s, m^2/s]."""
@@ -144,8 +145,9 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         """
         law, shape = self._contact_at(None)
         z, v, load = self._inputs(z, v, f_n)
-        by = published.drive(xp, law, shape, v)
-        return load[..., None] * published.wrench(xp, law, shape, z, self._number("z_dot", z_dot), by)
+        rate, by = published.wide(self._number("z_dot", z_dot)), published.drive(xp, law, shape, v)
+        pull = published.pull(law, published.wide(z), rate, by)
+        return load[..., None] * published.wrench(xp, shape, pull)
 
     def step(self, z: Tensor, v: Tensor, f_n: Tensor | float, dt: Tensor | float) -> tuple[Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the bristles after `dt` [s] of a constant twist, and the wrench at the end. Stable at any `dt`."""

@@ -43,7 +43,7 @@ def rollout(
     if twist.shape[-2] == 0:
         raise InvalidValueError("twist", "have T > 0 steps", f"shape {list(twist.shape)}")
     compiled = model.compiled()
-    obstacle = _obstacle(model, compiled, *inputs)
+    obstacle = model.obstacle or _obstacle(model, compiled, *inputs)
     if method == "adjoint" and obstacle:
         raise InvalidValueError("method", f"be 'eager' {obstacle}", repr(method))
     if method == "eager" or obstacle:

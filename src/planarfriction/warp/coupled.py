@@ -67,7 +67,7 @@ class CoupledPatches:
         which = [next(i for i, each in enumerate(known) if each is model) for model in self.models]
         if follows is not None and len(follows) != len(which):
             raise InvalidValueError("follows", f"hold one for each of {len(which)} models", len(follows))
-        kinds = [described(model) for model in known]
+        kinds = [described(model, precision) for model in known]
         pieces = [each.pieces for each in kinds]
         radii = [coupling.lever_of(model) or 1.0 for model in self.models]
         source = coupled_source_of(kinds, which, follows or [True] * len(which), radii, precision)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -29,7 +30,8 @@ class Model:
     ----------
     model
         A `ReducedModel`, `DistributedModel` or `ReducedModelPublished` with a law of LuGre bristles; or several that
-        are stepped by the same code, as `ReducedModel` of any patches is.
+        are stepped by the same code, as `ReducedModel` of any patches is: those of fewer cells have cells without load
+        behind their own, and states for these.
     contacts
         Number of contacts.
     which
@@ -63,14 +65,15 @@ class Model:
         self.contacts = validation.count("contacts", contacts, at_most=2**31 - 1)
         self.device, self.dtype = wp.get_device(device), dtype
         kinds = self._indices(which, len(models))
-        pieces = [described(each) for each in models]
-        sources = [source_of(each, arrays.precision_of(dtype)) for each in pieces]
+        precision, most = arrays.precision_of(dtype), max((each.state_shape for each in models), key=math.prod)
+        pieces = [described(each, precision, most[-1] if len(most) > 1 else 0) for each in models]
+        sources = [source_of(each, precision) for each in pieces]
         if any(each.text != sources[0].text for each in sources):
             raise InvalidValueError("model", "have one source, as all of `ReducedModel(patch, law)` do", "several")
         numbers = [{**each.pieces.parameters, "scale": 1.0} for each in pieces]
         self.names = tuple(numbers[0])
         """Parameters in the order of the columns of `parameters`."""
-        self.state_shape = (self.contacts, *models[0].state_shape)
+        self.state_shape = (self.contacts, *most)
         columns = {name: np.array([each[name] for each in numbers]) for name in self.names}
         differ = {name: each[kinds] for name, each in columns.items() if (each != each[0]).any()}
         rows = arrays.parameter_rows(numbers[0], differ | dict(parameters or {}), self.contacts)

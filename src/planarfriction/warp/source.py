@@ -38,13 +38,14 @@ class Described(NamedTuple):
     """True if the patch moves where their pressure cannot follow moments any further."""
 
 
-def described(model: FrictionModel) -> Described:
-    """Return the pieces of a model and the points that share its load.
+def described(model: FrictionModel, precision: str, count: int = 0) -> Described:
+    """Return the pieces of a model and the points that share its load, `count` of them if it has fewer cells.
 
     Raises InvalidValueError for models without source (see `export_c`).
     """
     points, words = model.compiled.points()
-    return Described(pieces_of(model), points, not words)
+    pieces = pieces_of(model, precision, count=count)
+    return Described(pieces, np.pad(points, [(0, pieces.count - len(points)), (0, 0)], mode="edge"), not words)
 
 
 def source_of(model: Described, precision: str) -> Source:

@@ -72,7 +72,6 @@ SAMPLES = 1_000_000
 
 MODELS: dict[str, Any] = {
     "reduced": lambda: ReducedModel(disc(), law()),
-    "parts1": lambda: ReducedModel(disc(), law(), parts=1),
     "published": lambda: ReducedModelPublished(disc(), law()),
 }
 """Models by the end of the benchmark's name."""

@@ -139,7 +139,7 @@ def _law(mu: float, sigma_0: float, sigma_1: float = 0.0) -> LuGre:
 
 def _pad(radius: float, mu: float, sigma_0: float) -> ReducedModel:
     pad = ContactPatch.disc(radius=radius, cells=21)
-    return ReducedModel(pad, _law(mu, sigma_0, math.sqrt(sigma_0) * 0.8), parts=1)
+    return ReducedModel(pad, _law(mu, sigma_0, math.sqrt(sigma_0) * 0.8))
 
 
 def _pads(place: str, geom: str, joint: str = "") -> str:
@@ -221,7 +221,7 @@ def disc(speed: float, spin: float) -> MujocoScene:
         0.3,
         0.0,
         (("disc", ("floor", "disc")),),
-        ReducedModel(ContactPatch.disc(radius=0.1, cells=31), _law(0.3, 1e5), parts=1),
+        ReducedModel(ContactPatch.disc(radius=0.1, cells=31), _law(0.3, 1e5)),
         lambda t: (),
         time=1.2,
         weightless=False,
@@ -247,7 +247,7 @@ def plate(load: Literal[1, 2] = 1) -> MujocoScene:
     <site name="upper" pos="0 0 -0.01"/></body></worldbody>
     <actuator><motor joint="press"/></actuator>"""
     force, pads = in_hand_load(load), (("lower", ("lower", "plate")), ("upper", ("upper", "plate")))
-    own = ReducedModel(ContactPatch.disc(radius=0.01, cells=21), LuGre(mu_s=1.2, elasto_plastic=0.9), parts=1)
+    own = ReducedModel(ContactPatch.disc(radius=0.01, cells=21), LuGre(mu_s=1.2, elasto_plastic=0.9))
     control = lambda t: (float(force(t)),)  # noqa: E731
     # solref: the pads press with what the motor gives
     return MujocoScene(body, 1.0, 2e-2 / 3.0, pads, own, control, time=2.0, solref=0.004)

@@ -67,10 +67,10 @@ def published_call(full: bool) -> Measurement:
     return line(_python_step(model, 2000) * 1e6, "us", "one Python call of rate", rate * 1e6)
 
 
-def reduced_loop(full: bool, parts: int | None = None) -> Measurement:
-    """Measure a step of `ReducedModel` in a compiled loop; with `parts`, of its moments."""
+def reduced_loop(full: bool, cells: int = ReducedModel.cells) -> Measurement:
+    """Measure a step of `ReducedModel` in a compiled loop."""
     twists = mixed_twists(20_000)
-    models = ReducedModel(disc(), law(), parts=parts), ReducedModelPublished(disc(), law())
+    models = ReducedModel(disc(), law(), cells=cells), ReducedModelPublished(disc(), law())
     ours, theirs = (_compiled_loop(model, twists) for model in models)
     return line(ours / len(twists) * 1e6, "us", AGAINST_PUBLISHED, theirs / len(twists) * 1e6)
 

@@ -7,14 +7,12 @@ import subprocess
 import sys
 from typing import Any, Literal
 
-import numpy as np
-
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch, SoftFinger
 from planarfriction.scenes import Scene, Solution, in_hand, in_hand_load, simulate
 from planarfriction.scenes.ready import IN_HAND_LOADS
 from planarfriction_studies.bench.baselines import lsoda_time
-from planarfriction_studies.bench.measurement import Measurement, disc, law, line, median, once
+from planarfriction_studies.bench.measurement import Measurement, disc, law, line, median
 
 WINDOW = 0.1
 """Part of the in-hand run [s] that the general solver is given where the whole run would take it minutes."""
@@ -57,9 +55,9 @@ def published(full: bool, load: Literal[1, 2] = 1) -> Measurement:
     return line(value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end))
 
 
-def reduced(full: bool, parts: int | None = None) -> Measurement:
+def reduced(full: bool) -> Measurement:
     """Measure `ReducedModel`."""
-    models = ReducedModel(disc(), law(), parts=parts), ReducedModelPublished(disc(), law())
+    models = ReducedModel(disc(), law()), ReducedModelPublished(disc(), law())
     value, theirs = (_solver_time(in_hand(model), 9)[0] for model in models)
     return line(value, "s", "the published reduced model", theirs)
 
@@ -70,24 +68,12 @@ def _soft() -> ContactPatch:
     return ContactPatch.rectangle(0.02, cells=21, pressure=finger)
 
 
-def load_family(full: bool) -> Measurement:
-    """Measure a run with maps of a load family beside one with a fixed map, in turns: noise disturbs both alike."""
+def reduced_load_dependent(full: bool) -> Measurement:
+    """Measure `ReducedModel` with shares that follow the load beside fixed ones."""
     soft = _soft()
     fixed = ContactPatch(soft.positions, soft.areas, soft.weights(IN_HAND_LOADS[1, 1][0]), soft.grid)
-    family, rebuilt = ReducedModel(soft, law(), parts=1), ReducedModel(soft, law(), parts=1, load_error=0.0)
-    scenes = [in_hand(family), in_hand(ReducedModel(fixed, law(), parts=1))]
-    simulate(scenes[1], t_end=0.02)
-    built = once(lambda: simulate(scenes[0]))
-    every = once(lambda: simulate(in_hand(rebuilt)))
-    times = np.array([[once(lambda scene=scene: simulate(scene)) for scene in scenes] for _ in range(25)])
-    value, theirs = np.median(times, axis=0).tolist()
-    moments: Any = family.reduction
-    maps = len(moments.load_rungs)
-    words = (
-        f"the same with a fixed shape (both: all of simulate); building the family's {maps} maps "
-        f"first took {built:.2g} s; with a map built for every load, the run takes {every:.2g} s"
-    )
-    return line(value, "s", words, theirs)
+    value, theirs = (_solver_time(in_hand(ReducedModel(patch, law())), 9)[0] for patch in (soft, fixed))
+    return line(value, "s", "the same with a fixed shape", theirs)
 
 
 def load_dependent(full: bool) -> Measurement:

@@ -90,7 +90,7 @@ def identification_times(model: str) -> tuple[float, float]:
     """Return seconds of a fit of eight parameters, with all nuisance parameters and without, after one to compile."""
     patch = ContactPatch.disc(0.01, cells=21)
     law = LuGre(0.5, 0.65, 2e-3, 2e4, 30.0, 0.8, 1.4, ElastoPlastic(0.9))
-    contact = (DistributedModel if model == "distributed" else ReducedModelPublished)(patch.compressed(), law)
+    contact = (DistributedModel if model == "distributed" else ReducedModelPublished)(patch.discs(24), law)
     log = _log(contact, DURATION)
     identify_lugre(_log(contact, 0.1), patch, model=model, options=FitOptions(starts=1))
     times = []

@@ -43,7 +43,7 @@ EXPERIMENTS = {
         ("load-dependent", "A contact pressure that follows the load"),
         ("convergence", "Convergence in the number of cells and of table segments"),
         ("timing", "Time, and work against precision"),
-        ("beyond", "Beyond the paper: exact surfaces, moments, few cells, loads and grooves"),
+        ("beyond", "Beyond the paper: exact surfaces, few discs, loads and grooves"),
     )
 }
 """Experiment by name, in the order of the paper, and what goes beyond it."""

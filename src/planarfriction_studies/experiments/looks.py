@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from planarfriction.plots import style
-from planarfriction.plots.style import DISTRIBUTED, ELLIPSOID, EXACT, FEW, MOMENTS, PARTS, PlotFigure
+from planarfriction.plots.style import DISTRIBUTED, ELLIPSOID, EXACT, FEW, PlotFigure
 from planarfriction_studies.experiments import facts
 
-__all__ = ["DISTRIBUTED", "ELLIPSOID", "EXACT", "FEW", "MOMENTS", "PARTS", "QUARTIC", "REDUCED"]
+__all__ = ["DISTRIBUTED", "ELLIPSOID", "EXACT", "FEW", "QUARTIC", "REDUCED"]
 
 REDUCED, QUARTIC = style.PUBLISHED, style.OTHER
 

@@ -16,7 +16,7 @@ from planarfriction_studies.measured.tasks import TASKS
 DRAWN = ("uncoupled", "ellipsoid", "exact surface", "toss by toss")
 """Models of an example, where they took part, besides those of the user."""
 
-COLOURS: dict[str, str] = dict(zip(DRAWN, (style.OTHER, style.ELLIPSOID, style.EXACT, style.PARTS), strict=True))
+COLOURS: dict[str, str] = dict(zip(DRAWN, (style.OTHER, style.ELLIPSOID, style.EXACT, style.PUBLISHED), strict=True))
 """Model -> its colour; the others take what is left, one after the other."""
 
 
@@ -198,7 +198,7 @@ def _draw_onsets(part: Any, benchmark: Benchmark) -> None:
     test, axes = benchmark.test("onsets"), part.subplots()
     results = benchmark.results["onsets"]
     name = next((name for name in ("distributed", "reduced") if name in results), list(results)[-1])
-    for board, colour in (("feet", style.OTHER), ("flat", style.PARTS)):
+    for board, colour in (("feet", style.OTHER), ("flat", style.PUBLISHED)):
         rows = [i for i, case in enumerate(test) if case.board == board]
         pairs = np.array([[results[name].answers[i][3], test[i].answer[3]] for i in rows])
         axes.plot(*pairs.T, ".", color=colour, label=board)

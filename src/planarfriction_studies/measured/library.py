@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable
-from functools import partial
 from typing import Any, NamedTuple
 
 from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceExact, LimitSurfaceQuartic
@@ -37,7 +36,7 @@ LIBRARY = {
     "quartic": Entry(lambda: SurfaceModel(LimitSurfaceQuartic), "a convex quartic of the patch", "cvxpy", "quartic"),
     "quartic of pushes": Entry(PushedQuartic, "a convex quartic fitted to the training pushes", "cvxpy", "quartic"),
     "exact surface": Entry(lambda: SurfaceModel(LimitSurfaceExact), "the limit surface of the patch itself"),
-    "reduced": Entry(lambda: BristleModel(partial(ReducedModel, parts=1)), "ReducedModel in one part, stiff bristles"),
+    "reduced": Entry(lambda: BristleModel(ReducedModel), "ReducedModel, stiff bristles"),
     "distributed": Entry(lambda: BristleModel(DistributedModel), "DistributedModel, stiff bristles"),
     "mu(v) and radius": Entry(SpeedModel, "exact surface, friction that grows with speed, fitted radius (slides only)"),
     "toss by toss": Entry(TossModel, "the same with the friction, radius and centre of each toss (slides only)"),

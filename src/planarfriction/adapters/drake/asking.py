@@ -103,7 +103,7 @@ class Asking:
                     self._learn(wrench - row.guess, twist - row.free_twist, load - row.free_load)
             turned = self._moved.T @ (wrench @ self._rows - force)  # the axes have, since the last step
             row.free_twist[:], row.free_load[:], row.guess[:], row.state[:] = twist + turned, load, wrench, bristles
-            row.moments[:] = np.einsum("kij,kj->ki", self._moments, pushes).ravel()
+            row.moments[:] = (self._moments @ pushes[:, :, None]).ravel()
             iterations += row.solve()
             np.copyto(row.follows, -abs(row.follows))  # pressures stay for the rest of the step
             change, wrench, solved = row.wrench - wrench, row.wrench.copy(), True

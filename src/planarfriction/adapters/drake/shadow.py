@@ -6,7 +6,8 @@ Discrete plants sample their forces before a step and their contacts at its end:
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import operator
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,9 @@ from pydrake.systems.framework import DiagramBuilder
 
 from planarfriction.adapters.drake.patches import Placed
 from planarfriction.errors import InvalidValueError
+
+
+_ORIGIN = np.zeros(3)
 
 
 class Shadow:
@@ -47,8 +51,10 @@ class Shadow:
             for own, other in each.pairs:
                 self._pairs[other, own], self._pairs[own, other] = (p, 1.0), (p, -1.0)
         self._solve = dposv  # the one of NumPy takes as long as a contact
+        self._world = self.plant.world_frame()
         self._points: list[tuple[int, int, float]] = []
         self._surfaces: list[tuple[int, int, float]] = []
+        self._pressed: list[list[tuple[float, list[float]]]] = []
 
     def begin(self, state: np.ndarray, driven: dict[str, Any]) -> None:
         """Go to the beginning of a step, with what drives the plant besides generalized forces."""
@@ -77,36 +83,39 @@ class Shadow:
         results = self._contacts()
         if first:
             self._find(results)
-        forces = np.zeros((len(self._frames), 6))
+        self._pressed = [[] for _ in self._frames]
+        forces = [[0.0] * 6 for _ in self._frames]
         for i, p, sign in self._points:
             info = results.point_pair_contact_info(i)
-            force, place = info.contact_force(), info.contact_point()
-            forces[p, :3] += sign * force
-            forces[p, 3:] += sign * _cross(place, force)
+            force, place = info.contact_force().tolist(), info.contact_point().tolist()
+            self._pressed[p].append((math.hypot(*force), place))
+            _add(forces[p], sign, force, _cross(place, force))
         for i, p, sign in self._surfaces:
             info = results.hydroelastic_contact_info(i)
-            spatial, place = info.F_Ac_W(), info.contact_surface().centroid()
-            forces[p, :3] -= sign * spatial.translational()
-            forces[p, 3:] -= sign * (spatial.rotational() + _cross(place, spatial.translational()))
-        return forces
+            spatial, place = info.F_Ac_W(), info.contact_surface().centroid().tolist()
+            force, moment = spatial.translational().tolist(), spatial.rotational().tolist()
+            self._pressed[p].append((math.hypot(*force), place))
+            _add(forces[p], -sign, force, map(operator.add, moment, _cross(place, force)))
+        return np.array(forces)
 
-    def rows(self, p: int, force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def rows(self, p: int, force: np.ndarray) -> tuple[np.ndarray, list[float], list[list[float]]]:
         """Return the Jacobian of the twist of a patch `[3, nv]`, in the axes of its frame, the normal, and moments.
 
         These are the maps `[2, 6]` of what `pushes` returns to (m_x, m_y) about the origin of the patch.
         """
-        normal = force / math.sqrt(force @ force)
-        frame, world, origin = self._frames[p], self.plant.world_frame(), np.zeros(3)
-        x = frame.CalcRotationMatrixInWorld(self._begin).matrix()[:, 0]
-        x = x - normal * (x @ normal)
-        x /= math.sqrt(x @ x)
+        pose = self._frames[p].CalcPoseInWorld(self._begin)
+        turned, place, origin = pose.rotation().matrix(), pose.translation(), _ORIGIN
         if self._centres[p] == "contact":
-            origin = frame.CalcPoseInWorld(self._begin).inverse().multiply(self._centre(p))
-        measured = JacobianWrtVariable.kV, frame, origin, self._others[p], world
+            centre = self._centre(p)
+            origin, place = turned.T @ (centre - place), centre
+        x, normal, place = turned[:, 0].tolist(), _unit(force.tolist()), place.tolist()
+        along = sum(map(operator.mul, x, normal))
+        x = _unit([a - along * b for a, b in zip(x, normal, strict=True)])
+        y = _cross(normal, x)
+        measured = JacobianWrtVariable.kV, self._frames[p], origin, self._others[p], self._world
         spatial = self.plant.CalcJacobianSpatialVelocity(self._begin, *measured)
-        y, place = _cross(normal, x), frame.CalcPoseInWorld(self._begin).multiply(origin)
-        moments = np.array([np.concatenate([_cross(place, x), x]), np.concatenate([_cross(place, y), y])])
-        return np.array([x @ spatial[3:], y @ spatial[3:], normal @ spatial[:3]]), normal, moments
+        seen = np.array([[0.0, 0.0, 0.0, *x], [0.0, 0.0, 0.0, *y], [*normal, 0.0, 0.0, 0.0]])
+        return seen @ spatial, normal, [[*_cross(place, x), *x], [*_cross(place, y), *y]]
 
     def moved(self, jacobian: np.ndarray) -> np.ndarray:
         """Return the velocities that wrenches cause in a step without contact `[nv, 3k]`: `dt (M + dt D)^-1 J'`."""
@@ -136,24 +145,27 @@ class Shadow:
 
     def _centre(self, p: int) -> np.ndarray:
         """Return the centre of the contacts of a patch, weighted by their forces."""
-        results, places, weights = self._contacts(), [], []
-        for i, owner, _ in self._points:
-            if owner == p:
-                info = results.point_pair_contact_info(i)
-                places.append(info.contact_point())
-                weights.append(np.linalg.norm(info.contact_force()))
-        for i, owner, _ in self._surfaces:
-            if owner == p:
-                info = results.hydroelastic_contact_info(i)
-                places.append(info.contact_surface().centroid())
-                weights.append(np.linalg.norm(info.F_Ac_W().translational()))
-        return np.average(places, axis=0, weights=weights)
+        total = sum(force for force, _ in self._pressed[p])
+        return np.array([sum(force * place[i] for force, place in self._pressed[p]) / total for i in range(3)])
 
 
-def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return the cross product, which NumPy's own takes as long for as a contact."""
-    (a, b, c), (d, e, f) = one.tolist(), other.tolist()
-    return np.array([b * f - c * e, c * d - a * f, a * e - b * d])
+# NumPy's own functions of three numbers take as long as a contact.
+
+
+def _cross(one: Sequence[float], other: Sequence[float]) -> list[float]:
+    (a, b, c), (d, e, f) = one, other
+    return [b * f - c * e, c * d - a * f, a * e - b * d]
+
+
+def _unit(vector: Sequence[float]) -> list[float]:
+    size = math.hypot(*vector)
+    return [each / size for each in vector]
+
+
+def _add(total: list[float], sign: float, force: Sequence[float], moment: Iterable[float]) -> None:
+    """Add a force and its moment to a total of six numbers, in place."""
+    for i, each in enumerate((*force, *moment)):
+        total[i] += sign * each
 
 
 def _damping(plant: Any) -> np.ndarray:

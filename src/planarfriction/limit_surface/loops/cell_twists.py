@@ -1,6 +1,7 @@
 """Twists of wrenches for sums over cells: the least dissipation, whose minimum often lies on a kink.
 
-A cell sees `u = C V` of a scaled twist: in the plane `target . V = 1` `u = c + a d + b e` at the place `(a, b)`.
+A cell sees `u = C V` of a scaled twist: in the plane `target . V = 1` `u = c + a d + b e` at the place `(a, b)`. Cells
+that are discs have a third row in C, and no kink.
 """
 
 from __future__ import annotations
@@ -10,7 +11,9 @@ import math
 import numpy as np
 
 from planarfriction.compiler import jit, kernel
-from planarfriction.kernels.vectors import dot, plus
+from planarfriction.kernels.derive import derive
+from planarfriction.kernels.discs import sliding
+from planarfriction.kernels.vectors import dot, plus, times
 from planarfriction.limit_surface.loops.twists import lean_of, newton_move, of_each, plane
 
 _BALANCED = 1e-13
@@ -39,11 +42,43 @@ _MOST_STEPS = 60
 
 
 @kernel
+def _pull(u):
+    """Return the friction `W/S` of a disc."""
+    c_t, c_s, speed, pull = sliding(u)
+    return times(1.0 / speed, pull)
+
+
+_PULL = derive(_pull, ("u",), ("u",))
+_FORTH, _BACK = _PULL.forth, _PULL.back
+
+
+@kernel
+def _of_disc(seen, i, a, b):
+    """Return slope and Hessian of the mean speed of a disc at a place, and that speed."""
+    along_a, along_b = (seen[2, i], seen[3, i], seen[7, i]), (seen[4, i], seen[5, i], seen[8, i])
+    u = plus(plus((seen[0, i], seen[1, i], seen[6, i]), a, along_a), b, along_b)
+    (pull,), tape = _FORTH(u)
+    (by_a,), (by_b,) = _BACK(tape, (along_a,)), _BACK(tape, (along_b,))
+    slopes = dot(pull, along_a), dot(pull, along_b)
+    return slopes, (dot(by_a, along_a), dot(by_a, along_b), dot(by_b, along_b)), dot(pull, u)
+
+
+@kernel
+def _is_disc(seen, i):
+    return seen[6, i] != 0.0 or seen[7, i] != 0.0 or seen[8, i] != 0.0
+
+
+@kernel
 def _rounded(seen, weights, by_lean, a, b, rounding):
     """Return slope and Hessian of `sum w_i sqrt(|u_i|^2 + rounding^2)`, with the share of the asymmetry, at a place."""
     ga, gb, aa, ab, bb = by_lean[0], by_lean[1], 0.0, 0.0, 0.0
     for i in range(weights.shape[0]):
         ax, ay, bx, by = seen[2, i], seen[3, i], seen[4, i], seen[5, i]
+        if _is_disc(seen, i):
+            slope, bend, _ = _of_disc(seen, i, a, b)
+            ga, gb = ga + weights[i] * slope[0], gb + weights[i] * slope[1]
+            aa, ab, bb = aa + weights[i] * bend[0], ab + weights[i] * bend[1], bb + weights[i] * bend[2]
+            continue
         ux, uy = seen[0, i] + a * ax + b * bx, seen[1, i] + a * ay + b * by
         square = ux * ux + uy * uy + rounding * rounding
         pull = weights[i] / math.sqrt(square)
@@ -85,6 +120,9 @@ def _unborne(seen, weights, a, b, ga, gb):
     """Return what is left of a slope after the slowest cell, if it rests, has taken its share; and the dissipation."""
     slowest, rests, power = math.inf, 0, 0.0
     for i in range(weights.shape[0]):
+        if _is_disc(seen, i):
+            power += weights[i] * _of_disc(seen, i, a, b)[2]
+            continue
         ux, uy = seen[0, i] + a * seen[2, i] + b * seen[4, i], seen[1, i] + a * seen[3, i] + b * seen[5, i]
         speed = math.sqrt(ux * ux + uy * uy)
         power += weights[i] * speed
@@ -105,12 +143,14 @@ def _unborne(seen, weights, a, b, ga, gb):
 
 @kernel
 def _in_cells(surface, target):
-    levers, weights, lean, seen = surface
+    levers, spins, weights, lean, seen = surface
     first, second = plane(target)
     for i in range(weights.shape[0]):
         for k in range(2):
             c = (levers[k, 0, i], levers[k, 1, i], levers[k, 2, i])
             seen[k, i], seen[2 + k, i], seen[4 + k, i] = dot(c, target), dot(c, first), dot(c, second)
+        spin = spins[i]
+        seen[6, i], seen[7, i], seen[8, i] = spin * target[2], spin * first[2], spin * second[2]
     by_lean = (dot(lean, first), dot(lean, second))
     a, b, ga, gb, rounding = 0.0, 0.0, 0.0, 0.0, 1.0
     while rounding > 2.0 * _LAST:
@@ -124,11 +164,11 @@ def _in_cells(surface, target):
 
 
 @jit
-def cell_twists(levers, weights, frame, wrenches, twists):
-    """Find twists with `of_each` for cells, whose C are `levers [2, 3, n]`.
+def cell_twists(levers, spins, weights, frame, wrenches, twists):
+    """Find twists with `of_each` for cells, whose C are `levers [2, 3, n]`, and of discs `(0, 0, spins [n])`.
 
     The kinks are rounded off by a speed that shrinks to nothing, where plain Newton steps would stall on them. A cell
     that rests bears any force up to its friction: a wrench is reached if one such force makes up for what is missing.
     """
-    surface = levers, weights, lean_of(frame), np.empty((6, weights.shape[0]))
+    surface = levers, spins, weights, lean_of(frame), np.empty((9, weights.shape[0]))
     return of_each(_in_cells, surface, frame, wrenches, twists)

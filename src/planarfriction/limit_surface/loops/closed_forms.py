@@ -26,7 +26,7 @@ import numpy as np
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
-from planarfriction.kernels.vectors import accumulate, put_all
+from planarfriction.kernels.vectors import accumulate, plus, put_all
 
 POINTS, SEGMENTS, QUADS = 1, 2, 4
 """Kinds of elements by their number of corners; a triangle is a quad with two corners in one place."""
@@ -48,10 +48,12 @@ class Elements(NamedTuple):
 
 
 class Discs(NamedTuple):
-    """Evenly loaded discs about the centre of pressure; a hole has a negative load."""
+    """Evenly loaded discs; a hole has a negative load."""
 
     radii: np.ndarray
     """`[K]`."""
+    places: np.ndarray
+    """Middles of the discs `[2, K]`."""
     loads: np.ndarray
     """Shares of the load of the discs, `[K]`."""
 
@@ -285,25 +287,32 @@ def _ratio(v, q):
 @kernel
 def disc_sum(discs, x, y, s):
     """Compute as `element_sum` for evenly loaded discs, in closed form (docs/physics.md, "Exact limit surfaces")."""
-    v = math.sqrt(x * x + y * y)
-    spin, along, across, twirl = 0.0, 0.0, 0.0, 0.0
+    total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(discs.radii.shape[0]):
-        radius = discs.radii[k]
-        q = abs(s) * radius
+        radius, px, py = discs.radii[k], discs.places[0, k], discs.places[1, k]
+        ux, uy = x - s * py, y + s * px
+        v, q = math.sqrt(ux * ux + uy * uy), abs(s) * radius
         large, ratio, complement = _ratio(v, q)
         b, d, c = _elliptic(complement)
         e, w = complement * d, discs.loads[k] * 4.0 / (math.pi * large)
-        across += w * (2.0 * b + e) * (1.0 / 3.0)
         if v < q:
             by_spin = b * (3.0 - ratio * ratio) + e * (3.0 - 2.0 * ratio * ratio)
             curve = b + 2.0 * e
         else:
             by_spin, curve = 3.0 * b + c - d, d - c
-        spin += w * by_spin * radius * radius * (1.0 / 9.0)
         curve *= w / (3.0 * large * large)
-        along += curve * q * q
-        twirl += curve * radius * radius
-    return _axial(x, y, s, v, across, spin, along, twirl)
+        across, spin = w * (2.0 * b + e) * (1.0 / 3.0), w * by_spin * radius * radius * (1.0 / 9.0)
+        own = _axial(ux, uy, s, v, across, spin, curve * q * q, curve * radius * radius)
+        total = plus(total, 1.0, _about_origin(own, px, py))
+    return total
+
+
+@kernel
+def _about_origin(sums, px, py):
+    """Return gradient and second derivatives by the twist at the origin, from those by the twist at (px, py)."""
+    fx, fy, fs, xx, xy, xs, yy, ys, ss = sums
+    x_turn, y_turn = px * xy - py * xx + xs, px * yy - py * xy + ys
+    return fx, fy, fs + px * fy - py * fx, xx, xy, x_turn, yy, y_turn, px * (y_turn + ys) - py * (x_turn + xs) + ss
 
 
 @jit

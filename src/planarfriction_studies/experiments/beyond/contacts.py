@@ -14,7 +14,8 @@ from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, friction_metri
 from planarfriction.scenes import Body, Contact, Scene
 from planarfriction.scenes.ready import GRAVITY, drift
 from planarfriction_studies.experiments.drift.run import TORQUE, WIDTH
-from planarfriction_studies.experiments.experiment import Comparison, compare, compare_all
+from planarfriction_studies.experiments.experiment import Comparison, compare_all
+from planarfriction_studies.experiments.in_hand.runs import end_distance
 from planarfriction_studies.experiments.load_dependent.run import soft_patch
 from planarfriction_studies.experiments.runs import LAW, simulated
 
@@ -39,13 +40,13 @@ HELD_MODELS = {
 }
 
 SHARE = 1e-3
-"""Tolerance of the plateau of `ReducedModel` against the distributed model's, as a share of it."""
+"""Tolerance of a plateau against its closed form, as a share of it."""
 
 TIME, QUICK_TIME = 2.0, 0.05
 """End of the in-hand run with the soft finger [s]: the load changes every 0.01 s."""
 
 LOADS = (0.83, 1.37)
-"""Loads at which steady wrenches from blended maps are compared with those of maps built at the load [N]."""
+"""Loads at which steady wrenches of few discs are compared with those of all cells [N]."""
 
 
 def metric() -> np.ndarray:
@@ -105,40 +106,43 @@ def plateaus() -> dict[str, float]:
     for name, model in HELD_MODELS.items():
         scene = drift(model(patch, LAW), load="normal", t_end=1.0)
         result[name] = float(simulated(scene, rtol=1e-7, atol=3e-7)["theta"][-1])
-    return result | {"closed form": TORQUE / (LAW.sigma_0 * GRAVITY * float(patch.second_moment()))}
+    moments = {"closed form": patch.second_moment(), "closed form, discs": patch.discs().second_moment()}
+    return result | {name: TORQUE / (LAW.sigma_0 * GRAVITY * float(moment)) for name, moment in moments.items()}
 
 
 def plateau_comparisons(angles: dict[str, float]) -> list[Comparison]:
-    """Compare plateaus with the distributed model and the closed form."""
-    stiff = (
+    """Compare plateaus with the closed forms: of cells as points, and of cells that have an extent."""
+    cause = (
         r"The same torsional stiffness, $\sigma_0 \langle\rho^2\rangle$; what is left is that bristles near the "
-        "threshold give way."
+        "threshold give way, and the tolerance of the solver."
     )
-    settled = "Bristles that are not yet at rest, and the tolerance of the solver."
-    ours, whole, exact = (angles[name] for name in ("ReducedModel", "distributed", "closed form"))
-    words = "torsional plateau, ReducedModel"
-    beside = compare(f"{words} beside distributed", ours, whole, "converged", SHARE * whole, "rad", stiff)
-    return [beside, compare(words, ours, exact, "closed form", SHARE * exact, "rad", settled)]
+    rows = (("distributed", "closed form"), ("ReducedModel", "closed form, discs"))
+    return compare_all(
+        "closed form",
+        (
+            (f"torsional plateau, {name}", angles[name], angles[exact], SHARE * angles[exact], "rad", cause)
+            for name, exact in rows
+        ),
+    )
 
 
-def load_family(quick: bool) -> dict[str, float]:
-    """Compute the number of maps that one part of `ReducedModel` builds in the in-hand run of a finger whose pressure
-    flattens with the load (k = 2 f_N), and the error of blending them.
+def soft_finger(quick: bool) -> dict[str, float]:
+    """Compare discs with all cells of a finger whose pressure flattens with the load (k = 2 f_N).
 
-    That is the largest distance of steady wrenches at 1 N [N, N m] from a model that builds a map at every load (at
-    few loads, for it is slow).
+    Returned are the end of an in-hand run [s], distances of ends from the distributed model's there [m], and the
+    largest difference of steady wrenches at 1 N [N, N m].
     """
     patch, t_end = soft_patch(2), QUICK_TIME if quick else TIME
-    model, rebuilt = ReducedModel(patch, LAW, parts=1), ReducedModel(patch, LAW, parts=1, load_error=0.0)
-    moments: Any = model.reduction
-    scenes.simulate(scenes.in_hand(model), t_end=t_end)
-    maps = len(moments.load_rungs)
-    apart = np.array([_steady_apart(model, rebuilt, load) for load in LOADS]).max(axis=0)
+    whole, few = DistributedModel(patch, LAW), ReducedModel(patch, LAW)
+    models = {"distributed": whole, "reduced": few, "published": ReducedModelPublished(patch, LAW)}
+    ended = {name: simulated(scenes.in_hand(model), t_end=t_end) for name, model in models.items()}
+    apart = np.array([_steady_apart(few, whole, load) for load in LOADS]).max(axis=0)
     return {
-        "maps": maps,
         "end [s]": t_end,
-        "force from rebuilding [N]": float(apart[:2].max()),
-        "torque from rebuilding [N m]": float(apart[2]),
+        "reduced [m]": end_distance(ended["reduced"], ended["distributed"]),
+        "published [m]": end_distance(ended["published"], ended["distributed"]),
+        "steady force [N]": float(apart[:2].max()),
+        "steady torque [N m]": float(apart[2]),
     }
 
 
@@ -146,5 +150,5 @@ def _steady_apart(model: Any, rebuilt: Any, load: float) -> np.ndarray:
     """Return the largest difference `[3]` of steady wrenches at 1 N between two models at a load [N]."""
     generator = np.random.default_rng(3)
     twists = generator.normal(size=(200, 3)) * [1.0, 1.0, 150.0] * 10.0 ** generator.uniform(-4.0, -1.5, (200, 1))
-    wrenches = [each.step(np.zeros((200, 3)), twists, load, 10.0)[1] for each in (model, rebuilt)]
+    wrenches = [each.step(np.zeros((200, *each.state_shape)), twists, load, 10.0)[1] for each in (model, rebuilt)]
     return np.abs(wrenches[0] - wrenches[1]).max(axis=0) / load

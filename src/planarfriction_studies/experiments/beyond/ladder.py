@@ -1,4 +1,4 @@
-"""Errors and costs of models with 3 to 882 bristle states, in hand and moved with a given velocity."""
+"""Errors and costs of models with 3 to 951 bristle states, in hand and moved with a given velocity."""
 
 from __future__ import annotations
 
@@ -21,14 +21,16 @@ from planarfriction_studies.experiments.in_hand.runs import Case
 from planarfriction_studies.experiments.runs import IN_WORDS, LAW, SIX_SHAPES, at_centre_of_pressure, simulated
 from planarfriction_studies.experiments.velocity_driven import boxes
 
-DEGREES = (3, 5)
-"""Degrees of the compressed patches: 28 and 45 cells."""
+DISCS = (1, 4, 8, 16, 32, 64)
+"""Numbers of discs of `ReducedModel`, beside its default."""
 
-PARTS = (1, 4, 6, 16)
-"""Parts of `ReducedModel`, beside the few cells that it has by default."""
+DEFAULT = ReducedModel.cells
 
-AUTO = "auto"
-"""Value of `parts` with which the model chooses their number, and the name of that model."""
+NAMES = {n: "reduced" if n == DEFAULT else f"{n} discs" for n in sorted({*DISCS, DEFAULT})}
+"""Number of discs -> name of the model."""
+
+ALL = "all discs"
+"""Name of `ReducedModel` with a disc for every cell of the patch."""
 
 CASES = (
     *(Case(shape, load) for shape in (*SIX_SHAPES, "LineGradX") for load in (1, 2)),
@@ -49,9 +51,9 @@ REPEATS, LONG, SHORT = 9, 0.1, 0.02
 
 MOVED = {
     "published": "published reduced",
-    "reduced": "ReducedModel",
-    "one part": "ReducedModel, 1 part",
-    AUTO: 'ReducedModel, parts="auto"',
+    "8 discs": "ReducedModel, 8 discs",
+    "reduced": f"ReducedModel, {DEFAULT} discs",
+    ALL: "ReducedModel, a disc a cell",
     "full": "distributed, 21 x 21",
 }
 """Model of the ladder -> its name in the report."""
@@ -59,16 +61,13 @@ MOVED = {
 STATISTICS = ("median", "third quartile", "maximum")
 """Statistics of the errors over a run, of force and of torque."""
 
-TIMED_PARTS = (1, 4, 6)
-"""Parts whose steps are timed."""
-
 ROUNDS, STEPS = 9, 10_000
 
 SPIN, SPIN_STEPS, SPIN_STEP = 0.02, 400, 1e-8
 """Speed of the spin from rest [rad/s], its steps, and how far each goes at the contact radius [m]: 1e-6 m are full
 deflection."""
 
-ENDS = {name: (MOVED | {"4 parts": "ReducedModel, 4 parts"})[name] for name in (*list(MOVED)[:3], "4 parts", AUTO)}
+ENDS = {name: words for name, words in MOVED.items() if name != "full"}
 """Models of the in-hand runs -> their names in the report."""
 
 SHIFT = "friction"
@@ -84,7 +83,7 @@ class Row(NamedTuple):
 
     case: str
     model: str
-    """"published", the same with another surface, "reduced", "one part", "n parts", "auto", "degree d", or "full"."""
+    """"published", the same with another surface, "n discs", "reduced" by default, "all discs", or "full"."""
     states: int
     """Bristle states."""
     errors: dict[str, float]
@@ -102,42 +101,23 @@ def shape_of(case: str) -> str:
     return case.rpartition(", load")[0].removesuffix(", far placement")
 
 
-def reduced_models(patch: ContactPatch, parts: Iterable[Any]) -> dict[str, Any]:
-    """Return the published reduced model, and `ReducedModel` by default and with numbers of parts, by name."""
+def reduced_models(patch: ContactPatch, discs: Iterable[int]) -> dict[str, Any]:
+    """Return the published reduced model, and `ReducedModel` by default and with numbers of discs, by name."""
     few: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW), "reduced": ReducedModel(patch, LAW)}
-    return few | {name_of_parts(count): ReducedModel(patch, LAW, parts=count) for count in parts}
+    return few | {f"{count} discs": ReducedModel(patch, LAW, cells=count) for count in discs}
 
 
 @functools.lru_cache(maxsize=8)
 def models(shape: str) -> dict[str, Any]:
-    """Return the models of a published patch by name, each number of cells once; kept: fitting cells takes seconds.
-
-    `AUTO` is one of the others by another name, where its number of parts is among `PARTS`.
-    """
+    """Return the models of a published patch by name; numbers of discs only below that of its cells."""
     patch = PUBLISHED_PATCHES[shape]()
     result: dict[str, Any] = {
         "full": DistributedModel(patch, LAW),
-        "published": ReducedModelPublished(patch, LAW),
         "published, smooth": ReducedModelPublished(patch, LAW, surface=LimitSurfaceTable(patch)),
         "published, ellipsoid": ReducedModelPublished(patch, LAW, surface=LimitSurfaceEllipsoid(patch)),
-        "reduced": ReducedModel(patch, LAW),
     }
-    parts = {count: ReducedModel(patch, LAW, parts=count) for count in PARTS}
-    result |= {name_of_parts(count): model for count, model in parts.items()}
-    auto = ReducedModel(patch, LAW, parts=AUTO)
-    result[AUTO] = parts.get(auto.parts, auto)
-    sizes = {patch.cells}
-    for degree in DEGREES:
-        few = patch.compressed(degree)
-        if few.cells not in sizes:
-            sizes.add(few.cells)
-            result[f"degree {degree}"] = DistributedModel(few, LAW)
-    return result
-
-
-def name_of_parts(parts: Any) -> str:
-    """Return the name of `ReducedModel` with so many parts, or with `AUTO`."""
-    return {1: "one part", AUTO: AUTO}.get(parts, f"{parts} parts")
+    result |= reduced_models(patch, (count for count in DISCS if count < patch.cells))
+    return result | {ALL: ReducedModel(patch, LAW, cells=patch.cells)}
 
 
 def scenes_of(shape: str) -> dict[str, Callable[[Any], Scene]]:
@@ -230,7 +210,7 @@ def step_costs(shape: str = "Circle") -> dict[str, Any]:
     patch = PUBLISHED_PATCHES[shape]()
     directions = np.random.default_rng(7).normal(size=(STEPS, 3)) * [1.0, 1.0, 150.0]
     twists = directions * 10.0 ** np.random.default_rng(8).uniform(-4.0, -1.5, size=(STEPS, 1))
-    models = reduced_models(patch, TIMED_PARTS)
+    models = reduced_models(patch, DISCS)
     times = {name: np.empty(ROUNDS) for name in models}
     for turn in range(-1, ROUNDS):  # the first compiles
         for name, model in models.items():
@@ -254,7 +234,7 @@ def spin_up(shape: str) -> dict[str, float]:
     patch = PUBLISHED_PATCHES[shape]()
     dt = SPIN_STEP / (SPIN * patch.contact_radius())
     wanted = _spun(DistributedModel(patch, LAW), dt)
-    models = reduced_models(patch, (1, AUTO))
+    models = reduced_models(patch, (8,)) | {ALL: ReducedModel(patch, LAW, cells=patch.cells)}
     return {name: float(np.abs(_spun(model, dt) - wanted).max()) for name, model in models.items()}
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction_studies.experiments import looks
-from planarfriction_studies.experiments.beyond import contacts, ladder, surfaces, tables
+from planarfriction_studies.experiments.beyond import cells, contacts, ladder, surfaces, tables
 from planarfriction_studies.experiments.beyond import shapes as new_shapes
 from planarfriction_studies.experiments.experiment import Numbers, Result, Work, median_and_quartiles
 from planarfriction_studies.experiments.in_hand.figures import end_shifts
@@ -20,12 +20,17 @@ SHAPES, QUICK_SHAPES, QUICK_TWISTS = (*SIX_SHAPES, "LineGradX"), ("LineGrad", "N
 NEW_SHAPES, QUICK_NEW_SHAPES, QUICK_SEEDS = tuple(new_shapes.SHAPES), ("three feet",), (0, 1)
 
 
+SHOWN, UNSEEN = ("8 discs", "reduced", ladder.ALL), ("8 discs", "16 discs", "reduced", "64 discs")
+"""Models of the findings: on the published patches, and on those that no table holds."""
+
+
 def run(work: Work) -> Result:
     """Carry out the experiment."""
     shapes = QUICK_SHAPES if work.quick else SHAPES
     six = [shape for shape in shapes if shape in SIX_SHAPES]
     twists = QUICK_TWISTS if work.quick else surfaces.TWISTS
     new, seeds = (QUICK_NEW_SHAPES, QUICK_SEEDS) if work.quick else (NEW_SHAPES, new_shapes.SEEDS)
+    rungs, shaken = (("disc",), ("disc",)) if work.quick else (tuple(cells.SHAPES), ("disc", "L", "two pads"))
     found = work.pieces(
         {("models", shape): partial(_runs_of, shape) for shape in shapes}
         | {("limit surface", shape): partial(surfaces.surface_errors, shape, twists) for shape in shapes}
@@ -33,10 +38,13 @@ def run(work: Work) -> Result:
             ("plateaus", ""): contacts.plateaus,
             ("grooves", ""): partial(contacts.grooves, work.quick),
             ("staircase", ""): surfaces.staircase,
-            ("soft finger", ""): partial(contacts.load_family, work.quick),
+            ("soft finger", ""): partial(contacts.soft_finger, work.quick),
         }
         | {("spin-up", shape): partial(ladder.spin_up, shape) for shape in six}
-        | {("new shapes", name): partial(new_shapes.largest_errors, name, seeds) for name in new},
+        | {("new shapes", name): partial(new_shapes.largest_errors, name, seeds) for name in new}
+        | {("few discs", name): partial(cells.measured, name, work.quick) for name in rungs}
+        | {("creep", name): partial(cells.held, name) for name in shaken}
+        | {("work returned", ""): partial(cells.gained, 10_000 if work.quick else 1_000_000)},
         lambda key: ", ".join((key[0], IN_WORDS.get(key[1], key[1]))),
     )
     # one after the other: these are measured with a clock
@@ -58,9 +66,12 @@ def run(work: Work) -> Result:
         "jumps": surfaces.jumps(stairs),
         "plateaus": found["plateaus", ""],
         "grooves": {name: values.tolist() for name, values in found["grooves", ""].items()},
-        "load family": found["soft finger", ""],
+        "soft finger": found["soft finger", ""],
         "step": costs,
         "spin-up": of("spin-up"),
+        "few discs": cells.pooled(of("few discs")),
+        "creep": _last(of("creep")),
+        "work returned": found["work returned", ""],
         "new shapes": {name: new_shapes.ratios(each) for name, each in unseen.items()},
     }
     return report(
@@ -71,6 +82,7 @@ def run(work: Work) -> Result:
             "driven_models": tables.driven_boxes(numbers["driven"]),
             "in_hand_ends": _ends_figure(numbers["in hand"]),
             "ladder": tables.draw_ladder(rows),
+            "few_discs": cells.figure(numbers["few discs"]),
             "grooves": tables.grooves(numbers["grooves"]),
         },
         numbers,
@@ -80,8 +92,20 @@ def run(work: Work) -> Result:
             *contacts.plateau_comparisons(numbers["plateaus"]),
             *contacts.grooves_comparisons(numbers["grooves"]),
         ],
-        tables=(*tables.tables(rows, numbers), new_shapes.table(unseen)),
+        tables=(
+            *tables.tables(rows, numbers),
+            new_shapes.table(unseen),
+            *cells.tables(numbers["few discs"], numbers["creep"]),
+        ),
     )
+
+
+def _last(ways: Numbers) -> Numbers:
+    """Return the last of the ways from cycle to cycle, by patch, level and model."""
+    return {
+        shape: {level: {model: float(each[-1]) for model, each in models.items()} for level, models in levels.items()}
+        for shape, levels in ways.items()
+    }
 
 
 def _runs_of(shape: str) -> Numbers:
@@ -97,7 +121,7 @@ def _runs_of(shape: str) -> Numbers:
 def _ends_figure(ends: Numbers) -> Any:
     """Draw the ends of the in-hand runs, and how far a change of friction moves them."""
     words = ladder.ENDS | {ladder.SHIFT: "0.1 % of friction"}
-    colours = (looks.REDUCED, looks.FEW, looks.MOMENTS, looks.OTHERS[3], looks.PARTS)
+    colours = (looks.REDUCED, looks.OTHERS[1], looks.FEW, looks.OTHERS[0])
     return end_shifts(
         {case: {words[name]: each[name] for name in words} for case, each in ends.items()},
         dict(zip(ladder.ENDS.values(), colours, strict=True)),
@@ -119,13 +143,12 @@ def _numbers(rows: list[ladder.Row], shifts: dict[str, float], errors: Numbers) 
         },
         "quartic installed": surfaces.has_quartic(),
         "driven": moved,
-        "driven ratios": ladder.ratios(moved, "one part"),
-        "driven ratios, auto": ladder.ratios(moved, ladder.AUTO),
-        "driven ratios, parts": ladder.ratios(moved, ladder.AUTO, "one part"),
+        "driven ratios": ladder.ratios(moved, "reduced"),
+        "driven ratios, all": ladder.ratios(moved, ladder.ALL),
         "in hand": ends,
         "in hand score": {
             model: {f"load {load}": ladder.score(ends, load, model) for load in (1, 2)}
-            for model in ("reduced", "one part", ladder.AUTO)
+            for model in SHOWN
         },
         # median over all runs of the time in the solver over that of the distributed model
         "run costs": {name: float(np.median([row.time for row in rows if row.model == name])) for name in models},
@@ -140,10 +163,7 @@ def _numbers(rows: list[ladder.Row], shifts: dict[str, float], errors: Numbers) 
 def _template_values(numbers: Numbers) -> Numbers:
     """Return the values that the template names."""
     exact, ends, drifts, unseen = (numbers[name] for name in ("surfaces", "in hand", "grooves", "new shapes"))
-    few = [each for each in ends.values() if "degree 5" in each]
-    moved = [each for each in numbers["driven"].values() if "degree 5" in each]
-    one, auto, over = (numbers[f"driven ratios{ending}"] for ending in ("", ", auto", ", parts"))
-    worse = {IN_WORDS[shape]: [name for name, value in each.items() if value > 1.05] for shape, each in over.items()}
+    ratios = {"reduced": numbers["driven ratios"], ladder.ALL: numbers["driven ratios, all"]}
     misses = [np.subtract(drifts[kind], drifts["closed form"]) for kind in contacts.GROOVED_MODELS]
     return {
         "nearer": {
@@ -152,32 +172,37 @@ def _template_values(numbers: Numbers) -> Numbers:
         },
         "fitted": [IN_WORDS[shape] for shape in surfaces.QUARTIC_SHAPES if shape in exact],
         "driven": {
-            "shapes": len(one),
-            "one": _by_statistic(one),
-            "auto": _by_statistic(auto),
-            "worse": {shape: names for shape, names in worse.items() if names},
+            "shapes": len(numbers["driven"]),
+            "ratios": {model: _by_statistic(each) for model, each in ratios.items()},
         },
         "unseen": {
             "twists": len(next(iter(unseen.values()))["reduced"]["force"]),
             "worst": {
                 model: {name: max(max(each[model][name]) for each in unseen.values()) for name in new_shapes.QUANTITIES}
-                for model in ("reduced", "one part", "4 parts", ladder.AUTO)
+                for model in UNSEEN
             },
         },
         "held": {
             model: {load: _score(each) for load, each in found.items()}
             for model, found in numbers["in hand score"].items()
         },
-        "friction": {
-            model: _friction_shares(ends, model) for model in ("reduced", "one part", ladder.AUTO, "published")
-        },
-        "furthest": {model: max(each[model] for each in ends.values()) for model in ("reduced", "published")},
-        "few": {
-            model: max(each[model] for each in few)
-            for model in ("degree 5", "published", "reduced", "one part", ladder.AUTO, "16 parts")
-        },
-        "quartile": [each["degree 5"]["third quartile"] / each["full"]["third quartile"] for each in moved],
+        "friction": {model: _friction_shares(ends, model) for model in (*SHOWN, "published")},
+        "furthest": {model: max(each[model] for each in ends.values()) for model in ("published", *SHOWN)},
+        "default": ladder.DEFAULT,
+        "discs": {model: _over_all(numbers, model) for model in (*ladder.NAMES.values(), ladder.ALL)},
         "grooves": {"models": len(misses), "miss": float(np.abs(misses).max())},
+    }
+
+
+def _over_all(numbers: Numbers, model: str) -> Numbers:
+    """Return what discs cost and how far they are off, on the patches that have more cells than any number of them."""
+    moved, ends = ([each for each in numbers[name].values() if "64 discs" in each] for name in ("driven", "in hand"))
+    over = lambda name: float(np.median([each[model][name] / each["published"][name] for each in moved]))  # noqa: E731
+    return {
+        "driven": over("third quartile"),
+        "largest": over("maximum"),
+        "end": max(each[model] for each in ends),
+        "time": numbers["run ratios"][model][0],
     }
 
 

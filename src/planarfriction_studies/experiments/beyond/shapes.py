@@ -13,12 +13,12 @@ from planarfriction.patch import ContactPatch
 from planarfriction.scenes.ready import driven
 from planarfriction.scenes.signal import Signal
 from planarfriction_studies.experiments import experiment
-from planarfriction_studies.experiments.beyond.ladder import AUTO, reduced_models
+from planarfriction_studies.experiments.beyond.ladder import reduced_models
 from planarfriction_studies.experiments.experiment import Table
 from planarfriction_studies.experiments.runs import LAW, at_centre_of_pressure, simulated
 
-PARTS, SEEDS = (1, 4, AUTO), tuple(range(10))
-"""Numbers of parts of `ReducedModel`, beside its few cells, and seeds of the twists."""
+DISCS, SEEDS = (8, 16, 64), tuple(range(10))
+"""Numbers of discs of `ReducedModel`, beside its default, and seeds of the twists."""
 
 T_END, DT, WAVES = 2.0, 5e-3, 5
 """End of a twist and time between its samples [s], linear in between, and its half waves over that time, at most."""
@@ -87,7 +87,7 @@ def largest_errors(shape: str, seeds: tuple[int, ...] = SEEDS) -> dict[str, np.n
     """
     patch = SHAPES[shape]()
     fine = patch.refined(FINER) if (patch.cell_extents() > 0.0).any() else patch
-    models, reference = reduced_models(patch, PARTS), DistributedModel(fine, LAW)
+    models, reference = reduced_models(patch, DISCS), DistributedModel(fine, LAW)
     result = {}
     for seed in seeds:
         wrench = functools.partial(_wrench, twist=twist(seed))
@@ -115,7 +115,7 @@ def ratios(errors: dict[str, np.ndarray]) -> dict[str, dict[str, list[float]]]:
 def table(found: dict[str, dict[str, np.ndarray]]) -> Table:
     """Return the largest errors over the published model's: the median twist and the worst."""
     models = [name for name in next(iter(found.values())) if name != "published"]
-    words = {"reduced": "few cells", "one part": "1 part"}
+    words = {"reduced": "default"}
     columns = {
         f"{quantity}, {words.get(model, model)}": lambda each, m=model, q=quantity: (
             f"{np.median(each[m][q]):.2f} / {max(each[m][q]):.2f}"

@@ -11,7 +11,7 @@ import numpy as np
 from planarfriction.plots.style import PlotFigure
 from planarfriction_studies.experiments import looks
 from planarfriction_studies.experiments.beyond import contacts
-from planarfriction_studies.experiments.beyond.ladder import AUTO, ENDS, MOVED, SHIFT, STATISTICS, Row, shape_of
+from planarfriction_studies.experiments.beyond.ladder import ALL, ENDS, MOVED, NAMES, SHIFT, STATISTICS, Row, shape_of
 from planarfriction_studies.experiments.beyond.surfaces import KINDS
 from planarfriction_studies.experiments.experiment import Arrays, Numbers, Table, entry, table
 from planarfriction_studies.experiments.runs import IN_WORDS, SIX_SHAPES
@@ -23,12 +23,8 @@ MODEL_WORDS = {
     "published": "published reduced, published table",
     "published, smooth": "published reduced, LimitSurfaceTable",
     "published, ellipsoid": "published reduced, ellipsoid",
-    "reduced": "ReducedModel",
-    "one part": "ReducedModel, 1 part",
-    **{f"{count} parts": f"ReducedModel, {count} parts" for count in (4, 6, 16)},
-    "auto": 'ReducedModel, parts="auto"',
-    "degree 3": "distributed, 28 compressed cells",
-    "degree 5": "distributed, 45 compressed cells",
+    **{name: f"ReducedModel, {n} disc{'s' * (n > 1)}" for n, name in NAMES.items()},
+    ALL: MOVED[ALL],
 }
 """Model of the ladder -> model and surface, in words."""
 
@@ -63,13 +59,12 @@ def tables(rows: list[Row], numbers: Numbers) -> tuple[Table, ...]:
             },
             "run",
         ),
-        _ratios(numbers["driven ratios"], "Error of ReducedModel with one part over the published reduced model's"),
-        _ratios(numbers["driven ratios, parts"], 'Error of ReducedModel with parts="auto" over that with one part'),
+        _ratios(numbers["driven ratios"], "Error of ReducedModel over the published reduced model's"),
         table(
             "In hand: distance of the end from the distributed model's",
             ends,
             {f"{words} [mm]": _scaled(name) for name, words in (ENDS | {SHIFT: "0.1 % of friction"}).items()}
-            | {"auto / published": lambda each: shown(each[AUTO] / each["published"])},
+            | {"default / published": lambda each: shown(each["reduced"] / each["published"])},
             "run",
         ),
         _combinations(rows, "third quartile", "driven", "error of the force, third quartile [mN]"),
@@ -152,10 +147,12 @@ def _spread(values: Iterable[float]) -> str:
 
 
 COLOURS = dict(
-    zip(KINDS, (looks.REDUCED, looks.MOMENTS, looks.DISTRIBUTED, looks.QUARTIC, looks.ELLIPSOID), strict=True)
+    zip(KINDS, (looks.REDUCED, looks.OTHERS[0], looks.DISTRIBUTED, looks.QUARTIC, looks.ELLIPSOID), strict=True)
 )
 
-MODEL_COLOURS = dict(zip(MOVED, (looks.REDUCED, looks.FEW, looks.MOMENTS, looks.PARTS, looks.DISTRIBUTED), strict=True))
+MODEL_COLOURS = dict(
+    zip(MOVED, (looks.REDUCED, looks.OTHERS[1], looks.FEW, looks.OTHERS[0], looks.DISTRIBUTED), strict=True)
+)
 
 
 def surface_errors(errors: dict[str, Arrays]) -> PlotFigure:
@@ -239,16 +236,13 @@ class Family(NamedTuple):
     marker: str
 
 
-_RIGHT, _LEFT, _ABOVE, _CORNER = (6, -12), (-12, -13), (5, 5), (-16, 4)
+_RIGHT, _ABOVE = (4, 5), (5, 5)
 
 FAMILIES = (
     Family("published reduced model", {"published": ("", _RIGHT)}, looks.REDUCED, "^"),
-    Family("ReducedModel, by default", {"reduced": ("", _RIGHT)}, looks.FEW, "s"),
-    Family("ReducedModel in 1, 4, 6 and 16 parts",
-           {"one part": ("1", _RIGHT), "4 parts": ("4", _LEFT), "6 parts": ("6", _RIGHT), "16 parts": ("16", _RIGHT)},
-           looks.MOMENTS, "o"),
-    Family("distributed, 28, 45 or all cells",
-           {"degree 3": ("28", _CORNER), "degree 5": ("45", _ABOVE), "full": ("all", _ABOVE)}, looks.DISTRIBUTED, "D"),
+    Family("ReducedModel, 1 disc to one a cell",
+           {name: (str(n), _RIGHT) for n, name in NAMES.items()} | {ALL: ("all", _RIGHT)}, looks.FEW, "o"),
+    Family("distributed, 21 x 21 points", {"full": ("", _ABOVE)}, looks.DISTRIBUTED, "D"),
 )  # fmt: skip
 
 ROWS = (
@@ -268,7 +262,7 @@ def draw_ladder(rows: list[Row]) -> PlotFigure:
     """Draw the error over the time of a run: patches of many cells on the left, of few on the right; a row a run."""
     from matplotlib.ticker import FixedLocator, NullLocator
 
-    many = {shape_of(row.case) for row in rows if row.model == "degree 5"}
+    many = {shape_of(row.case) for row in rows if row.model == "64 discs"}
     groups = [group for few in (False, True) if (group := [row for row in rows if (shape_of(row.case) in many) ^ few])]
     figure, panels = looks.panels(8.3, 9.6, len(ROWS), len(groups), sharex="col", sharey="row", squeeze=False)
     for column, group in zip(panels.T, groups, strict=True):

@@ -64,6 +64,6 @@ ENGINES = [
     MujocoWarp("MuJoCo Warp", f"as it comes: pyramidal cone, impratio 1, condim 3, Euler; {_CPU}"),
     MujocoWarp("MuJoCo Warp, elliptic", f"elliptic cone, impratio 10, condim 3, implicitfast; {_CPU}", ELLIPTIC,
                integrator="implicitfast"),
-    MujocoWarp("MuJoCo Warp, patches", f"planarfriction: ReducedModel, one part, 21 cells across, implicitfast; {_CPU}",
-               integrator="implicitfast", kind="one part"),
+    MujocoWarp("MuJoCo Warp, patches", f"planarfriction: ReducedModel, 21 cells across, implicitfast; {_CPU}",
+               integrator="implicitfast", kind="reduced"),
 ]  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 
 import numpy as np
 
@@ -18,7 +17,7 @@ SIGMA_0 = 1e6
 SIGMA_1 = 800.0
 """Damping of bristles [s/m], which sliding at a constant velocity does not see."""
 
-MODELS = {"reduced": ReducedModel, "one part": partial(ReducedModel, parts=1), "distributed": DistributedModel}
+MODELS = {"reduced": ReducedModel, "distributed": DistributedModel}
 
 
 def model(contact: Contact, kind: str) -> FrictionModel:

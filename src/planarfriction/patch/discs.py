@@ -1,0 +1,388 @@
+"""A patch as a few small discs: clusters of its cells, each with the load, centre and second moment of its cells.
+
+The fewer the discs, the larger they are, and the more their own law of friction stands for. Clusters are those of
+Lloyd's iteration: least `sum w |rho - c|^2`. Only one period of a patch with mirrors is clustered, so that a symmetric
+patch has symmetric discs; the result does not depend on the order of cells, and turns with the patch.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+import warnings
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.patch.disc_friction import disc_friction
+from planarfriction.patch.outline import with_outline
+from planarfriction.patch.pressure import PerCell
+from planarfriction.patch.shared import SharedPressure, mean_weights
+
+if TYPE_CHECKING:
+    from planarfriction.patch.contact_patch import ContactPatch
+
+REMEMBERED = 8
+"""Patches whose discs are kept: choosing them takes longer than a short run, and models with other laws ask again."""
+
+OF_ALL_LOADS = 2
+"""Times as many discs stand for a patch whose shape depends on the load.
+
+Steady friction of a Hertz contact at 0.5 to 10 N differs from that of fine cells by 0.3 to 1.6 % rms of `mu f_N` with
+48 discs, by 0.6 to 2 % with 24, and by 0.2 to 0.3 % with 24 that are chosen for one load.
+"""
+
+SAME = 1e-9
+"""Relative difference of positions, shares and second moments below which they are the same."""
+
+SLANTED = np.array([1.0, 0.5 * (1.0 + math.sqrt(5.0))])
+"""Direction along which no two cells of a grid are level: sorted along it, equal patches are equal cell by cell."""
+
+STEPS, LAST_STEPS = 60, 200
+"""Steps of Lloyd's iteration while partitions are compared, and of the one that is taken."""
+
+WORK = 3e6
+"""Distances between cells and centres that are computed, about: bounds the number of seeds."""
+
+MOST_SEEDS = 12
+"""Seeds of one arrangement of centres on the mirrors."""
+
+NEAR_BEST, COMPARED = 1.02, 8
+"""Cost over the least, and number of partitions, up to which their friction is compared."""
+
+BESIDE = np.array([(0.1, 0.0), (0.0, 0.1), (0.25, 0.0), (0.0, 0.25), (0.17, 0.17)])
+"""Centres of rotation beside the centre of pressure, in radii of gyration: the slope of friction at a pure spin."""
+
+HEAVIER = 10.0
+"""Weight of errors there over those elsewhere."""
+
+PLACES = 40
+"""Other centres of rotation: about so many cells."""
+
+
+def discs(patch: ContactPatch, n: Any) -> ContactPatch:
+    """Implement `ContactPatch.discs`."""
+    n = patch.cells if n is None else validation.count("n", n)
+    n = OF_ALL_LOADS * n if patch.depends_on_load else n
+    return _own_discs(patch) if patch.cells <= n else _few_discs(patch, n)
+
+
+def _own_discs(patch: ContactPatch) -> ContactPatch:
+    """Return the patch with each cell as the disc of its own second moment; points remain points."""
+    radii = np.sqrt((patch.cell_extents() ** 2).sum(axis=1) / 6.0)
+    if patch.has_discs or not radii.any():
+        return patch
+    with warnings.catch_warnings(action="ignore"):  # of the size, said when the patch was made
+        return with_outline(dataclasses.replace(patch, radii=radii, point_shares=None), patch.outline)
+
+
+@functools.lru_cache(REMEMBERED)
+def _few_discs(patch: ContactPatch, n: int) -> ContactPatch:
+    """Return fewer discs than the patch has cells; those of each kind of friction are chosen by themselves."""
+    from planarfriction.patch.contact_patch import ContactPatch
+
+    cells = _own_discs(patch)
+    places, root_scale = np.stack(cells.lever_coordinates(*cells.positions.T), -1), _ratio(cells)
+    weights = mean_weights(cells)
+    squares = 0.5 * cells.lever_radii**2
+    groups, parts = _kinds(cells), []
+    for group, count in zip(groups, _counts(places, weights, groups, n), strict=True):
+        clusters = _clusters(places[group], weights[group], squares[group], count)
+        parts.append(clusters._replace(cells=group[clusters.cells]))
+    first = np.repeat([group[0] for group in groups], [len(part.places) for part in parts])
+    start = np.cumsum([0, *(len(part.places) for part in parts)])
+    labels = np.concatenate([part.labels + at for part, at in zip(parts, start[:-1], strict=True)])
+    order = np.argsort(labels, kind="stable")
+    members = np.concatenate([part.cells for part in parts])[order]
+    parted = np.concatenate([part.parted for part in parts])[order]
+    begins = np.searchsorted(labels[order], np.arange(start[-1]))
+    radii = np.concatenate([part.radii for part in parts]) / root_scale[first]
+    shared = SharedPressure(cells, members, parted, begins, radii)
+    areas = shared.sums(cells.areas)
+    fields = {
+        "metric": None if cells.metric is None else np.broadcast_to(cells.metric, (cells.cells, 2, 2))[first],
+        "asymmetry": None if cells.asymmetry is None else cells.asymmetries()[first],
+        "radii": radii,
+    }
+    if len(groups) == 1:
+        fields |= {name: None if fields[name] is None else fields[name][0] for name in ("metric", "asymmetry")}
+    law = shared if cells.depends_on_load else PerCell(shared.relative(cells.positions))
+    positions = _from_lever_coordinates(cells, np.concatenate([part.places for part in parts]), first)
+    with warnings.catch_warnings(action="ignore"):
+        return ContactPatch(positions, areas, law, None, patch.name, **fields)
+
+
+# ---------------------------------------------------------------------- friction that depends on the direction
+
+
+def _ratio(patch: ContactPatch) -> np.ndarray:
+    """Return the radius of a disc in the space of its metric over its radius, `[N]`."""
+    root = np.eye(2) if patch.root is None else patch.root
+    return np.broadcast_to(np.sqrt(0.5 * (root**2).sum((-2, -1))), patch.cells)
+
+
+def _from_lever_coordinates(patch: ContactPatch, places: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Return the positions whose lever coordinates are `places` `[n, 2]`, with the metrics of these `cells` `[n]`."""
+    if patch.root is None:
+        return places
+    root = np.broadcast_to(patch.root, (patch.cells, 2, 2))[cells]
+    turned = np.stack([-places[:, 1], places[:, 0]], -1)  # L (-y, x) of positions
+    turned = np.linalg.solve(root, turned[..., None])[..., 0]
+    return np.stack([turned[:, 1], -turned[:, 0]], -1)
+
+
+def _kinds(patch: ContactPatch) -> list[np.ndarray]:
+    """Return the cells of each kind of friction."""
+    if patch.metric is None and patch.asymmetry is None:
+        return [np.arange(patch.cells)]
+    metric = np.broadcast_to(np.eye(2) if patch.metric is None else patch.metric, (patch.cells, 2, 2))
+    numbers = np.hstack([metric.reshape(-1, 4), patch.asymmetries()])
+    kind = np.unique(numbers, axis=0, return_inverse=True)[1].reshape(-1)
+    return [np.flatnonzero(kind == k) for k in range(kind.max() + 1)]
+
+
+def _counts(places: np.ndarray, weights: np.ndarray, groups: list[np.ndarray], n: int) -> list[int]:
+    """Return the numbers of discs of the kinds of friction, which are n or fewer in all, and at least one each.
+
+    Proportional to `w r`, the share times the radius of gyration of a kind, with which the sum of costs is least.
+    """
+    sizes = []
+    for group in groups:
+        w, p = weights[group], places[group]
+        total = max(w.sum(), 1e-300)
+        sizes.append(math.sqrt(max(total * (w @ (p - w @ p / total) ** 2).sum(), 0.0)))
+    per_size = n / max(sum(sizes), 1e-300)
+    return [min(len(g), max(1, math.floor(s * per_size + SAME))) for g, s in zip(groups, sizes, strict=True)]
+
+
+# ---------------------------------------------------------------------- clusters of cells of one kind
+
+
+class _Clusters(NamedTuple):
+    """Discs of cells, and the cells of each disc: a cell on a mirror is parted between a disc and its image."""
+
+    places: np.ndarray
+    """Centres `[n, 2]`."""
+    radii: np.ndarray
+    """Radii `[n]`."""
+    cells: np.ndarray
+    """Cell of each membership `[M]`."""
+    labels: np.ndarray
+    """Disc of the same, `[M]`."""
+    parted: np.ndarray
+    """Part of the cell that belongs to the disc, `[M]`; those of a cell add up to 1."""
+
+
+class _Period(NamedTuple):
+    """One of the equal pieces into which the symmetries divide a patch, in coordinates of `_frame`."""
+
+    points: np.ndarray
+    """`[M, 2]`."""
+    weights: np.ndarray
+    """Share of the load of the points, less for those that lie in several periods, `[M]`."""
+    squares: np.ndarray
+    """Second moments of the cells about themselves, `[M]`."""
+    images: np.ndarray
+    """Cells that are the images of each, `[G, M]`; the first is the cell itself."""
+    signs: np.ndarray
+    """Signs of the coordinates of the images, `[G, 2]`."""
+    parted: np.ndarray
+    """One over the number of periods in which a cell lies, `[M]`."""
+
+    @property
+    def inverted(self) -> bool:
+        """True if the only symmetry is `p -> -p`, which has no mirror as a border."""
+        return len(self.signs) == 2 and self.signs[1].tolist() == [-1.0, -1.0]
+
+    def images_of(self, on_axes: np.ndarray) -> np.ndarray:
+        """Return the first of the images `[G, k]` that is the same as each, for centres held `on_axes` `[k, 2]`."""
+        different = (self.signs[:, None, None] != self.signs[None, :, None]) & ~on_axes
+        return np.argmax(~different.any(axis=-1), axis=1)
+
+
+class _Partition(NamedTuple):
+    """Clusters of the points of a period."""
+
+    centres: np.ndarray
+    on_axes: np.ndarray
+    """Coordinates `[k, 2]` of centres that are held at 0."""
+
+
+def _clusters(places: np.ndarray, weights: np.ndarray, squares: np.ndarray, n: int) -> _Clusters:
+    """Return the discs of points with `weights` `[N]` and second moments of their own; fewer where n does not fit."""
+    if len(places) <= n:
+        each = np.arange(len(places))
+        return _Clusters(places, np.sqrt(2.0 * squares), each, each, np.ones(len(places)))
+    weights = weights / weights.sum() if weights.any() else np.full(len(places), 1.0 / len(places))
+    middle, axes, scale = _frame(places, weights)
+    points = (places - middle) @ axes / scale
+    order = np.argsort(points @ SLANTED, kind="stable")
+    points, weights, squares = points[order], weights[order], squares[order] / scale**2
+    period = _period(points, weights, squares)
+    chosen = _chosen(period, points, weights, squares, n)
+    centres, radii, cells, labels, parted = _finished(period, chosen)
+    return _Clusters(centres @ axes.T * scale + middle, radii * scale, order[cells], labels, parted)
+
+
+def _frame(places: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return the mean of points, their principal axes as columns, and their radius of gyration.
+
+    Where the axes are not determined, those of the coordinates; they point to the side with the farther load.
+    """
+    middle = weights @ places
+    offset = places - middle
+    scale = math.sqrt(weights @ (offset**2).sum(axis=1)) or 1.0
+    x, y = offset.T / scale
+    xx, xy, yy = weights @ x**2, weights @ (x * y), weights @ y**2
+    angle = 0.0 if abs(xy) < SAME else 0.5 * math.atan2(2.0 * xy, xx - yy)
+    axes = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    if yy - xx > SAME and angle == 0.0:
+        axes = axes[:, ::-1]
+    turned = offset @ axes / scale
+    lean = weights @ (turned * (x**2 + y**2)[:, None] + turned**3)
+    return middle, axes * np.where(lean < -SAME, -1.0, 1.0), scale
+
+
+def _period(points: np.ndarray, weights: np.ndarray, squares: np.ndarray) -> _Period:
+    """Return one period of the symmetries of points sorted along `SLANTED`: mirrors on both axes, or `p -> -p`."""
+    every, near = np.arange(len(points)), SAME * float(np.abs(points).max())
+    found = {(1.0, 1.0): every}
+    for flip in ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)):
+        image = np.empty_like(every)
+        image[np.argsort(points * flip @ SLANTED, kind="stable")] = every
+        alike = all(np.abs(each[image] - each).max() <= SAME * each.max() for each in (weights, squares))
+        known = any(np.array_equal(image, other) for other in found.values())  # all points lie on an axis
+        if alike and not known and np.abs(points[image] - points * flip).max() <= near:
+            found[flip] = image
+    signs, images = np.array(list(found)), np.array(list(found.values()))
+    mirrored = [k for k, flip in enumerate([(-1.0, 1.0), (1.0, -1.0)]) if flip in found]
+    # without mirrors any one of a point and its image will do
+    inside = (points[:, mirrored] >= -near).all(axis=1) if mirrored else every <= images[-1]
+    parted = 1.0 / (images == every).sum(axis=0)
+    period = np.flatnonzero(inside)
+    own = points[period], (weights * parted)[period], squares[period]
+    return _Period(*own, images[:, period], signs, parted[period])
+
+
+def _arrangements(period: _Period, n: int) -> list[tuple[int, int, int, int]]:
+    """Return numbers of centres inside, held at x = 0, at y = 0 and at both, whose images are n in all."""
+    flips = {tuple(each) for each in period.signs}
+    at_x, at_y, at_both = (flip in flips for flip in ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)))
+    pair = max(1, len(flips) // 2)
+    width, height = np.sqrt(period.weights @ period.points**2 / period.weights.sum()) + SAME
+    most_x = min(n // pair, int(math.sqrt(n * height / width)) + 1) if at_x else 0
+    most_y = min(n // pair, int(math.sqrt(n * width / height)) + 1) if at_y else 0
+    ways = []
+    for both in range(1 + (at_both and n > 0)):
+        for x in range(most_x + 1):
+            for y in range(most_y + 1):
+                rest = n - both - pair * (x + y)
+                if rest >= 0 and rest % len(flips) == 0:
+                    ways.append((rest // len(flips), x, y, both))
+    return ways
+
+
+def _partitions(period: _Period, n: int) -> list[_Partition]:
+    """Return the partitions into n clusters that cost little more than the best, the best first."""
+    points, weights = period.points, period.weights
+    ways = [way for way in _arrangements(period, n) if 0 < sum(way) <= len(points)]
+    labels, turned = np.empty(len(points), int), np.empty(len(points), bool)
+    work = len(points) * n / len(period.signs) * 0.5 * STEPS * max(len(ways), 1)
+    found: list[tuple[float, _Partition]] = []
+    for inside, at_x, at_y, at_both in ways:
+        k = inside + at_x + at_y + at_both
+        for seed in range(min(MOST_SEEDS, max(1, round(WORK / work)))):
+            centres, on_axes = np.empty((k, 2)), np.zeros((k, 2), bool)
+            kernels().seeds(points, weights, seed * k, centres)
+            order = np.argsort(np.hypot(*centres.T) if period.inverted else centres[:, 0], kind="stable")
+            on_axes[order[:at_both] if period.inverted else [], :] = True
+            on_axes[order[:at_x], 0] = True
+            rest = order[at_x:] if not period.inverted else order[:0]
+            lowest = rest[np.argsort(centres[rest, 1], kind="stable")[: at_y + at_both]]
+            on_axes[lowest, 1] = True
+            on_axes[lowest[np.argsort(centres[lowest, 0], kind="stable")[:at_both]], 0] = True
+            centres[on_axes] = 0.0
+            cost = kernels().lloyd(points, weights, period.inverted, on_axes, STEPS, centres, labels, turned)
+            if cost < np.inf:
+                found.append((cost, _Partition(centres, on_axes)))
+    found.sort(key=lambda each: each[0])
+    return _different(found)
+
+
+def _different(found: list[tuple[float, _Partition]]) -> list[_Partition]:
+    """Return the cheapest of partitions sorted by their cost; equal costs are equal partitions."""
+    kept: list[tuple[float, _Partition]] = []
+    for cost, partition in found:
+        if cost > NEAR_BEST * found[0][0] or len(kept) == COMPARED:
+            break
+        if not kept or cost > kept[-1][0] * (1.0 + 1e-6):
+            kept.append((cost, partition))
+    return [partition for _, partition in kept]
+
+
+@functools.cache
+def kernels() -> Any:
+    """Return the compiled loops, which a patch alone does not need."""
+    from planarfriction.kernels import clusters
+
+    return clusters
+
+
+def _chosen(period: _Period, points: np.ndarray, weights: np.ndarray, squares: np.ndarray, n: int) -> _Partition:
+    """Return the partition into n clusters whose friction is nearest to that of all cells.
+
+    A patch with two mirrors, or that is the same when turned by half a turn, has a disc in its middle for odd numbers
+    only, so that n - 1 is tried too.
+    """
+    centred = (period.signs == -1.0).all(axis=1).any()
+    good: list[_Partition] = []
+    while not good:
+        for number in (n, n - 1) if centred and n > 2 else (n,):
+            good += _partitions(period, number)
+        n -= 1
+    if len(good) == 1:
+        return good[0]
+    centres = np.concatenate([period.points[:: max(1, len(period.points) // PLACES)], BESIDE])
+    heavier = np.where(np.arange(len(centres)) < len(centres) - len(BESIDE), 1.0, HEAVIER)
+    wanted = weights @ _pulls(points, np.sqrt(2.0 * squares), centres)
+
+    def error(partition: _Partition) -> float:
+        places, radii, cells, labels, parted = _finished(period, partition)
+        shares = np.bincount(labels, weights[cells] * parted)
+        return float((heavier[:, None] * (shares @ _pulls(places, radii, centres) - wanted) ** 2).sum())
+
+    return min(good, key=error)
+
+
+def _finished(period: _Period, chosen: _Partition) -> _Clusters:
+    """Return the discs of a partition and of its images."""
+    points, weights = period.points, period.weights
+    k, on_axes, centres = len(chosen.centres), chosen.on_axes, chosen.centres.copy()
+    labels, turned = np.empty(len(points), int), np.empty(len(points), bool)
+    kernels().lloyd(points, weights, period.inverted, on_axes, LAST_STEPS, centres, labels, turned)
+    points = np.where(turned[:, None], -points, points)
+    share = np.bincount(labels, weights, k)
+    for axis in range(2):
+        centres[:, axis] = np.where(on_axes[:, axis], 0.0, np.bincount(labels, weights * points[:, axis], k) / share)
+    squares = ((points - centres[labels]) ** 2).sum(axis=1) + period.squares
+    radii = np.sqrt(2.0 * np.bincount(labels, weights * squares, k) / share)
+    images = np.where(turned, period.images[::-1], period.images)
+    same = period.images_of(on_axes)  # [G, k]
+    number = (same == np.arange(len(same))[:, None]).ravel()
+    numbered = (np.cumsum(number) - 1).reshape(same.shape)
+    disc = np.take_along_axis(numbered, same, axis=0)
+    places = (period.signs[:, None] * centres).reshape(-1, 2)[number] + 0.0
+    parted = np.tile(period.parted, len(same))
+    return _Clusters(places, np.tile(radii, len(same))[number], images.ravel(), disc[:, labels].ravel(), parted)
+
+
+def _pulls(places: np.ndarray, radii: np.ndarray, centres: np.ndarray) -> np.ndarray:
+    """Return friction `[K, n, 3]` per share of load against unit spins about K centres; a disc has its own torque."""
+    x, y = places.T
+    ux, uy = -(y - centres[:, 1:]), x - centres[:, :1]
+    c_t, c_s, speed = disc_friction(ux**2 + uy**2, radii**2)
+    per_speed = np.divide(1.0, speed, out=np.zeros_like(speed), where=speed > 0.0)
+    fx, fy = c_t * ux * per_speed, c_t * uy * per_speed
+    return np.stack([fx, fy, x * fy - y * fx + 0.5 * c_s * radii**2 * per_speed], -1)
