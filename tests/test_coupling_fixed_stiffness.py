@@ -54,6 +54,16 @@ def test_wrenches_are_those_of_the_models_while_loads_follow_them():
     assert moved > 0.1
 
 
+def test_newton_knows_how_wrenches_follow_their_loads():
+    """With the slopes of the published law it takes 268 iterations."""
+    patches, z, taken = _patches(1.0), _patches(1.0).rest(), 0
+    for seed in range(60):
+        done = patches.step(z, _host(seed, response=1.0), 1e-3)
+        assert done.converged
+        z, taken = done.state, taken + int(done.iterations)
+    assert taken < 230
+
+
 def test_a_held_body_keeps_its_force_under_a_load_that_oscillates():
     """The published law lets it swing."""
     for reference in (1.0, None):

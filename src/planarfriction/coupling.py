@@ -360,7 +360,8 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
         followers=followers,
         row=rows.offsets,
     )
-    kept, counts = [steps, slopes, firsts, radius, references, bristles, *followers, *known.values()], np.diff(followers.firsts)
+    kept = [steps, slopes, firsts, radius, references, bristles, *followers, *known.values()]
+    counts = np.diff(followers.firsts)
     return _PackedPatches(row_of(patches), rows.slices, rows.size, records, following, counts, sizes, kept)
 
 

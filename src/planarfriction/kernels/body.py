@@ -137,8 +137,8 @@ class System(Packed):
     ) -> None:
         n, square = len(contacts.count), (3, 3)
         work = layout(
-            Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=4, factor=n, stiffness=square,
-            matrix=square, inverse=square, to_pose=square, body=3, rows=(4, 3), moved=(n, 8),
+            Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=4, factor=n,
+            stiffness=square, matrix=square, inverse=square, to_pose=square, body=3, rows=(4, 3), moved=(n, 8),
         )  # fmt: skip
         self._block, addresses = np.zeros(work.size), [address_of(*each) for each in BODY_FUNCTIONS]
         sizes = n, int(contacts.state[n]), pressures, len(motion.breaks) - 1

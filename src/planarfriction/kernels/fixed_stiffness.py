@@ -1,8 +1,8 @@
 """Rates of cells whose stiffness does not grow with the load, as the solver sees them (docs/physics.md, "Stiffness and
 load").
 
-They are those of the published law at `l z`, `l = f_ref/f` (see `settle`), and that of bristles which a falling load has
-left beyond their limit. Derivatives of rates and tractions by z are l times as large, so that what is done with the
+They are those of the published law at `l z`, `l = f_ref/f` (see `settle`), and that of bristles which a falling load
+has left beyond their limit. Derivatives of rates and tractions by z are l times as large, so that what is done with the
 matrices of a linearisation is that of `general_cells`.
 """
 
