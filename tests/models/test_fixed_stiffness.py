@@ -119,7 +119,7 @@ def test_stored_energy_never_grows_while_only_the_load_moves(patch, ratio):
 @every_patch
 @pytest.mark.parametrize("ratio", [None, 0.9])
 def test_no_work_comes_out_that_was_not_put_in_over_10000_cycles_of_loads_and_twists(patch, ratio):
-    """Of a closed path of twists, whatever the loads do meanwhile; the published law gives much of it back."""
+    """Paths of the twist are closed, whatever the loads do meanwhile; the published law gives work out in some."""
     count, steps = 10_000, 12
     rng = np.random.default_rng(3)
     path = np.cumsum(rng.normal(size=(count, steps, 3)) * [1e-6, 1e-6, 1e-4] * 10.0 ** rng.uniform(-2, 0, (count, 1, 1)), 1)

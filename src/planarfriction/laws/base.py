@@ -68,7 +68,10 @@ class FrictionLaw(Checked):
         return self.numbers.creep_speed == 0.0
 
     def stiffness_factor(self, normal_force: ArrayLike) -> np.ndarray:
-        """Return what `sigma_0` has to be multiplied by at loads `[...]` [N]: `reference_load/f_N`, or 1 without one."""
+        """Return what `sigma_0` has to be multiplied by at loads `[...]` [N]: `reference_load/f_N`, or 1 without one.
+
+        Raises InvalidValueError for a load below zero.
+        """
         load = validation.non_negative_numbers("normal_force", normal_force)
         if self.reference_load is None:
             return np.ones(load.shape)
