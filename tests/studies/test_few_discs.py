@@ -42,13 +42,12 @@ def test_in_hand_few_discs_end_where_the_cells_do(case):
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", list(cells.SHAPES))
 def test_few_discs_moved_at_random(shape):
-    """Twenty motions with stops, and without: found 0.69 of the published model's largest error, and 0.5."""
+    """Twenty motions with stops, and without: found 0.69 of the published model's largest error, and 3.8 % (a line)."""
     patch = cells.SHAPES[shape]()
     models = {"few": pf.ReducedModel(patch, LAW), "published": pf.ReducedModelPublished(patch, LAW)}
-    for motion, most in ((cells.stopping, 0.75), (cells.wandering, 1.0)):
-        found = cells.driven(patch, models, motion, 20)
-        force = found["few"][:, 0] / found["published"][:, 0]
-        assert force.max() < most, motion.__name__
+    stops = cells.driven(patch, models, cells.stopping, 20)
+    assert (stops["few"][:, 0] / stops["published"][:, 0]).max() < 0.75
+    assert cells.driven(patch, {"few": models["few"]}, cells.wandering, 20)["few"][:, :2].max() < 0.04
 
 
 def test_errors_on_three_feet_are_far_below_those_of_one_threshold():
