@@ -20,6 +20,9 @@ from typing import Any, NamedTuple
 LARGEST = 1e50
 """Largest number of any quantity in SI units: beyond all that exists, and products of six stay finite."""
 
+LIGHTEST = 1e-12
+"""Share of its reference load below which the stiffness of a law that has one falls with the load again."""
+
 
 class LawNumbers(NamedTuple):
     """Numbers of a friction law that the formulas read by name: floats, or arrays that broadcast with the bristles."""

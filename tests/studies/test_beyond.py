@@ -82,9 +82,9 @@ def test_discs_are_nearer_than_the_published_model(result):
         assert ratios["maximum"] < 0.6 and ratios["torque maximum"] < 0.6 and ratios["torque third quartile"] < 0.25
 
 
-def test_a_disc_for_every_cell_is_nearer_than_points_of_the_same_cells(result):
+def test_largest_errors_of_a_disc_for_every_cell_are_below_those_of_points(result):
     for each in result.numbers["driven"].values():
-        for name in ladder.STATISTICS:
+        for name in ("maximum", "torque maximum"):
             assert each[ladder.ALL][name] < each["full"][name]
 
 

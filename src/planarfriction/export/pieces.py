@@ -21,7 +21,7 @@ from planarfriction.kernels.surfaces import CELLS
 from planarfriction.kernels.trace import Block, Mathematics, Number, Table, Trace, traced
 from planarfriction.kernels.twins import twin
 from planarfriction.kernels.vectors import norm, times
-from planarfriction.laws.base import is_rate_law
+from planarfriction.laws.base import is_rate_law, refuse_fixed_stiffness
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.shared import loads_of_change
@@ -95,6 +95,7 @@ def pieces_of(model: Any, precision: str = "double", *, fixed: bool = True, coun
     depends on the load, friction that differs from cell to cell in other ways than by a metric.
     """
     whole, law = model.reduction if isinstance(model, ReducedModel) else model, getattr(model, "law", None)
+    refuse_fixed_stiffness(law, "compiled sources")
     for kind, taken_apart in _KINDS.items():
         if type(whole) is kind and isinstance(getattr(law, "numbers", None), LawNumbers) and not is_rate_law(law):
             if whole.patch.depends_on_load and (fixed or kind is not DistributedModel):
