@@ -223,6 +223,8 @@ class CoupledPatches(ByValue):
         for p in range(len(self.models)) if patches is None else patches:
             if self._packed.counts[p] == 0:
                 rule = "be None: a patch without cells cannot follow them while its shape follows the load"
+                if self.models[p].law.reference_load is not None:
+                    rule = "be None for a law with a reference_load"
                 raise InvalidValueError("moments", rule, f"model {p}: {type(self.models[p]).__name__}")
 
     def _solve(self, problems: np.ndarray) -> np.ndarray:
@@ -341,6 +343,8 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
             (records[p],), sizes[p] = places_of(packed.records), packed.records.shape[1]
     # all cells, whatever load they carry: a lever arm that does not follow the load
     radius = np.array([lever_of(model) for model in models])
+    references = np.array([model.law.reference_load or 0.0 for model in models], float)
+    bristles = np.array([model.state_shape[0] for model in models], np.int64)
     followers, firsts = _followers(models), bounds.astype(np.int64)
     rows = layout(len(models), int(bounds[-1]), len(followers.x), int(followers.words.sum()))
     patches = Patches(
@@ -351,10 +355,13 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
         slopes=slopes,
         firsts=firsts,
         radius=radius,
+        reference=references,
+        bristle=bristles,
         followers=followers,
         row=rows.offsets,
     )
-    kept, counts = [steps, slopes, firsts, radius, *followers, *known.values()], np.diff(followers.firsts)
+    kept = [steps, slopes, firsts, radius, references, bristles, *followers, *known.values()]
+    counts = np.diff(followers.firsts)
     return _PackedPatches(row_of(patches), rows.slices, rows.size, records, following, counts, sizes, kept)
 
 

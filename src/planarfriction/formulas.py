@@ -20,6 +20,9 @@ from typing import Any, NamedTuple
 LARGEST = 1e50
 """Largest number of any quantity in SI units: beyond all that exists, and products of six stay finite."""
 
+LIGHTEST = 1e-12
+"""Share of its reference load below which the stiffness of a law that has one falls with the load again."""
+
 
 class LawNumbers(NamedTuple):
     """Numbers of a friction law that the formulas read by name: floats, or arrays that broadcast with the bristles."""
@@ -164,9 +167,9 @@ def disc_friction(xp, slide, spin):
     """Sliding friction of a disc, `c_t`, `c_s` and `m` [-], from `p = |u|^2` of its centre and `o = (a omega)^2`.
 
     The mean speed of the disc is `S = sqrt(p + m o)`, with `m = 1/4 + 7/36 (e_1 + A e_2)` and `(e_1, e_2, e_3) = (o^2,
-    p o, p^2)/(o^2 + B p o + C p^2)`. Force and scaled torque of sliding are `W/S` with `W = (c_t u, c_s kappa a omega)`,
-    the gradient of S: `c_t = 1 + h e_1`, `c_s = 2 (m - h e_2)`, and `h = 7/36 ((A - B) e_1 - 2 C e_2 - A C e_3)`. Within
-    0.0085 of the exact disc. ("Discs")
+    p o, p^2)/(o^2 + B p o + C p^2)`. Force and scaled torque of sliding are `W/S`, and W is S times the gradient of S:
+    `W = (c_t u, c_s kappa a omega)`, `c_t = 1 + h e_1`, `c_s = 2 (m - h e_2)` and `h = 7/36 ((A - B) e_1 - 2 C e_2 - A
+    C e_3)`. Within 0.0085 of the exact disc. ("Discs")
     """
     return disc_friction_above(slide, spin, DISC_REST)
 

@@ -314,15 +314,12 @@ def test_the_ladder_moves_with_the_twist_and_turns_round():
     np.testing.assert_allclose(motion(state)(0.18), np.negative(state.twist))
 
 
-def test_models_are_compared_with_the_distributed_one_or_refuse_the_law():
+def test_models_are_compared_with_the_distributed_one():
+    """A mask of 18 cells: as discs they are more than points, and differ from them by what a cell's size is worth."""
     rungs = {each.name: each for each in climb(State(Drawing.published("NonConvex1"), State().law))}
     assert list(rungs) == list(RUNGS) and rungs["distributed"].error == 0.0
-    assert [each.states for each in rungs.values()] == [36, 36, 12, 3, 3]
-    assert (
-        0.0 == rungs["reduced"].error < rungs["reduced, 4 parts"].error < rungs["reduced, 1 part"].error < 0.2
-    )  # of mu_c f_N
-    refused = {each.name: each for each in climb(State().with_law("coulomb-stribeck"))}["reduced, 1 part"]
-    assert np.isnan(refused.error) and "no creep_speed" in refused.refusal
+    assert [each.states for each in rungs.values()] == [36, 54, 54, 24, 3]
+    assert 0.0 < rungs["reduced"].error < 0.02 < rungs["reduced, as published"].error < 0.2  # of mu_c f_N
 
 
 def test_a_scene_is_run_with_the_contact_on_the_screen():

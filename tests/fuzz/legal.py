@@ -17,6 +17,7 @@ import planarfriction as pf
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"
 LAW = pf.LuGre(mu_c=1.0, mu_s=1.2, elasto_plastic=0.9)
 PATCH = pf.ContactPatch.disc(0.01, 5)
+DISCS = pf.ReducedModel(PATCH, LAW, cells=4)
 SOFT = pf.ContactPatch.disc(0.01, 5, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
 TWISTS = np.linspace([0.0, 0.0, 0.1], [0.01, 0.005, 1.0], 20)
 TIMES = np.linspace(0.0, 0.19, 20)
@@ -138,7 +139,7 @@ def objects() -> dict[str, Any]:
         "ContactPatch": SOFT, "Coulomb": pf.Coulomb(0.5), "CoulombStribeck": pf.CoulombStribeck(), "Dahl": pf.Dahl(),
         "LuGre": LAW, "DistributedModel": pf.DistributedModel(PATCH, LAW),
         "ReducedModelPublished": soft,
-        "ReducedModel": pf.ReducedModel(PATCH, LAW, cells=4), "Signal": signal, "Scene": scene,
+        "ReducedModel": DISCS, "Signal": signal, "Scene": scene,
         "Solution": solution, "Grid": pf.patch.Grid.around_origin(0.02, 0.02, 5, 5), "SoftFinger": SOFT.pressure,
         "Slide": pf.identify.Slide(time, pose), "Log": log, "Uniform": pf.Uniform(),
         "LinearGradient": pf.LinearGradient((5.0, 2.0)), "PressureMaps": pf.PressureMaps([1.0, 2.0], np.ones((2, 3))),
@@ -207,7 +208,8 @@ SPECIAL: dict[str, dict[str, Any]] = {
         for name in ("patch.Pressure", "patch.PerCell", "SoftFinger", "Uniform", "LinearGradient", "PressureMaps")
     },
     **{
-        f"DistributedModel.{name}": {"state": Fresh(lambda: np.zeros((2, PATCH.cells)))}
+        f"{model}.{name}": {"state": Fresh(lambda shape=shape: np.zeros(shape))}
+        for model, shape in (("DistributedModel", (2, PATCH.cells)), ("ReducedModel", DISCS.state_shape))
         for name in ("rate", "wrench", "step", "jacobians", "step_jacobians")
     },
     **{

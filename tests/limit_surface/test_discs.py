@@ -151,6 +151,18 @@ def test_one_metric_is_a_change_of_coordinates():
         assert kind(turned).dissipation(twists) == pytest.approx(kind(plain).dissipation(seen), rel=1e-12)
 
 
+def test_the_published_table_and_model_take_discs():
+    for patch in (ONE, FEW):
+        table, cells = pf.LimitSurfaceTablePublished(patch), pf.LimitSurfaceCells(patch)
+        assert table.contact_radius == cells.contact_radius
+        assert table.compare(cells).force.largest < 0.01  # bilinear in 4.5 degrees
+        model = pf.ReducedModelPublished(patch, pf.LuGre(mu_c=0.5, mu_s=0.5, sigma_2=0.0))
+        x, y = cells.centre_of_pressure
+        spin = np.array([y, -x, 1.0])
+        wrench = model.step(model.rest(), 3.0 * spin, 2.0, 10.0)[1]
+        assert spin @ wrench == pytest.approx(-0.5 * 2.0 * cells.contact_radius, rel=1e-6)
+
+
 def test_tables_and_models_take_surfaces_of_discs():
     law = pf.LuGre()
     cells, table = pf.LimitSurfaceCells(FEW), pf.LimitSurfaceTable(FEW)

@@ -85,7 +85,10 @@ class Jax:
         return np.asarray(array)
 
 
-@pytest.fixture(scope="module", params=[pytest.param(each, marks=getattr(pytest.mark, each.name)) for each in (Torch, Jax)])
+FRONTS = [pytest.param(each, marks=getattr(pytest.mark, each.name)) for each in (Torch, Jax)]
+
+
+@pytest.fixture(scope="module", params=FRONTS)
 def front(request):
     made = request.param()
     before = made.library.config.jax_enable_x64 if made.name == "jax" else None

@@ -17,6 +17,7 @@ import numpy as np
 from planarfriction.compiled.packed import PackedModel
 from planarfriction.compiled.rates import rates
 from planarfriction.equality import by_parts
+from planarfriction.formulas import LIGHTEST
 from planarfriction.geometry import twist_at, wrench_at
 from planarfriction.kernels.steps import UNFIT, StepFunctions, jacobians, ready, step_many, step_one
 
@@ -49,6 +50,14 @@ class StepJacobians(NamedTuple):
 def _seen(twist: np.ndarray, moved: np.ndarray | None) -> np.ndarray:
     """Return the twists that patches see which have moved, in C order."""
     return twist if moved is None else np.ascontiguousarray(twist_at(twist, moved))
+
+
+def driven(contact: PackedModel, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """Return twists as rates read them: of a fixed stiffness with the factor on `sigma_0` behind, `[B, 4]`."""
+    if contact.reference == 0.0:
+        return twist
+    factor = contact.reference / np.maximum(load, LIGHTEST * contact.reference)
+    return np.concatenate([twist, factor[:, None]], axis=1)
 
 
 def _pull(wrench: np.ndarray, moved: np.ndarray | None) -> np.ndarray:
@@ -227,7 +236,7 @@ class CompiledModel:
         z, v = state.reshape(-1, self._size), twist.reshape(-1, 3)
         rate, unit = np.zeros(z.shape), np.zeros(v.shape)
         for rows, contact, moved in self.pressed(load, centre):
-            rate[rows], pull = rates(contact, z[rows], _seen(v[rows], moved))
+            rate[rows], pull = rates(contact, z[rows], driven(contact, _seen(v[rows], moved), load.reshape(-1)[rows]))
             unit[rows] = _pull(pull, moved)
         return rate.reshape(state.shape), unit.reshape(twist.shape)
 

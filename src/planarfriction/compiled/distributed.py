@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from planarfriction.compiled import packed
-from planarfriction.compiled.base import CompiledModel
+from planarfriction.compiled.base import CompiledModel, driven
 from planarfriction.compiled.packed import PackedModel
 from planarfriction.compiled.rates import linearised
 from planarfriction.compiled.shapes_by_load import ShapesByLoad, cells_by_load
 from planarfriction.compiler.memory import places_of, rows_of, size_of
 from planarfriction.kernels import cells as contacts
-from planarfriction.kernels import disc_cells, disc_passes
+from planarfriction.kernels import disc_cells, disc_passes, fixed_stiffness
 from planarfriction.kernels import distributed_step as steps
 from planarfriction.kernels.contacts import ModelFunctions
 from planarfriction.kernels.discs import KAPPA
@@ -23,6 +23,14 @@ from planarfriction.kernels.general_cells import LINEAR, MATRICES, A, C, E, F
 from planarfriction.kernels.leaning_cells import RATES_OF_LEANING, STEPS_OF_LEANING
 from planarfriction.kernels.steps import StepFunctions
 from planarfriction.patch.tilt import tilted
+
+_FIXED = {
+    (2, False): fixed_stiffness.POINTS,
+    (2, True): fixed_stiffness.TURNED_POINTS,
+    (3, False): fixed_stiffness.DISCS,
+    (3, True): fixed_stiffness.TURNED_DISCS,
+}
+"""Rates of a fixed stiffness, by the components of a bristle, and whether friction is anisotropic."""
 
 LOAD_STEP = 1e-5
 """Step of the central differences of weights by the load, as a share of it [-]; their relative error is 1e-10."""
@@ -35,7 +43,11 @@ class CompiledDistributed(CompiledModel):
         self.law, self.patch = law, patch
         self.size = 3 if patch.radii.any() else 2
         """Number of bristles of a cell: two of a point, three of a disc."""
+        self.reference = 0.0 if law.reference_load is None else law.reference_load
+        """Load [N] of `reference_load`, or 0."""
         self._contact, functions = self._functions()
+        if self.reference > 0.0:
+            self._contact = _FIXED[self.size, patch.anisotropic]
         cells = len(patch.positions)
         super().__init__(functions, (self.size, cells), (self.size, self.size, cells))
 
@@ -54,6 +66,8 @@ class CompiledDistributed(CompiledModel):
     def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         """Return the record of a contact, and how many numbers of a linearisation each cell has."""
         rows = LINEAR * self.size**2 if self.size == 3 or self.patch.asymmetric else contacts.LINEAR_ROWS
+        if self.reference > 0.0:
+            rows = MATRICES * self.size**2 + fixed_stiffness.ROWS_BEHIND
         return contacts.CellsContact(self.law.numbers, numbers.shape[1], numbers, weights), rows
 
     # ------------------------------------------------------------------ at given loads
@@ -69,7 +83,8 @@ class CompiledDistributed(CompiledModel):
 
     def points(self) -> tuple[np.ndarray, int]:
         """See `CompiledModel`."""
-        return self.patch.positions, size_of(type(self.record(np.zeros((2, 1)), np.zeros(1))[0]))
+        size = size_of(type(self.record(np.zeros((2, 1)), np.zeros(1))[0]))
+        return self.patch.positions[: 0 if self.reference > 0.0 else None], size
 
     def _following(self, load: np.ndarray, centre: np.ndarray) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
         weights = tilted(self.patch.positions, self.patch.weights(load.reshape(-1)), centre)
@@ -79,7 +94,8 @@ class CompiledDistributed(CompiledModel):
         """Return linearisations `[..., L, N]` as `kernels.cells.LinearCells`, or those of `kernels.general_cells`."""
         ((_, contact),) = self.at_each_load(load)
         cells = state.shape[-1]
-        lin = linearised(contact, state.reshape(load.size, self.size * cells), twist.reshape(-1, 3))
+        seen = driven(contact, twist.reshape(-1, 3), load.reshape(-1))
+        lin = linearised(contact, state.reshape(load.size, self.size * cells), seen)
         return lin.reshape(*load.shape, lin.shape[-1] // cells, cells)
 
     def slopes(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> Any:
@@ -88,6 +104,8 @@ class CompiledDistributed(CompiledModel):
         Four arrays `[..., d, d, N]` of d bristles a cell; the velocity is that which a cell sees.
         """
         law, d, lin = self.law.numbers, self.size, self.linearisation(state, twist, load)
+        if self.reference > 0.0:
+            lin = lin[..., : MATRICES * d * d, :]
         identity = np.eye(d)[:, :, None]
         if lin.shape[-2] == contacts.LINEAR_ROWS:
             k, k_z, k_v = lin[..., :1, None, :], lin[..., None, 1:3, :], lin[..., None, 3:5, :]
@@ -151,6 +169,8 @@ class CompiledDistributed(CompiledModel):
             float(np.hypot(np.hypot(*(positions - positions.mean(axis=0)).T), KAPPA * self.patch.lever_radii[chosen]).mean()),
             (weights, numbers),
             chosen,
+            reference=self.reference,
+            bristle=self.size,
         )
 
     def numbers(self, chosen: Any = slice(None)) -> np.ndarray:

@@ -49,8 +49,14 @@ class PackedModel(NamedTuple):
     noise, and a patch that just holds could give way, or the other way round.
     """
 
+    reference: float = 0.0
+    """Reference load [N] of a law whose stiffness does not grow with the load; 0 of others."""
+    bristle: int = 2
+    """Components of a bristle, for such a law."""
+
     def table(self, function: Any, square: int) -> np.ndarray:
         """Return the words of `kernels.steps.Stepped`, which hold as long as the records; `square` as there."""
         loads, words = self.records.shape
         address = address_of(function, WORDS)
-        return row_of(Stepped(address, self.states, square, loads, place_of(self.records), words))
+        own = address, self.states, square, loads, place_of(self.records), words
+        return row_of(Stepped(*own, self.reference, self.bristle))

@@ -18,7 +18,7 @@ from planarfriction.kernels.cell_blocks import divided
 from planarfriction.kernels.law import LAW
 from planarfriction.kernels.published_rollouts import gradient, rollout, sensitivities, tangent
 from planarfriction.kernels.rollouts import Inputs
-from planarfriction.laws.base import is_rate_law
+from planarfriction.laws.base import is_rate_law, refuse_fixed_stiffness
 from planarfriction.models import DistributedModel, ReducedModelPublished
 from planarfriction.models.reduced_published import PublishedShape, axes_of
 
@@ -169,6 +169,7 @@ def _family(model: Any) -> Family:
     model = getattr(model, "reduction", model)
     if isinstance(model, ReducedModelPublished):
         return PUBLISHED
+    refuse_fixed_stiffness(getattr(model, "law", None), "compiled roll-outs")
     if isinstance(model, DistributedModel) and not (is_rate_law(model.law) or model.patch.asymmetric):
         families = (DISCS, TURNED_DISCS) if model.patch.has_discs else (CELLS, TURNED_CELLS)
         return families[model.patch.anisotropic]

@@ -21,21 +21,18 @@ from planarfriction.kernels.surfaces import CELLS
 from planarfriction.kernels.trace import Block, Mathematics, Number, Table, Trace, traced
 from planarfriction.kernels.twins import twin
 from planarfriction.kernels.vectors import norm, times
-from planarfriction.laws.base import is_rate_law
+from planarfriction.laws.base import is_rate_law, refuse_fixed_stiffness
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
+from planarfriction.patch.shared import loads_of_change
 
 ERROR = 2e-3
 """Largest share of the load that stands on other cells than it should, halfway between two rungs [-]."""
 
 MOST_RUNGS = 512
 
-PROBED = np.geomspace(1e-6, 1e6, 1001)
-"""Loads [N] at which a patch is looked at to find where its shape changes."""
-
-MOVED = 0.1
-"""Share of the load that moves between cells from one rung to the next, to begin with."""
-
+NARROW = 1e-3
+"""Relative distance of rungs [-] between which nothing is put: a shape that jumps there stays as it is."""
 
 class Ladder(NamedTuple):
     """Shares of the load at some loads, linear in the load between them and constant beyond."""
@@ -46,30 +43,19 @@ class Ladder(NamedTuple):
     """Shares of the cells [L, N]."""
 
 
-def _loads_of_change(patch: ContactPatch) -> np.ndarray:
-    """Return loads [N] from the lowest to the highest at which the shape changes, by equal changes of the shape."""
-    moved = 0.5 * np.abs(np.diff(patch.weights(PROBED), axis=0)).sum(axis=1)
-    changes = np.flatnonzero(moved > 0.0)
-    if len(changes) == 0:  # the shape stays, or changes at loads beyond all that exist
-        return PROBED[[0, -1]]
-    span = slice(changes[0], changes[-1] + 2)
-    total = np.r_[0.0, np.cumsum(moved[changes[0] : changes[-1] + 1])]
-    wanted = np.linspace(0.0, total[-1], max(2, math.ceil(total[-1] / MOVED)) + 1)
-    return np.exp(np.interp(wanted, total, np.log(PROBED[span])))
-
-
 def ladder_of(patch: ContactPatch) -> Ladder:
-    """Return rungs so close that shares between them err by `ERROR` at most.
+    """Return rungs so close that shares between them err by `ERROR` at most, or `NARROW` ones where shares jump.
 
     Raises InvalidValueError if more than `MOST_RUNGS` are needed.
     """
-    rungs = np.union1d(_loads_of_change(patch), getattr(patch.pressure, "loads", ()))
+    rungs = np.union1d(loads_of_change(patch), getattr(patch.pressure, "loads", ()))
     while True:
         shares, between = patch.weights(rungs), 0.5 * (rungs[1:] + rungs[:-1])
         off = 0.5 * np.abs(patch.weights(between) - 0.5 * (shares[1:] + shares[:-1])).sum(axis=1)
-        if not (off > ERROR).any():
+        coarse = (off > ERROR) & (np.diff(rungs) > NARROW * between)
+        if not coarse.any():
             return Ladder(rungs, shares)
-        rungs = np.union1d(rungs, between[off > ERROR])
+        rungs = np.union1d(rungs, between[coarse])
         if len(rungs) > MOST_RUNGS:
             rule = f"have a patch whose shape {MOST_RUNGS} loads describe within {ERROR:g}"
             raise InvalidValueError("model", rule, patch.name or "a patch")
@@ -109,6 +95,7 @@ def pieces_of(model: Any, precision: str = "double", *, fixed: bool = True, coun
     depends on the load, friction that differs from cell to cell in other ways than by a metric.
     """
     whole, law = model.reduction if isinstance(model, ReducedModel) else model, getattr(model, "law", None)
+    refuse_fixed_stiffness(law, "compiled sources")
     for kind, taken_apart in _KINDS.items():
         if type(whole) is kind and isinstance(getattr(law, "numbers", None), LawNumbers) and not is_rate_law(law):
             if whole.patch.depends_on_load and (fixed or kind is not DistributedModel):

@@ -22,7 +22,7 @@ turn are slower, and less than that is noise."""
 LEAST, MOST = 20, 120
 """Least number of sliding samples that a check needs, and most that it takes, evenly chosen."""
 
-MOST_CELLS, DISCS = 500, 200
+MOST_CELLS, FEW_DISCS = 500, 100
 """Number of cells of a patch above which a check uses discs, and number of these."""
 
 AGAINST = 0.7
@@ -137,7 +137,7 @@ class Sliding:
     @classmethod
     def of(cls, log: Log, patch: ContactPatch) -> Sliding:
         """Select the fast samples under load, at most `MOST` of them."""
-        few = patch.discs(DISCS) if patch.cells > MOST_CELLS else patch
+        few = patch.discs(FEW_DISCS) if patch.cells > MOST_CELLS else patch
         weights = few.weights(_load(log)) if few.depends_on_load else few.weights()
         size = size_of(log, patch)
         speed, force = (np.linalg.norm(each, axis=1) for each in (log.twist * [1, 1, size], log.wrench / [1, 1, size]))

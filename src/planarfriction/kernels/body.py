@@ -28,8 +28,14 @@ from planarfriction.kernels.contacts import (
     contact_map,
     contact_map_slopes,
 )
+from planarfriction.kernels.law import law_of
+from planarfriction.kernels.settle import bring_back, factor_at
 from planarfriction.kernels.small_matrices import applied, inverse
 from planarfriction.kernels.vectors import applied_back, plus, put, put_all, three
+
+
+NO_LOAD = 1e-6
+"""Share of the reference load of a fixed stiffness below which bristles cannot follow the load (see `settle_all`)."""
 
 
 class Motion(NamedTuple):
@@ -76,7 +82,9 @@ class Work(NamedTuple):
     wrench: Doubles
     """Wrench of each contact per unit load, [C, 3]."""
     twist: Doubles
-    """Twist of one contact, [3]."""
+    """Twist of one contact and the factor on its stiffness, [4]."""
+    factor: Doubles
+    """That factor of each contact (see `settle.factor_at`), as `rates` left it, [C]."""
     stiffness: Doubles
     """d wrench / d twist of one contact, [3, 3]."""
     matrix: Doubles
@@ -129,8 +137,8 @@ class System(Packed):
     ) -> None:
         n, square = len(contacts.count), (3, 3)
         work = layout(
-            Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=3, stiffness=square,
-            matrix=square, inverse=square, to_pose=square, body=3, rows=(4, 3), moved=(n, 8),
+            Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=4, factor=n,
+            stiffness=square, matrix=square, inverse=square, to_pose=square, body=3, rows=(4, 3), moved=(n, 8),
         )  # fmt: skip
         self._block, addresses = np.zeros(work.size), [address_of(*each) for each in BODY_FUNCTIONS]
         sizes = n, int(contacts.state[n]), pressures, len(motion.breaks) - 1
@@ -157,6 +165,20 @@ def total_load(own, piece, since, c):
 def record_of(own, piece, c):
     """Return the address of the record of contact c with the shape that it has on a piece."""
     return own.contacts.record[own.motion.row[piece * own.size + c]]
+
+
+@kernel
+def settle_all(own, piece, y):
+    """Bring bristles back onto their limits where a piece starts with hardly any load.
+
+    Elsewhere they return by themselves, too fast to be followed only there.
+    """
+    for c in range(own.size):
+        reference, load = own.contacts.reference[c], load_of(own, piece, 0.0, c)
+        if load < NO_LOAD * reference:
+            first, size = own.contacts.state[c], own.contacts.bristle[c]
+            count, factor = (own.contacts.state[c + 1] - first) // size, factor_at(reference, load)
+            bring_back(law_of(record_of(own, piece, c)), size, at(y, first), factor, count)
 
 
 @kernel
@@ -224,6 +246,8 @@ def rates(system, piece, since, y, dy):
         place, seen = place_at(own, piece, since, c, body)
         contact_map(own.contacts.mount[c], place, at(body, 3), a)
         put(work.twist, applied(a, seen))
+        work.factor[c] = factor_at(own.contacts.reference[c], load_of(own, piece, since, c))
+        work.twist[3] = work.factor[c]
         call(function_of(own, c, EVALUATE), (record_of(own, piece, c), at(y, first), work.twist, at(dy, first), w))
         total = plus(total, total_load(own, piece, since, c), applied_back(a, w))
     for i in range(3):
@@ -258,6 +282,7 @@ def linearise(system, piece, y):
                 g[3 * i] -= omega * a[3 * i + 1]
                 g[3 * i + 1] += omega * a[3 * i]
         put(work.twist, applied(a, seen))
+        work.twist[3] = work.factor[c]
         z = at(y, own.contacts.state[c])
         call(function_of(own, c, LINEARISE), (record_of(own, piece, c), z, work.twist, linearisation_of(own, c)))
 

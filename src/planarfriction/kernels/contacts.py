@@ -50,9 +50,9 @@ class ModelFunctions(NamedTuple):
     """
 
     evaluate: Any
-    """`(contact, z, V, z', W)`: write z' and W."""
+    """`(contact, z, V, z', W)`: write z' and W; behind V is the factor on the stiffness, for `fixed_stiffness`."""
     linearise: Any
-    """`(contact, z, V, lin)`: write the derivatives of f into the workspace `lin` of the contact."""
+    """`(contact, z, V, lin)`: write the derivatives of f into the workspace `lin` of the contact; V as above."""
     factor: Any
     """`(contact, z, shift, lin, S)`: prepare D in `lin`, write S [3, 3] = dW/dV with z eliminated."""
     eliminate: Any
@@ -116,6 +116,10 @@ class Contacts(NamedTuple):
     """Number of the state at which the bristles of each contact begin, [C + 1]."""
     linear: Integers
     """Number of the workspace at which the linearisation of each contact begins, [C + 1]."""
+    reference: Doubles
+    """Reference load [N] of laws whose stiffness does not grow with the load; 0 of others, [C]."""
+    bristle: Integers
+    """Components of a bristle of each contact with such a law, [C]."""
 
 
 @kernel

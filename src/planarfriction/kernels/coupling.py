@@ -24,6 +24,7 @@ from planarfriction.compiler.calls import address_of, call, pointer
 from planarfriction.compiler.memory import arrays_at, at, doubles
 from planarfriction.kernels.coupling_rows import INVALID, read
 from planarfriction.kernels.following import follow
+from planarfriction.kernels.settle import factor_at, stepped
 from planarfriction.kernels.small_matrices import leave_out_rising, solved
 
 DOWNHILL = 0.5
@@ -41,6 +42,9 @@ SHORTER, STAGES = 4.0, 8
 
 NEAR = 10.0
 """Misfit of the guess, over the tolerance, up to which a Newton step goes from there: rest need not be tried."""
+
+LOAD_STEP = 1e-6
+"""Share of a load over which wrenches of a fixed stiffness are compared for their slope."""
 
 ROUNDING = 1e-13
 """Error of a twist, in the largest speed that goes into it, below which no step gets."""
@@ -66,6 +70,32 @@ def _bring_back(step, dx, dy):
 
 
 @kernel
+def _step(own, p, functions, k, load):
+    """Step patch k under a load, at the twist that it sees."""
+    first, reference = own.firsts[k], own.reference[k]
+    if reference > 0.0:
+        states, factor = own.firsts[k + 1] - first, factor_at(reference, load)
+        given = own.bristle[k], states, factor, at(p.state, first), p.seen, p.dt[0], at(p.new, first), p.step
+        stepped(functions[k], p.acting[k], *given)
+    else:
+        call(functions[k], (p.acting[k], at(p.state, first), p.seen, p.dt[0], at(p.new, first), p.step))
+
+
+@kernel
+def _load_slopes(own, p):
+    """Write the slopes of the wrenches by the loads; where stiffness is fixed, by a step under another load."""
+    for k in range(own.count):
+        one, load = 3 * k, p.load[k]
+        for i in range(3):
+            p.unit_loaded[one + i] = p.unit[one + i]
+        if own.reference[k] > 0.0 and p.acting[k] != 0 and load > 0.0:
+            p.seen[0], p.seen[1], p.seen[2] = p.twist[one], p.twist[one + 1], p.twist[one + 2]
+            _step(own, p, own.steps, k, (1.0 + LOAD_STEP) * load)
+            for i in range(3):
+                p.unit_loaded[one + i] += (p.step[i] - p.unit[one + i]) / LOAD_STEP
+
+
+@kernel
 def step_all(own, p, functions):
     """Step all patches at the twists of a problem: write the new state and wrenches per unit load.
 
@@ -77,9 +107,8 @@ def step_all(own, p, functions):
             for i in range(12):
                 p.step[i] = 0.0
         else:
-            first = own.firsts[k]
             seen[0], seen[1], seen[2] = p.twist[3 * k] - spin * dy, p.twist[3 * k + 1] + spin * dx, spin
-            call(functions[k], (p.acting[k], at(p.state, first), seen, p.dt[0], at(p.new, first), p.step))
+            _step(own, p, functions, k, p.load[k])
             if dx != 0.0 or dy != 0.0:
                 _bring_back(p.step, dx, dy)
         for i in range(3):
@@ -142,10 +171,11 @@ def _newton(own, p, held, falling):
         for i in range(3):
             one, x, y, s = 3 * k + i, slopes[3 * i], slopes[3 * i + 1], slopes[3 * i + 2]
             change[one] = (load + follows * lacks) * p.unit[one] - w[one]
+            change[one] += follows * lacks * (p.unit_loaded[one] - p.unit[one])
             change[one] += x * gap[3 * k] + y * gap[3 * k + 1] + s * gap[3 * k + 2]
             for j in range(n):
                 caused = x * a[n * 3 * k + j] + y * a[n * (3 * k + 1) + j] + s * a[n * (3 * k + 2) + j]
-                loaded = follows * p.unit[one] * p.load_response[n * k + j]
+                loaded = follows * p.unit_loaded[one] * p.load_response[n * k + j]
                 p.matrix[n * one + j] = (1.0 if j == one else 0.0) - caused - loaded
     sign, downhill = solved(p.matrix, change, n), _downhill(own, p)
     return sign > 0.0 and downhill > 0.0
@@ -324,6 +354,7 @@ def solve(patches, problem):
             break
         held = iterations % ROUND >= JOINT
         step_all(own, p, own.slopes)  # dear: not before they are needed, which at rest they are not
+        _load_slopes(own, p)
         if not _newton(own, p, held, False):
             _newton(own, p, held, True)
         _go(own, p, held, rest)

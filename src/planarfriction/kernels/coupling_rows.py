@@ -57,6 +57,8 @@ class Problem(NamedTuple):
     """1 or 0, [1]."""
     unit: Doubles
     """Wrenches of the models per unit load, [3k]; this and all that follows is scratch."""
+    unit_loaded: Doubles
+    """Slopes of the wrenches by the loads, [3k]: `unit` but for a fixed stiffness."""
     unit_slopes: Doubles
     """Slopes of the wrenches per unit load, [k, 9]."""
     slopes: Doubles
@@ -138,6 +140,10 @@ class Patches(NamedTuple):
     """First state of each patch, and behind the last the number of all, [k + 1]."""
     radius: Doubles
     """Lever arms of the patches that turn spins into speeds [m], [k]."""
+    reference: Doubles
+    """Reference loads [N] of laws whose stiffness does not grow with the load; 0 of others, [k]."""
+    bristle: Integers
+    """Components of the bristles of patches with such laws, [k]."""
     followers: Followers
     row: Offsets
 

@@ -76,9 +76,10 @@ class Bristle(NamedTuple):
 
 def bristle(evaluate: Any, step: Any, size: int = 2, linear: bool = False) -> Bristle:
     """Return the functions of a bristle, with the derivatives that `derive` writes."""
-    linearise = slopes_of(evaluate, size) if evaluate else None  # not needed for steps alone
+    linearise = slopes_of(evaluate, size) if evaluate else None  # not needed for steps alone, nor steps for rates
     readers = reader_of(size), reader_of(size * size)
-    return Bristle(evaluate, step, linearise, slopes_of(step, size), size, *readers, *_ALGEBRA[size], linear)
+    of_step = slopes_of(step, size) if step else None
+    return Bristle(evaluate, step, linearise, of_step, size, *readers, *_ALGEBRA[size], linear)
 
 
 def slopes_of(function: Any, size: int) -> Any:

@@ -10,7 +10,7 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import address_of, call
 from planarfriction.compiler.memory import Packed, at, exists, layout
-from planarfriction.kernels.body import BODY_FUNCTIONS, System, load_of, maps_of, place_at, read
+from planarfriction.kernels.body import BODY_FUNCTIONS, System, load_of, maps_of, place_at, read, settle_all
 from planarfriction.kernels.contacts import contact_map
 from planarfriction.kernels.integration import Method, Output, Progress, RunRecord, Stages, combine, read_run
 from planarfriction.kernels.rest import at_rest, speed_of
@@ -106,8 +106,18 @@ def _time_slope(own, piece, slope):
 
 
 @kernel
+def _drifts(own, piece):
+    """Return True if rates of bristles change with the time alone: what they touch moves, or a limit with the load."""
+    found = exists(own.motion.mover)
+    for c in range(own.size):
+        changes = own.motion.load[(2 * piece + 1) * own.size + c] != 0.0
+        found = found or (changes and own.contacts.reference[c] > 0.0)
+    return found
+
+
+@kernel
 def _drift(run, own, piece, since, step):
-    """Write `df/dt` of all states [n] where what a contact touches moves: a difference over a small share of a step.
+    """Write `df/dt` of all states [n] where bristles see the time: a difference over a small share of a step.
 
     That is right to `_NUDGE` and costs one evaluation, while each model would have to know what its bristles say.
     """
@@ -149,7 +159,7 @@ def _extend(run, share, value, slope, base, out):
 def _step(run, own, piece, since, step):
     """Go through the stages of one step from `y`: solution into `new`, its error estimate into `error`."""
     n, s, method, work, y = run.states, run.stage_count, run.method, run.stages, run.progress.y
-    k, right, shift, moves = work.k, work.right, 1.0 / (step * method.gamma), exists(own.motion.mover)
+    k, right, shift, drifts = work.k, work.right, 1.0 / (step * method.gamma), _drifts(own, piece)
     call(own.factor, (run.system, piece, since, y, shift))
     for i in range(s):
         for j in range(i):
@@ -159,7 +169,7 @@ def _step(run, own, piece, since, step):
             call(own.rates, (run.system, piece, since + method.alpha[i] * step, work.argument, work.rate))
         call(run.combine, (work.coupling, k, i, n, work.rate if i > 0 else work.start_rate, right))
         slope = method.time_gamma[i] * step
-        if moves:
+        if drifts:
             for p in range(n):
                 right[p] += slope * work.drift[p]
         else:
@@ -222,7 +232,7 @@ def attempt(run, piece, since, step, fresh):
         call(own.rates, (run.system, piece, since, y, run.stages.start_rate))
         call(own.linearise, (run.system, piece, y))
         _time_slope(own, piece, run.stages.time_slope)
-        if exists(own.motion.mover):
+        if _drifts(own, piece):
             _drift(run, own, piece, since, step)
         statistics[JACOBIANS] += 1
     _step(run, own, piece, since, step)
@@ -239,6 +249,7 @@ def _start(run, own, piece):
     progress, motion = run.progress, own.motion
     if exists(motion.velocity):
         put(at(progress.y, run.states - 6), three(at(motion.velocity, 3 * piece)))
+    settle_all(own, piece, progress.y)
     progress.clock[STEP] = xp.minimum(progress.clock[STEP], progress.clock[FIRST])
     if piece == 0 and progress.cursor[SAMPLE] == 0 and run.output.time[0] == motion.breaks[0]:
         _record(run, own, piece, 0.0, progress.y)

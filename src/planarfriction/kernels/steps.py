@@ -22,13 +22,18 @@ from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import call, pointer
 from planarfriction.compiler.memory import at, reader
 from planarfriction.kernels.bind import bind
-from planarfriction.kernels.vectors import put, three, times
+from planarfriction.kernels.settle import factor_at, stepped, unscale
+from planarfriction.kernels.vectors import plus, put, three, times
 
 WORDS = "pddfdd"
 """Arguments of `StepFunctions` (see `calls.address_of`)."""
 
 SLOPES = 12
 """Numbers that `StepFunctions.slopes` writes."""
+
+
+NUDGE = 1e-5
+"""Share of the load over which wrenches of a fixed stiffness are compared for their slope."""
 
 
 class StepFunctions(NamedTuple):
@@ -76,6 +81,10 @@ class Stepped(NamedTuple):
     """Address of the first of the R records, which lie one behind the other."""
     words: int
     """Number of words of a record."""
+    reference: float = 0.0
+    """Reference load [N] of a law whose stiffness does not grow with the load; 0 of others."""
+    size: int = 2
+    """Components of a bristle, for such a law."""
 
 
 _read = reader(Stepped)
@@ -103,7 +112,11 @@ def _positive(load, dt):
 @kernel
 def _step(own, b, z, twist, load, dt, new, wrench, unit):
     """Step contact b; `unit` [3] is scratch."""
-    call(own.function, (_record(own, b), z, twist, dt, new, unit))
+    if own.reference > 0.0:
+        factor = factor_at(own.reference, load)
+        stepped(own.function, _record(own, b), own.size, own.states, factor, z, twist, dt, new, unit)
+    else:
+        call(own.function, (_record(own, b), z, twist, dt, new, unit))
     if load > 0.0:
         put(wrench, times(load, three(unit)))
     else:
@@ -151,14 +164,36 @@ def step_many(stepped, z, twist, load, dt, new, wrench, scratch):
 
 
 @kernel
+def _step_fixed(own, b, z, given, new, wrench_twist):
+    """Step contact b with a fixed stiffness: slopes behind `new` as others have them, and that of the wrench by load.
+
+    That one is a central difference.
+    """
+    s, load, dt, record = own.states, given[3], given[4], _record(own, b)
+    found, more, less = at(new, s), factor_at(own.reference, load * (1.0 + NUDGE)), load * (1.0 - NUDGE)
+    stepped(own.function, record, own.size, s, more, z, given, dt, new, found)
+    above = three(found)
+    stepped(own.function, record, own.size, s, factor_at(own.reference, less), z, given, dt, new, found)
+    change = times(0.5 / NUDGE, plus(above, -1.0, three(found)))
+    factor = factor_at(own.reference, load)
+    stepped(own.function, record, own.size, s, factor, z, given, dt, new, found)
+    put(at(wrench_twist, 9), plus(three(found), 1.0, change))
+    by_twist = at(found, SLOPES)
+    unscale(record, own.size, z, factor, s // own.size, by_twist, at(by_twist, 3 * s), at(by_twist, 6 * s))
+
+
+@kernel
 def _jacobians(own, b, z, given, out, new):
     """Write the derivatives of a step of contact b to `out`; `new` [S] and all behind it are scratch."""
     s, load, dt = own.states, given[3], given[4]
     found, loaded, by_twist = at(new, s), 1.0 if load > 0.0 else 0.0, at(out, own.square)
     of_wrench, wrench_twist = at(by_twist, 3 * s), at(by_twist, 6 * s)
-    call(own.function, (_record(own, b), z, given, dt, new, found))
-    for m in range(3):
-        wrench_twist[9 + m] = found[m]
+    if own.reference > 0.0:
+        _step_fixed(own, b, z, given, new, wrench_twist)
+    else:
+        call(own.function, (_record(own, b), z, given, dt, new, found))
+        for m in range(3):
+            wrench_twist[9 + m] = found[m]
     for m in range(9):
         wrench_twist[m] = load * found[3 + m]
     for m in range(3 * s):

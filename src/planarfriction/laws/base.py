@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,6 +25,9 @@ class FrictionLaw(Checked):
     dimensions, where `axis` is the axis of the components.
     """
 
+    reference_load: ClassVar[float | None] = None
+    """Load [N] at which `sigma_0` holds, of a law whose stiffness does not grow with the load; None: it does."""
+
     def _repr_html_(self) -> str:
         return picture("law in a notebook", self)
 
@@ -42,7 +45,10 @@ class FrictionLaw(Checked):
 
     @property
     def largest_deflection(self) -> float:
-        """Steady-state deflection at high speed, `mu_c / sigma_0` [m], which is the natural scale of a bristle."""
+        """Steady-state deflection at high speed, `mu_c / sigma_0` [m], which is the natural scale of a bristle.
+
+        That at the reference load, of a law that has one: deflections grow with the load then.
+        """
         return self.numbers.mu_c / self.numbers.sigma_0
 
     def steady_friction(self, speed: ArrayLike) -> np.ndarray:
@@ -61,12 +67,29 @@ class FrictionLaw(Checked):
         """True if a bristle that is not driven keeps its deflection, so that a contact can stick under a load."""
         return self.numbers.creep_speed == 0.0
 
-    def rate(self, state: ArrayLike, velocity: ArrayLike, *, axis: int | None = None) -> np.ndarray:
+    def stiffness_factor(self, normal_force: ArrayLike) -> np.ndarray:
+        """Return what `sigma_0` has to be multiplied by at loads `[...]` [N]: `reference_load/f_N`, or 1 without one."""
+        load = validation.non_negative_numbers("normal_force", normal_force)
+        if self.reference_load is None:
+            return np.ones(load.shape)
+        return self.reference_load / np.maximum(load, formulas.LIGHTEST * self.reference_load)
+
+    def rate(
+        self, state: ArrayLike, velocity: ArrayLike, normal_force: ArrayLike | None = None, *, axis: int | None = None
+    ) -> np.ndarray:
         """Return the rate `zdot` [m/s] of bristles with deflection `state` [m] driven at `velocity` [m/s].
 
-        Both broadcast. Raises InvalidValueError for shapes that do not broadcast.
+        All broadcast; a law with a `reference_load` needs the `normal_force` [N]. How the rate of bristles grows that a
+        falling load has left beyond their limit is up to models (see docs/physics.md, "Stiffness and load").
+
+        Raises InvalidValueError for shapes that do not broadcast, and where a load is missing.
         """
-        return self._bristle(*_bristles(state, velocity, axis), axis)[0]
+        z, v = _bristles(state, velocity, axis)
+        if self.reference_load is not None:
+            if normal_force is None:
+                raise InvalidValueError("normal_force", "be given for a law with a reference_load", normal_force)
+            z = z * _expanded(self.stiffness_factor(normal_force), axis)
+        return self._bristle(z, v, axis)[0]
 
     def force(
         self, state: ArrayLike, velocity: ArrayLike, normal_force: ArrayLike, *, axis: int | None = None
@@ -78,10 +101,9 @@ class FrictionLaw(Checked):
         """
         z, v = _bristles(state, velocity, axis)
         load = validation.non_negative_numbers("normal_force", normal_force)
-        if axis is not None:
-            load = np.expand_dims(load, axis)
+        factor, load = _expanded(self.stiffness_factor(load), axis), _expanded(load, axis)
         validation.broadcast(state=z, velocity=v, normal_force=load)
-        return load * self._bristle(z, v, axis)[1]
+        return load * self._bristle(factor * z, v, axis)[1]
 
     def _bristle(self, z: np.ndarray, v: np.ndarray, axis: int | None) -> tuple[np.ndarray, np.ndarray]:
         """Return the rates of bristles and their tractions per unit load; checked arrays that broadcast."""
@@ -91,6 +113,10 @@ class FrictionLaw(Checked):
         grip = law.sigma_0 / formulas.stribeck(np, speed, law)
         rate = v - formulas.bristle_decay(np, length * grip, along, speed, grip, law) * z
         return rate, formulas.traction(z, rate, v, law)
+
+
+def _expanded(load: np.ndarray, axis: int | None) -> np.ndarray:
+    return load if axis is None else np.expand_dims(load, axis)
 
 
 def _bristles(state: Any, velocity: Any, axis: int | None) -> tuple[np.ndarray, np.ndarray]:
@@ -122,6 +148,12 @@ def refuse_rate_law(law: Any, by: str) -> None:
         raise InvalidValueError(
             "law", f"have the bristles of LuGre for {by}, not a rate of its own", type(law).__name__
         )
+
+
+def refuse_fixed_stiffness(law: Any, by: str) -> None:
+    """Raise for a law whose stiffness does not grow with the load, where it must."""
+    if getattr(law, "reference_load", None) is not None:
+        raise InvalidValueError("law", f"have no reference_load for {by}, which does not know it", law.reference_load)
 
 
 def _norm(vector: np.ndarray, axis: int | None) -> np.ndarray:

@@ -118,9 +118,9 @@ class LimitSurfaceExact(LimitSurface):
 
     Integrated over the patch's outline if the pressure on it is uniform (polygons) or depends on the radius alone
     (discs and rings, `Uniform` or `SoftFinger`), otherwise over its cells, each a rectangle (on lines a segment) of
-    uniform pressure. Points remain points, and discs that stand for several cells remain discs. The wrench is continuous
-    in the twist, and the Jacobian is exact; on lines it has a logarithmic singularity where the centre of rotation meets
-    the line, cut off at 1e-15 of a cell.
+    uniform pressure. Points remain points, and discs that stand for several cells remain discs. The wrench is
+    continuous in the twist, and the Jacobian is exact; on lines it has a logarithmic singularity where the centre of
+    rotation meets the line, cut off at 1e-15 of a cell.
 
     It costs more than a sum over cells; models, whose compiled code cannot evaluate it, store it as a table.
     """

@@ -13,6 +13,7 @@ from planarfriction.kernels import surfaces as kernels
 from planarfriction.limit_surface.base import MOST_SEGMENTS, SurfaceNumbers
 from planarfriction.limit_surface.compiled import CompiledLimitSurface
 from planarfriction.limit_surface.loops.published_twists import published_twists
+from planarfriction.limit_surface.stored import cell_sums
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +22,7 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
 
     The sums, and the contact radius, are blended over the corners of the grid cell that contains the centre of
     rotation; interpolated values are not renormalised. The map has kinks and is not the gradient of a potential;
-    `LimitSurfaceTable` is. Patches without a grid (points) use the plain sums.
+    `LimitSurfaceTable` is. Patches without a grid (points, a few discs) use the plain sums.
 
     Raises InvalidValueError for an unsupported number of segments, and as every limit surface does.
 
@@ -49,15 +50,29 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
         place = (float(grid.x_min - x), float(grid.y_min - y), float(grid.cell_width), float(grid.cell_height))
         return place, np.full((grid.columns + 1, grid.rows + 1, 3), np.nan)
 
+    @property
+    def _few_discs(self) -> bool:
+        """True for discs off any grid, whose friction is smooth already."""
+        return self.patch.has_discs and self.patch.grid is None
+
     def _radius(self) -> float:
+        if self._few_discs:
+            return super()._radius()
         place, corners = self._grid()
         return float(spin_sums.smoothed_spin_sum(corners, place, *self._loaded_cells(), 0.0, 0.0)[2])
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
         """`h` at the nodes."""
-        place, corners = self._grid()
         nodes = np.zeros((self.segments + 1, 4 * self.segments + 1, 4))
+        if self._few_discs:
+            angles = 0.5 * np.pi / self.segments * np.arange(4 * self.segments + 1)
+            polar, azimuth = angles[: self.segments + 1, None], angles
+            sides = np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar) + 0.0 * azimuth
+            units = np.stack(sides, -1).reshape(-1, 3)
+            nodes[..., :3] = cell_sums(*self._scaled_levers, units).reshape(*nodes.shape[:2], 3)
+            return SurfaceNumbers(self.kind, self.segments, nodes.reshape(-1))
+        place, corners = self._grid()
         spin_sums.smoothed_nodes(corners, place, *self._loaded_cells(), self.contact_radius, self.segments, nodes)
         return SurfaceNumbers(self.kind, self.segments, nodes.reshape(-1))
 

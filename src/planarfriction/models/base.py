@@ -31,7 +31,7 @@ class ModelJacobians(NamedTuple):
     rate_twist: np.ndarray
     """d rate / d twist: distributed `[..., 2, N, 3]`, of three states `[..., 3, 3]`."""
     rate_load: np.ndarray
-    """d rate / d normal_force of a fixed shape: zero, `[..., *s]`."""
+    """d rate / d normal_force of a fixed shape, `[..., *s]`: zero but for a fixed stiffness."""
     wrench_state: np.ndarray
     """d wrench / d state: distributed `[..., 3, 2, N]`, of three states `[..., 3, 3]`."""
     wrench_twist: np.ndarray
@@ -214,6 +214,8 @@ class FrictionModel(ByValue):
         All come out in C order and writable: compiled loops know no other arrays, and sums run the same way.
         """
         held = None if moments is None else moments_of(moments)
+        if held is not None and self.law.reference_load is not None:
+            raise InvalidValueError("moments", "be None for a law with a reference_load", "moments")
         state, twist = validation.numbers("state", state), validation.numbers("twist", twist)
         inner = self.state_shape
         if state.shape[state.ndim - len(inner) :] != inner:
@@ -251,4 +253,5 @@ def _named(law: FrictionLaw) -> str:
     """Return a law in few words, with its friction coefficients."""
     numbers = law.numbers
     static = "" if numbers.mu_s == numbers.mu_c else f", mu_s={numbers.mu_s:g}"
-    return f"{type(law).__name__}(mu_c={numbers.mu_c:g}{static}, ...)"
+    fixed = "" if law.reference_load is None else f", reference_load={law.reference_load:g}"
+    return f"{type(law).__name__}(mu_c={numbers.mu_c:g}{static}{fixed}, ...)"

@@ -10,7 +10,9 @@ import numpy as np
 
 from planarfriction.compiled.distributed import CompiledDistributed
 from planarfriction.compiled.rate_cells import CompiledRateCells
-from planarfriction.laws.base import is_rate_law, refuse_creep, refuse_rate_law
+from planarfriction.errors import InvalidValueError
+from planarfriction.formulas import LIGHTEST
+from planarfriction.laws.base import is_rate_law, refuse_creep, refuse_fixed_stiffness, refuse_rate_law
 from planarfriction.models.base import FrictionModel, ModelJacobians
 
 
@@ -28,7 +30,11 @@ class DistributedModel(FrictionModel):
     bristle decays towards `a_i g/sigma_0` instead of zero, `zdot_i = u_i - k_i (z_i - a_i g/sigma_0)`, `k_i = beta
     sigma_0 |u_i|/g`, where beta depends on the deflection measured from there.
 
-    Raises InvalidValueError for what is not a patch or a law, and for a law that creeps on a patch with an asymmetry.
+    A law with a `reference_load` (`LuGre`, `Dahl`) has a stiffness that does not grow with the load; a bristle that a
+    falling load has left beyond its limit slips back onto it (see docs/physics.md, "Stiffness and load").
+
+    Raises InvalidValueError for what is not a patch or a law, for a law that creeps or has a `reference_load` on a patch
+    with an asymmetry, and for one with a `reference_load` on a patch whose shape depends on the load.
 
     Source: Waltersson and Karayiannidis 2024, section III.
     """
@@ -40,6 +46,10 @@ class DistributedModel(FrictionModel):
         if self.patch.asymmetric:
             refuse_creep(self.law, "patches with an asymmetry")  # at rest they would push
             refuse_rate_law(self.law, "patches with an asymmetry")
+            refuse_fixed_stiffness(self.law, "patches with an asymmetry")
+        if self.law.reference_load is not None and self.patch.depends_on_load:
+            rule = "have a shape that does not depend on the load, for a law with a reference_load"
+            raise InvalidValueError("patch", rule, self.patch.name or "one that does")
 
     @property
     def state_shape(self) -> tuple[int, ...]:
@@ -59,13 +69,19 @@ class DistributedModel(FrictionModel):
         state, twist, load, _ = self._inputs(state, twist, normal_force)
         lever, share = self.compiled.lever, (load[..., None] * self.patch.weights(load))[..., None, None, :]
         rate_state, rate_velocity, pull_state, pull_velocity = self.compiled.slopes(state, twist, load)
+        wrench_state = np.einsum("dan,...abn->...dbn", lever, share * pull_state)
+        rate_load, wrench_load = np.zeros_like(state), self.compiled.evaluate(state, twist, load)[1]
+        if self.compiled.reference > 0.0:  # rates and tractions are functions of `z f_ref/f`
+            per = np.where(load > LIGHTEST * self.compiled.reference, -1.0, 0.0) / np.where(load > 0.0, load, 1.0)
+            rate_load = np.einsum("...,...abn,...bn->...an", per, rate_state, state)
+            wrench_load = wrench_load + np.einsum("...,...dbn,...bn->...d", per, wrench_state, state)
         return ModelJacobians(
             rate_state,
             np.einsum("...abn,dbn->...and", rate_velocity, lever),
-            np.zeros_like(state),
-            np.einsum("dan,...abn->...dbn", lever, share * pull_state),
+            rate_load,
+            wrench_state,
             np.einsum("dan,...abn,ebn->...de", lever, share * pull_velocity, lever),
-            self.compiled.evaluate(state, twist, load)[1],
+            wrench_load,
         )
 
     def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:

@@ -11,6 +11,7 @@ from planarfriction import validation
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import friction_filter as kernels
+from planarfriction.laws.base import refuse_fixed_stiffness
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models import FrictionModel
 from planarfriction.online.gripper import Measurement, Sensors
@@ -120,6 +121,7 @@ class FrictionObserver:
         if surface.patch.asymmetric:
             raise InvalidValueError("model", "have symmetric friction", "a patch with an asymmetry")
         own: Any = Sensors() if sensors is None else validation.instance("sensors", sensors, Sensors, "Sensors")
+        refuse_fixed_stiffness(model.law, "FrictionObserver")
         self.tolerance = validation.positive("tolerance", tolerance)
         self._filter = _settings(
             model,

@@ -194,9 +194,9 @@ class ContactPatch(Moments):
     ) -> ContactPatch:
         """Return a line of `length` [m] along `direction` ("y" or "x") through the origin, one cell wide, of discs.
 
-        Points in a row pull worst where the line turns about one of its cells: as discs, 21 cells have two thirds of the
-        largest error of force in motion (one third if they are squares). `dataclasses.replace(line, radii=None)` has
-        points.
+        Points in a row pull worst where the line turns about one of its cells: as discs, 21 cells have two thirds of
+        the largest error of force in motion (one third if they are squares). `dataclasses.replace(line, radii=None)`
+        has points.
 
         `profile` holds the relative pressures `[cells]` from the top down (y) or from the left to the right (x), or is
         a function of the coordinate along the line [m]; None is uniform. The grid is square with the line in its middle

@@ -21,7 +21,7 @@ def disc_friction(slide: Any, spin: Any) -> tuple[np.ndarray, np.ndarray, np.nda
 
 
 def disc_curvature(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return g `[...]` and q `[..., 3]` of `dW/du = diag(c_t, c_t, c_s) + g q q'`, for velocities u `[..., 3]` of discs.
+    """Return g `[...]` and q `[..., 3]` of `dW/du = diag(c_t, c_t, c_s) + g q q'`, for velocities u `[..., 3]`.
 
     `S^2(p, o)` is homogeneous of degree 1 in `p = |u|^2` and `o = (a omega)^2`, so that its second derivatives are
     those by p times 1, `-p/o` and `(p/o)^2`; with `x = p/(p + o)` and `y = 1 - x` they are `(y^2, -x y, x^2)` times

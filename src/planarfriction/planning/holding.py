@@ -185,4 +185,5 @@ def _slips(model: Any, body: Body, load: np.ndarray, grip: Signal) -> bool:
     dx, dy, _ = twist_at(np.array([x, y, theta]), model.patch.centre_of_pressure(force))
     moved = np.hypot(dx, dy) + float(model.patch.contact_radius(force)) * abs(theta)
     numbers = model.law.numbers
-    return bool(moved > numbers.mu_s / numbers.sigma_0 + SLIP)
+    bends = numbers.mu_s / (numbers.sigma_0 * float(model.law.stiffness_factor(force)))
+    return bool(moved > bends + SLIP)

@@ -15,6 +15,7 @@ from planarfriction.compiler.memory import places_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.body import Motion, System
 from planarfriction.kernels.contacts import BODY, BODY_AXES, WORLD, Contacts, calls_of
+from planarfriction.laws.base import refuse_fixed_stiffness
 from planarfriction.scenes.scene import Contact
 from planarfriction.scenes.signal import SAME_TIME, Signal, breaks_between, displacement
 from planarfriction.scenes.start import first_slopes, first_states
@@ -39,6 +40,7 @@ def packed_contact(
     packed = contact.model.packed(loads, between)
     if contact.pressure == "fixed":
         return packed
+    refuse_fixed_stiffness(contact.model.law, "a pressure that follows the load")
     return following(contact.model.compiled, packed, contact.centre_of_mass, contact.height)
 
 
@@ -129,6 +131,11 @@ class Segments:
         held = held[held > 0.0]
         return (float(held.min()), float(held.max())) if len(held) else (1.0, 1.0)
 
+    def largest(self, c: int) -> float:
+        """Return the largest load of contact c [N]."""
+        load, slope = self._load[c]
+        return float(np.maximum(load, load + slope * np.diff(self._breaks)).max())
+
     def force(self, pieces: np.ndarray) -> np.ndarray:
         """Return the applied wrench at the start of pieces, and its slope, [S, 2, 3]."""
         if self._force is None:
@@ -180,6 +187,9 @@ class SegmentBatches:
         self._ahead = self._most
         self._pieces, self._done = Segments(scene, t_end, marks), 0
         contacts = scene.contacts
+        if sensitivities:
+            for contact in contacts:
+                refuse_fixed_stiffness(contact.model.law, "derivatives of scenes")
         follows = [contact.model.patch.depends_on_load for contact in contacts]
         self._between = [self._pieces.between(c) if follows[c] else None for c in range(len(contacts))]
         self.models: list[PackedModel] = []
@@ -197,8 +207,14 @@ class SegmentBatches:
             count=np.array([contact.count for contact in contacts], dtype=float),
             state=_starts([model.states for model in self.models]),
             linear=_starts([model.workspace for model in self.models]),
+            reference=np.array([model.reference for model in self.models]),
+            bristle=np.array([model.bristle for model in self.models]),
         )
-        self._length = min(contact.model.law.largest_deflection for contact in contacts)
+        most = [max(self._pieces.largest(c), 0.0) for c in range(len(contacts))]
+        factors = [float(each.model.law.stiffness_factor(f)) for each, f in zip(contacts, most, strict=True)]
+        self._bends = [1.0 / factor if f > 0.0 else 1.0 for factor, f in zip(factors, most, strict=True)]
+        """Deflections at the largest loads, as multiples of those that the laws name: 1 but for a fixed stiffness."""
+        self._length = min(b * each.model.law.largest_deflection for b, each in zip(self._bends, contacts, strict=True))
         self._laws = [contact.model.law.numbers for contact in contacts]
         speed = min(model.velocity_scale * law.v_s for model, law in zip(self.models, self._laws, strict=True))
         # a single point has no lever arm: its spin is measured in rad/s
@@ -207,7 +223,7 @@ class SegmentBatches:
         self.state = np.concatenate([self._first(), body.velocity, body.position, [body.angle]])
         """Bristles as the scene starts, body velocity, pose."""
         self.state_scale = np.concatenate(
-            [*(model.state_scale for model in self.models), speed * arm, self._length * arm]
+            [*(b * m.state_scale for b, m in zip(self._bends, self.models, strict=True)), speed * arm, self._length * arm]
         )
         """Natural scale of each state: mu_c/sigma_0 for deflections and positions, a share of v_s for velocities (that
         of a creep, `compiled.PackedModel.velocity_scale`), angles over r.
@@ -300,7 +316,7 @@ class SegmentBatches:
             mover=inputs.mover(pieces),
             stop_speed=float(scene.stop_speed or 0.0),
             stop_radius=self._radius,
-            stop_time=max(law.sigma_1 / law.sigma_0 for law in self._laws),
+            stop_time=max(b * law.sigma_1 / law.sigma_0 for b, law in zip(self._bends, self._laws, strict=True)),
             stop_length=self._length,
             settled=inputs.settled,
         )

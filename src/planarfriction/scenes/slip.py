@@ -160,7 +160,8 @@ def slip_field(
     lean[:2] = bristles.patch.asymmetries().T
     bent, slips = np.zeros((len(frames), count)), np.zeros((len(frames), count), dtype=bool)
     distance, slip, frame = np.zeros(count), np.zeros(count), 1
-    bent[0] = _bent(state, levers @ first, lean, law)
+    factor = bristles.law.stiffness_factor(np.maximum(loads, 0.0))
+    bent[0] = _bent(factor[0] * state, levers @ first, lean, law)
     for k, (step, dt) in enumerate(zip(displacements, np.diff(times), strict=True)):
         if not dt > 0.0:
             continue
@@ -171,7 +172,7 @@ def slip_field(
         distance += length
         slip += np.linalg.norm(moved - (state - before), axis=0)
         if frame < len(frames) and k + 1 == frames[frame]:
-            bent[frame] = _bent(state, moved.T / dt, lean, law)
+            bent[frame] = _bent(factor[k + 1] * state, moved.T / dt, lean, law)
             slips[frame] = (slip > SLIPS * distance) & (distance > AT_REST * largest)
             distance[:], slip[:], frame = 0.0, 0.0, frame + 1
     if len(frames) > 1:  # at first no distance is known: as right after it

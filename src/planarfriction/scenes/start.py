@@ -30,7 +30,10 @@ def first_states(scene: Any, shaped: np.ndarray) -> list[np.ndarray]:
             raise InvalidValueError("start", rule, scene.start)
     loads = np.array([float(contact.normal_force(0.0)) for contact in scene.contacts])
     shaped = np.where(loads > 0.0, shaped, 0.0)
-    return _sliding(scene, shaped) if scene.start == "sliding" else _equilibrium(scene, loads, shaped)
+    if scene.start == "sliding":
+        fixed = [contact.model.law.reference_load is not None for contact in scene.contacts]
+        return _sliding(scene, np.where(fixed, loads, shaped))
+    return _equilibrium(scene, loads, shaped)
 
 
 def first_slopes(scene: Any, shaped: np.ndarray, d_loads: np.ndarray, d_pull: np.ndarray) -> list[np.ndarray]:
@@ -41,12 +44,16 @@ def first_slopes(scene: Any, shaped: np.ndarray, d_loads: np.ndarray, d_pull: np
     """
     loads = np.array([float(contact.normal_force(0.0)) for contact in scene.contacts])
     cells, sizes, pull = _held_by(scene, loads, np.where(loads > 0.0, shaped, 0.0))
-    bent, slope = cells.bent(_least_energy(cells, pull))
+    motion = _least_energy(cells, pull)
+    bent, slope = cells.bent(motion)
     share = np.repeat(d_loads / np.where(loads == 0.0, 1.0, loads), sizes, axis=1)
+    longer = share * (cells.fixed & cells.full(motion))  # of a fixed stiffness the limit grows with the load
+    share = np.where(cells.fixed, longer, share)
     held = np.einsum("kn,n,nij,ni->kj", share, cells.stiffness, cells.levers, bent)
     stiff = np.einsum("n,nia,nij,njb->ab", cells.stiffness, cells.levers, slope, cells.levers)
     motions = np.linalg.lstsq(stiff, (d_pull - held).T, rcond=None)[0]
-    return _states(scene, shaped, np.einsum("nij,njb,bk->kni", slope, cells.levers, motions), sizes)
+    moved = np.einsum("nij,njb,bk->kni", slope, cells.levers, motions) + longer[:, :, None] * bent
+    return _states(scene, shaped, moved, sizes)
 
 
 def _states(scene: Any, shaped: np.ndarray, deflections: np.ndarray, sizes: list[int]) -> list[np.ndarray]:
@@ -100,11 +107,17 @@ class _BristleField(NamedTuple):
     levers: np.ndarray
     """Jacobian of the displacement of each cell by a small motion of the body, `[n, 3, 3]`."""
     stiffness: np.ndarray
-    """`count f_N w_i sigma_0` `[n]` [N/m]."""
+    """`count f_N w_i sigma_0`, or `count f_ref w_i sigma_0`, `[n]` [N/m]."""
     largest: np.ndarray
     """Largest deflection `[n]` [m]."""
     middle: np.ndarray
     """Deflection of each bristle that is as far from its largest in all directions `[n, 3]` [m]."""
+    fixed: np.ndarray
+    """True for cells whose stiffness does not grow with the load, bool `[n]`."""
+
+    def full(self, motion: np.ndarray) -> np.ndarray:
+        """Return which cells are bent as far as they can be after a small motion of the body, bool `[n]`."""
+        return _lengths(self.levers @ motion - self.middle) > self.largest
 
     def bent(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the deflections `[n, 3]` after a small motion of the body, and slopes `[n, 3, 3]` by the stretch."""
@@ -157,10 +170,12 @@ def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _BristleF
     levers = patch.levers() @ contact_map(scene, contact)
     levers = np.concatenate([levers, np.zeros((len(levers), 3 - levers.shape[1], 3))], axis=1)  # points do not spin
     weights = patch.weights(shaped) if shaped > 0.0 else np.zeros(len(levers))
-    largest = float(formulas.stribeck(np, np.zeros(()), law)) / law.sigma_0
+    sigma_0 = law.sigma_0 * float(model.law.stiffness_factor(load))
+    largest = float(formulas.stribeck(np, np.zeros(()), law)) / sigma_0
     middle = np.zeros((len(levers), 3))
     middle[:, :2] = largest * patch.asymmetries()
-    return _BristleField(levers, contact.count * load * law.sigma_0 * weights, np.full(len(levers), largest), middle)
+    fixed = np.full(len(levers), model.law.reference_load is not None)
+    return _BristleField(levers, contact.count * load * sigma_0 * weights, np.full(len(levers), largest), middle, fixed)
 
 
 def _least_energy(cells: _BristleField, pull: np.ndarray) -> np.ndarray:

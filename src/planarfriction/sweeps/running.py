@@ -166,7 +166,9 @@ def _bookkeeper(out: str | Path | None, make: Callable[..., Scene], grid: Grid, 
     """Make the bookkeeper for a folder, for a store, or for the memory."""
     if out is None:
         return Bookkeeper(grid, timed)
-    if validation.path("out", out).suffix != ".zarr":
+    if not str(validation.path("out", out)).isprintable():
+        raise InvalidValueError("out", "be a path of printable characters", ascii(str(out)))
+    if Path(out).suffix != ".zarr":
         return FolderBookkeeper(grid, timed, out)
     from planarfriction.sweeps.zarr_store import ZarrBookkeeper
 

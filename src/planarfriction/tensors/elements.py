@@ -126,5 +126,5 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
         (rules.per, per),
         (rules.ratio, ratio),
         (bristle_step.cap, lambda deflection, most: formulas.cap(xp, beyond(deflection, most), most)),
-        (bristle_step.reachable, lambda deflection, law: formulas.reachable_deflection(xp, beyond(deflection, 1.0), law)),
+        (bristle_step.reachable, lambda x, law: formulas.reachable_deflection(xp, beyond(x, 1.0), law)),
     ]

@@ -68,7 +68,7 @@ def values_of(law: FrictionLaw, shape: PublishedShape) -> dict[str, float]:
 
 
 def numbers_of(xp, values: Mapping[str, Any], surface: Any, root: Any) -> PublishedNumbers:
-    """Return a shape at values of its parameters `[..., 1, 1]`; `surface` has the `kind`, `size` and `data` of its law."""
+    """Return a shape at values of its parameters `[..., 1, 1]`; `surface` has its `kind`, `size` and `data`."""
     own = {name: values[name] for name in PublishedNumbers._fields[:4]}
     sliding = functools.partial(surfaces.sliding, xp, surface.kind, surface.size, surface.data)
     return PublishedNumbers(**own, surface=sliding, root=root)

@@ -10,7 +10,7 @@ from planarfriction import validation
 from planarfriction.derivatives.parameters import PARAMETERS
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws import FrictionLaw
-from planarfriction.laws.base import refuse_creep, refuse_rate_law
+from planarfriction.laws.base import refuse_creep, refuse_fixed_stiffness, refuse_rate_law
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors.namespace import Namespace, broadcast, finite, non_negative, shaped
 from planarfriction.tensors.pressure import Pressed, centre_of, follow
@@ -79,6 +79,7 @@ class TensorModel:
         validation.instance("patch", patch, ContactPatch, "a ContactPatch")
         refuse_rate_law(law, name)
         refuse_creep(law, name)
+        refuse_fixed_stiffness(law, name)
 
     @property
     def state_shape(self) -> tuple[int, ...]:

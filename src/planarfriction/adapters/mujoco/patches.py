@@ -190,7 +190,8 @@ class Placed:
         self.bodies = int(bodies[1 - own]), int(owner)
         kinds = set(m.geom_type[self.geoms].tolist())
         faces = kinds == {_BOX} or (_PLANE in kinds and not _ROUND.intersection(kinds))
-        self.follows = patch.pressure == "follows" or (patch.pressure == "auto" and faces)
+        free = faces and patch.model.law.reference_load is None
+        self.follows = patch.pressure == "follows" or (patch.pressure == "auto" and free)
         """True if the pressure follows the contact forces."""
         curved = bool(_ROUND.intersection(kinds)) or self._on_curved_side(m)
         self.at_contact = patch.centre == "contact" or (patch.centre == "auto" and curved)

@@ -11,7 +11,7 @@ import numpy as np
 from planarfriction.derivatives import rollout
 from planarfriction.geometry import wrench_at
 from planarfriction.laws import ElastoPlastic, LuGre
-from planarfriction.limit_surface import LimitSurfaceCells
+from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceTable
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction.plots.style import PlotFigure
@@ -26,7 +26,7 @@ LAW = LuGre(mu_s=1.2, elasto_plastic=ElastoPlastic(0.9))
 LAWS = {
     "published": LAW,
     "higher static friction": LuGre(mu_s=1.5, elasto_plastic=ElastoPlastic(0.98)),
-    "soft bristles": LuGre(mu_s=1.2, sigma_0=1e4, sigma_1=30.0, elasto_plastic=ElastoPlastic(0.9)),
+    "soft bristles": LuGre(mu_s=1.2, sigma_0=1e5, sigma_1=250.0, elasto_plastic=ElastoPlastic(0.9)),
 }
 """Laws of the loads of slip."""
 
@@ -52,9 +52,9 @@ SPEED, T_END, SAMPLES, STEPS = 0.02, 1.2, 600, 50
 COLUMNS = ("largest force", "largest torque", "rms force", "rms torque")
 """Errors of a driven motion, in units of `mu_c f_N` and of that times the radius of gyration."""
 
-RAMPS, TOP, SLIPPED = (0.01, 0.1, 1.0), 1.35, 1e-5
+RAMPS, TOP, SLIPPED = (0.01, 0.1, 1.0), 1.6, 3.0
 """Times in which a load grows from zero to TOP times what the limit surface of mu_s holds [s], and displacement beyond
-that of the bent bristles at which the patch counts as slipping [m]."""
+that of the bent bristles at which the patch counts as slipping, in deflections at mu_s."""
 
 LEVELS, CYCLE, CYCLES = (0.5, 0.65, 0.8), 0.5, 12
 """Largest load of a shaken contact as shares of that limit surface, its cycle [s], and cycles: the last half counts."""
@@ -174,10 +174,11 @@ def load_of_slip(model: Any, wrench: np.ndarray, ramp: float) -> float:
     bent = np.outer(share, wrench / [1.0, 1.0, r**2]) / model.law.sigma_0
     off = np.abs(run[:, 1:] - run[0, 1:] - bent) * [1.0, 1.0, r]
     off = np.hypot(off[:, 0], off[:, 1]) + off[:, 2]
-    first = int(np.argmax(off > SLIPPED))
-    if off[first] <= SLIPPED:
+    most = SLIPPED * model.law.mu_s / model.law.sigma_0
+    first = int(np.argmax(off > most))
+    if off[first] <= most:
         raise ValueError(f"no slip of {model.patch.name} in {ramp} s")
-    return float(np.interp(SLIPPED, off[first - 1 : first + 1], share[first - 1 : first + 1]))
+    return float(np.interp(most, off[first - 1 : first + 1], share[first - 1 : first + 1]))
 
 
 def slips(
@@ -192,13 +193,24 @@ def slips(
     return {name: loads[name] / loads[""] - 1.0 for name in models}
 
 
+def highest_level(patch: ContactPatch, pulls: np.ndarray) -> float:
+    """Return the largest of loads `[T, 3]` about the centre of pressure, as shares of what mu_s holds."""
+    surface, moved_back = LimitSurfaceTable(patch), -patch.centre_of_pressure()
+    wrenches = wrench_at(pulls, moved_back)
+    twists = [surface.twist(-wrench) for wrench in wrenches]
+    return max(
+        float(wrench @ twist / (surface.dissipation(twist) * LAW.mu_s))
+        for wrench, twist in zip(wrenches, twists, strict=True)
+    )
+
+
 def creep(patch: ContactPatch, models: dict[str, Any], level: float) -> dict[str, np.ndarray]:
     """Return by model the way from cycle to cycle [m], `[CYCLES - 1]`, of a contact that is shaken and holds."""
     r, t = gyration(patch), np.linspace(0.0, CYCLE * CYCLES, 100 * CYCLES + 1)
     grown, phase = np.minimum(t / 0.3, 1.0), 2.0 * np.pi * t / CYCLE
     spin = 0.27 + 0.32 * np.cos(phase + 0.6)
     pulls = grown[:, None] * np.stack([0.43 + 0.32 * np.sin(phase), 0.27 * np.cos(phase), r * spin], axis=1)
-    pulls *= level * LAW.mu_s / np.linalg.norm(pulls / [1.0, 1.0, r], axis=1).max()
+    pulls *= level / highest_level(patch, pulls[100:200:2])
     body = Body(0.1, 0.4 * r**2, gravity=(0.0, 0.0))
     found = {}
     for name, model in (models | {"refined(2)": DistributedModel(patch.refined(2), LAW)}).items():
@@ -237,8 +249,13 @@ def returned(model: Any, cycles: int, steps: int = 40, loads: bool = False) -> f
         twists, dt = about_centre(model.patch, twists), 10.0 ** rng.uniform(-5.0, -2.0)
         force = rng.uniform(0.2, 2.0, (count, steps)) if loads else 1.0
         work = -(rollout(model, None, twists, force, dt).wrenches * twists).sum(axis=-1)
-        worst = max(worst, float((-np.cumsum(work, axis=1).min(axis=1) / np.abs(work).sum(axis=1)).max()))
+        worst = max(worst, gain(work))
     return worst
+
+
+def gain(work: np.ndarray) -> float:
+    """Return the most that was ever given back beyond what was put in, of the works `[motions, steps]` of steps."""
+    return float((-np.cumsum(work, axis=1).min(axis=1) / np.abs(work).sum(axis=1)).max())
 
 
 def measured(shape: str, quick: bool) -> dict[str, dict[str, np.ndarray]]:

@@ -24,6 +24,11 @@ from planarfriction_studies.experiments.velocity_driven import boxes
 DISCS = (1, 4, 8, 16, 32, 64)
 """Numbers of discs of `ReducedModel`, beside its default."""
 
+DEFAULT = ReducedModel.cells
+
+NAMES = {n: "reduced" if n == DEFAULT else f"{n} discs" for n in sorted({*DISCS, DEFAULT})}
+"""Number of discs -> name of the model."""
+
 ALL = "all discs"
 """Name of `ReducedModel` with a disc for every cell of the patch."""
 
@@ -47,7 +52,7 @@ REPEATS, LONG, SHORT = 9, 0.1, 0.02
 MOVED = {
     "published": "published reduced",
     "8 discs": "ReducedModel, 8 discs",
-    "reduced": f"ReducedModel, {ReducedModel.cells} discs",
+    "reduced": f"ReducedModel, {DEFAULT} discs",
     ALL: "ReducedModel, a disc a cell",
     "full": "distributed, 21 x 21",
 }

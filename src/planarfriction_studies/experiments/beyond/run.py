@@ -23,8 +23,6 @@ NEW_SHAPES, QUICK_NEW_SHAPES, QUICK_SEEDS = tuple(new_shapes.SHAPES), ("three fe
 SHOWN, UNSEEN = ("8 discs", "reduced", ladder.ALL), ("8 discs", "16 discs", "reduced", "64 discs")
 """Models of the findings: on the published patches, and on those that no table holds."""
 
-MODELS_OF_DISCS = (*(f"{count} discs" for count in ladder.DISCS), "reduced", ladder.ALL)
-
 
 def run(work: Work) -> Result:
     """Carry out the experiment."""
@@ -190,8 +188,8 @@ def _template_values(numbers: Numbers) -> Numbers:
         },
         "friction": {model: _friction_shares(ends, model) for model in (*SHOWN, "published")},
         "furthest": {model: max(each[model] for each in ends.values()) for model in ("published", *SHOWN)},
-        "default": ladder.ReducedModel.cells,
-        "discs": {model: _over_all(numbers, model) for model in MODELS_OF_DISCS},
+        "default": ladder.DEFAULT,
+        "discs": {model: _over_all(numbers, model) for model in (*ladder.NAMES.values(), ladder.ALL)},
         "grooves": {"models": len(misses), "miss": float(np.abs(misses).max())},
     }
 

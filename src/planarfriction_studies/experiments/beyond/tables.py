@@ -11,7 +11,7 @@ import numpy as np
 from planarfriction.plots.style import PlotFigure
 from planarfriction_studies.experiments import looks
 from planarfriction_studies.experiments.beyond import contacts
-from planarfriction_studies.experiments.beyond.ladder import ALL, DISCS, ENDS, MOVED, SHIFT, STATISTICS, Row, shape_of
+from planarfriction_studies.experiments.beyond.ladder import ALL, ENDS, MOVED, NAMES, SHIFT, STATISTICS, Row, shape_of
 from planarfriction_studies.experiments.beyond.surfaces import KINDS
 from planarfriction_studies.experiments.experiment import Arrays, Numbers, Table, entry, table
 from planarfriction_studies.experiments.runs import IN_WORDS, SIX_SHAPES
@@ -23,9 +23,7 @@ MODEL_WORDS = {
     "published": "published reduced, published table",
     "published, smooth": "published reduced, LimitSurfaceTable",
     "published, ellipsoid": "published reduced, ellipsoid",
-    "1 discs": "ReducedModel, 1 disc",
-    **{f"{count} discs": f"ReducedModel, {count} discs" for count in DISCS[1:]},
-    "reduced": MOVED["reduced"] + " (default)",
+    **{name: f"ReducedModel, {n} disc{'s' * (n > 1)}" for n, name in NAMES.items()},
     ALL: MOVED[ALL],
 }
 """Model of the ladder -> model and surface, in words."""
@@ -243,9 +241,7 @@ _RIGHT, _ABOVE = (4, 5), (5, 5)
 FAMILIES = (
     Family("published reduced model", {"published": ("", _RIGHT)}, looks.REDUCED, "^"),
     Family("ReducedModel, 1 disc to one a cell",
-           {"1 discs": ("1", _RIGHT), "4 discs": ("4", _RIGHT), "8 discs": ("8", _RIGHT), "16 discs": ("16", _RIGHT),
-            "reduced": ("24", _RIGHT), "32 discs": ("32", _RIGHT), "64 discs": ("64", _RIGHT), ALL: ("all", _RIGHT)},
-           looks.FEW, "o"),
+           {name: (str(n), _RIGHT) for n, name in NAMES.items()} | {ALL: ("all", _RIGHT)}, looks.FEW, "o"),
     Family("distributed, 21 x 21 points", {"full": ("", _ABOVE)}, looks.DISTRIBUTED, "D"),
 )  # fmt: skip
 

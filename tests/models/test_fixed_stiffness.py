@@ -1,0 +1,227 @@
+"""Stiffness that does not grow with the load: closed forms, passivity, projection, and derivatives."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planarfriction.derivatives import rollout, rollout_jvp, rollout_vjp
+from planarfriction.errors import InvalidValueError
+from planarfriction.export.pieces import pieces_of
+from planarfriction.laws import CoulombStribeck, Dahl, LuGre
+from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
+from planarfriction.patch import ContactPatch
+
+REFERENCE = 2.0
+METRIC = np.array([[1.3, 0.2], [0.2, 0.8]])
+_DISC = ContactPatch.disc(0.02, cells=5)
+
+
+def _patch(radius: float, metric: np.ndarray | None) -> ContactPatch:
+    radii = np.full(_DISC.cells, radius)
+    return ContactPatch(_DISC.positions, _DISC.areas, _DISC.weights(), metric=metric, radii=radii)
+
+
+PATCHES = {
+    "points": _patch(0.0, None), "turned points": _patch(0.0, METRIC),
+    "discs": _patch(0.004, None), "turned discs": _patch(0.004, METRIC),
+}  # fmt: skip
+LAWS = {
+    "lugre": (LuGre, {"mu_s": 1.3}), "elasto-plastic": (LuGre, {"mu_s": 1.3, "elasto_plastic": 0.9}), "dahl": (Dahl, {}),
+}  # fmt: skip
+
+every_patch = pytest.mark.parametrize("patch", PATCHES.values(), ids=PATCHES)
+every_law = pytest.mark.parametrize(("kind", "given"), LAWS.values(), ids=LAWS)
+
+
+def _twists(seed: int, count: int = 40):
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-5.0, -2.0, (count, 1)) * [1.0, 1.0, 50.0]
+
+
+@every_patch
+@every_law
+@pytest.mark.parametrize("load", [REFERENCE, 3.0, 0.4])
+def test_at_a_held_load_it_is_the_published_law_of_another_sigma_0(patch, kind, given, load):
+    """With the reference load the published law itself, to rounding."""
+    fixed = DistributedModel(patch, kind(**given, reference_load=REFERENCE))
+    published = DistributedModel(patch, kind(**given, sigma_0=1e6 * REFERENCE / load))
+    scale = published.law.largest_deflection
+    z, y = fixed.rest(), published.rest()
+    for twist in _twists(1):
+        for _ in range(4):
+            (z, pull), (y, wanted) = fixed.step(z, twist, load, 1e-3), published.step(y, twist, load, 1e-3)
+            np.testing.assert_allclose(z, y, rtol=0.0, atol=1e-12 * scale)
+            np.testing.assert_allclose(pull, wanted, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(
+            fixed.rate(z, twist, load), published.rate(y, twist, load), rtol=0.0, atol=1e-10 * np.abs(twist).max()
+        )
+        np.testing.assert_allclose(fixed.wrench(z, twist, load), published.wrench(y, twist, load), rtol=1e-11, atol=1e-12)
+
+
+@every_patch
+def test_a_held_contact_keeps_its_force_when_it_is_pressed_harder(patch):
+    fixed, published = (DistributedModel(patch, LuGre(elasto_plastic=0.9, reference_load=f)) for f in (REFERENCE, None))
+    state, _ = fixed.step(fixed.rest(), [1e-4, 5e-5, 2e-3], REFERENCE, 1e-3)
+    still, first = fixed.step(state, np.zeros(3), REFERENCE, 1e-3)
+    np.testing.assert_array_equal(still, state)
+    harder, pull = fixed.step(state, np.zeros(3), 2.0 * REFERENCE, 1e-3)
+    np.testing.assert_allclose(harder, state, rtol=1e-15)
+    np.testing.assert_allclose(pull, first, rtol=1e-13)
+    np.testing.assert_allclose(fixed.wrench(state, np.zeros(3), 2.0 * REFERENCE), first, rtol=1e-13)
+    np.testing.assert_allclose(published.step(state, np.zeros(3), 2.0 * REFERENCE, 1e-3)[1], 2.0 * first, rtol=1e-13)
+
+
+@every_patch
+def test_a_bristle_beyond_its_limit_is_brought_back_onto_it_when_the_load_falls(patch):
+    law = LuGre(mu_c=0.8, mu_s=1.1, elasto_plastic=0.9, reference_load=REFERENCE)
+    model = DistributedModel(patch, law)
+    bent = np.zeros(model.state_shape)
+    bent[0] = np.linspace(0.1, 1.0, patch.cells) * law.mu_s / law.sigma_0
+    for load in (REFERENCE, 1.0, 0.1):
+        limit = law.mu_s * load / (law.sigma_0 * REFERENCE)
+        state, pull = model.step(bent, np.zeros(3), load, 1e-3)
+        np.testing.assert_allclose(state[0], np.minimum(bent[0], limit), rtol=1e-12)
+        assert not state[1:].any()
+        stiffness = law.sigma_0 * REFERENCE * patch.weights()
+        wanted = -np.einsum("n,nij,in->j", stiffness, patch.levers(), state)
+        np.testing.assert_allclose(pull, wanted, rtol=1e-11, atol=1e-15)
+
+
+def test_without_load_bristles_are_forgotten_and_a_load_from_zero_begins_without_force():
+    model = ReducedModel(_DISC, LuGre(reference_load=REFERENCE))
+    state, pull = model.step(model.rest() + 1e-7, np.zeros(3), 0.0, 1e-3)
+    assert not state.any() and not pull.any()
+    for load in (1e-300, 1e-20, 1e-9):
+        state, pull = model.step(state, [1e-3, 0.0, 0.0], load, 1e-3)
+        assert 0.0 < -pull[0] <= 1.01 * load
+    assert np.isfinite(model.rate(model.rest() + 1e-7, [1e-3, 0.0, 0.0], 0.0)).all()
+
+
+@every_patch
+@pytest.mark.parametrize("ratio", [None, 0.9])
+def test_stored_energy_never_grows_while_only_the_load_moves(patch, ratio):
+    law = LuGre(sigma_1=0.0, elasto_plastic=ratio, reference_load=REFERENCE)
+    model, rng = DistributedModel(patch, law), np.random.default_rng(2)
+    shares, state = law.sigma_0 * REFERENCE * patch.weights(), 1e-6 * rng.normal(size=model.state_shape)
+    before, fell = 0.5 * (shares * state**2).sum(), 0
+    for load in rng.uniform(0.05, 8.0, 200):
+        state, _ = model.step(state, np.zeros(3), load, 1e-2)
+        energy = 0.5 * (shares * state**2).sum()
+        assert energy <= before * (1.0 + 1e-13)
+        fell += energy < 0.99 * before
+        before = energy
+    assert fell > 1
+
+
+@every_patch
+@pytest.mark.parametrize("ratio", [None, 0.9])
+def test_no_work_comes_out_that_was_not_put_in_over_10000_cycles_of_loads_and_twists(patch, ratio):
+    """Of a closed path of twists, whatever the loads do meanwhile; the published law gives much of it back."""
+    count, steps = 10_000, 12
+    rng = np.random.default_rng(3)
+    path = np.cumsum(rng.normal(size=(count, steps, 3)) * [1e-6, 1e-6, 1e-4] * 10.0 ** rng.uniform(-2, 0, (count, 1, 1)), 1)
+    path[:, -1] = 0.0
+    moves, loads = np.diff(path, axis=1, prepend=0.0), 10.0 ** rng.uniform(-1.0, 1.0, (count, steps))
+    least = {}
+    for reference in (REFERENCE, None):
+        model = DistributedModel(patch, LuGre(sigma_1=0.0, elasto_plastic=ratio, reference_load=reference))
+        state, work = model.rest(count), np.zeros(count)
+        for move, load in zip(moves.swapaxes(0, 1), loads.T, strict=True):
+            state, pull = model.step(state, move / 1e-3, load, 1e-3)
+            work -= (pull * move).sum(axis=-1)
+        least[reference] = work.min() / np.abs(work).max()
+    assert least[REFERENCE] > -1e-12
+    assert least[None] < -1e-4
+
+
+def _differences(function, size, at):
+    return [(a - b) / (2.0 * size * at) for a, b in zip(function(at * (1.0 + size)), function(at * (1.0 - size)), strict=True)]
+
+
+@every_patch
+@every_law
+@pytest.mark.parametrize("load", [REFERENCE, 2.9, 0.7])
+def test_derivatives_are_those_of_differences(patch, kind, given, load):
+    model, rng = DistributedModel(patch, kind(**given, reference_load=REFERENCE)), np.random.default_rng(4)
+    state, twist = 4e-7 * rng.normal(size=model.state_shape), np.array([8e-4, -3e-4, 0.03])
+    slopes, step = model.jacobians(state, twist, load), model.step_jacobians(state, twist, load, 1e-3)
+    rate, wrench = _differences(lambda f: (model.rate(state, twist, f), model.wrench(state, twist, f)), 1e-6, load)
+    size = np.abs(rate).max()
+    np.testing.assert_allclose(slopes.rate_load, rate, rtol=1e-5, atol=1e-6 * size)
+    np.testing.assert_allclose(slopes.wrench_load, wrench, rtol=1e-5, atol=1e-8)
+    (of_step,) = _differences(lambda f: model.step(state, twist, f, 1e-3)[1:], 1e-6, load)
+    np.testing.assert_allclose(step.wrench_load, of_step, rtol=1e-5, atol=1e-7)
+    by_state, by_twist = 1e-12 * rng.normal(size=state.shape), 1e-9 * np.array([1.0, -2.0, 50.0])
+    for found, d_state, d_twist in (("state", by_state, 0.0 * by_twist), ("twist", 0.0 * by_state, by_twist)):
+        above, below = (model.step(state + s * d_state, twist + s * d_twist, load, 1e-3) for s in (1.0, -1.0))
+        rates = [model.rate(state + s * d_state, twist + s * d_twist, load) for s in (1.0, -1.0)]
+        new, pull = (0.5 * (a - b) for a, b in zip(above, below, strict=True))
+        if found == "state":
+            mine = np.einsum("abn,bn->an", step.state_state, d_state), np.einsum("dan,an->d", step.wrench_state, d_state)
+            of_rate = np.einsum("abn,bn->an", slopes.rate_state, d_state)
+        else:
+            mine, of_rate = (step.state_twist @ d_twist, step.wrench_twist @ d_twist), slopes.rate_twist @ d_twist
+        for one, other in ((mine[0], new), (mine[1], pull), (of_rate, 0.5 * (rates[0] - rates[1]))):
+            np.testing.assert_allclose(one, other, rtol=1e-4, atol=1e-5 * np.abs(other).max())
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.floats(0.05, 10.0), st.floats(1e-3, 1e3), st.floats(1.0, 2.0), st.floats(0.0, 0.99),
+    st.lists(st.floats(-2e-6, 2e-6), min_size=2, max_size=2),
+)  # fmt: skip
+def test_a_bristle_at_rest_never_holds_more_than_its_limit(load, reference, mu_s, ratio, bent):
+    law = LuGre(mu_s=mu_s, elasto_plastic=ratio, reference_load=reference)
+    patch = ContactPatch.points([[-0.01, 0.0], [0.01, 0.0]])
+    model = DistributedModel(patch, law)
+    state, pull = model.step(np.repeat(np.array(bent)[:, None], 2, 1), np.zeros(3), load, 1e-3)
+    assert math.hypot(*pull[:2]) <= mu_s * load * (1.0 + 1e-12)
+    held = law.sigma_0 * reference * math.hypot(*bent)
+    np.testing.assert_allclose(math.hypot(*pull[:2]), min(held, mu_s * load), rtol=1e-9, atol=1e-300)
+
+
+def test_a_single_bristle_follows_the_same_equations():
+    fixed, published = LuGre(reference_load=REFERENCE), LuGre(sigma_0=1e6 * REFERENCE / 3.0)
+    z, v = np.array([2e-7, -4e-7]), np.array([1e-3, 2e-3])
+    np.testing.assert_allclose(fixed.rate(z, v, 3.0), published.rate(z, v), rtol=1e-14)
+    np.testing.assert_allclose(fixed.rate(z, v, 3.0, axis=0), published.rate(z, v, axis=0), rtol=1e-14)
+    np.testing.assert_allclose(fixed.force(z, v, 3.0), published.force(z, v, 3.0), rtol=1e-14)
+    np.testing.assert_allclose(fixed.force(1e-7, 0.0, [0.0, 1.0, 4.0]), [0.0, -0.2, -0.2], rtol=1e-14)
+    np.testing.assert_array_equal(LuGre().stiffness_factor([0.0, 5.0]), [1.0, 1.0])
+    with pytest.raises(InvalidValueError, match="normal_force must be given for a law with a reference_load"):
+        fixed.rate(z, v)
+
+
+def test_rollouts_are_steps_and_their_derivatives_refuse():
+    model, twists, loads = DistributedModel(_DISC, LuGre(reference_load=REFERENCE)), _twists(5), np.linspace(0.5, 3.0, 40)
+    done, state = rollout(model, None, twists, loads, 1e-3), model.rest()
+    for t, (twist, load) in enumerate(zip(twists, loads, strict=True)):
+        state, pull = model.step(state, twist, load, 1e-3)
+        np.testing.assert_array_equal(done.wrenches[t], pull)
+    np.testing.assert_array_equal(done.state, state)
+    for refused, more in ((rollout_vjp, (np.ones((40, 3)),)), (rollout_jvp, ())):
+        with pytest.raises(InvalidValueError, match="law must have no reference_load for compiled roll-outs"):
+            refused(model, None, twists, loads, 1e-3, *more)
+
+
+def test_what_does_not_know_a_fixed_stiffness_says_so():
+    law = LuGre(reference_load=REFERENCE)
+    with pytest.raises(InvalidValueError, match="reference_load must be > 0, got 0"):
+        LuGre(reference_load=0.0)
+    with pytest.raises(InvalidValueError, match="law must have no reference_load for ReducedModelPublished"):
+        ReducedModelPublished(_DISC, law)
+    leaning = ContactPatch(_DISC.positions, _DISC.areas, _DISC.weights(), asymmetry=(0.1, 0.0))
+    with pytest.raises(InvalidValueError, match="law must have no reference_load for patches with an asymmetry"):
+        DistributedModel(leaning, law)
+    model = DistributedModel(_DISC, law)
+    with pytest.raises(InvalidValueError, match="moments must be None for a law with a reference_load"):
+        model.step(model.rest(), np.zeros(3), 1.0, 1e-3, moments=[0.0, 0.0])
+    with pytest.raises(TypeError):
+        CoulombStribeck(reference_load=1.0)
+    with pytest.raises(InvalidValueError, match="law must have no reference_load for compiled sources"):
+        pieces_of(model)
+    assert "reference_load=2" in repr(model)
+    assert law != LuGre() and LuGre(reference_load=None) == LuGre()

@@ -1,0 +1,126 @@
+"""Scenes with a stiffness that does not grow with the load, in the solver."""
+
+import numpy as np
+import pytest
+
+from planarfriction.derivatives import scene_sensitivities
+from planarfriction.errors import InvalidValueError
+from planarfriction.laws import LuGre
+from planarfriction.models import DistributedModel, ReducedModel
+from planarfriction.patch import ContactPatch
+from planarfriction.scenes import Body, Contact, Scene, Signal, simulate
+
+ONE = ContactPatch.points([[-0.01, 0.0], [0.01, 0.0]])
+_GRID = ContactPatch.disc(0.02, cells=4)
+DISCS = ContactPatch(_GRID.positions, _GRID.areas, _GRID.weights(), radii=np.full(_GRID.cells, 0.005))
+
+
+def _body(mass: float = 0.1, inertia: float = 1e-4) -> Body:
+    return Body(mass, inertia, gravity=(0.0, 0.0))
+
+
+def _swinging(mean: float, share: float, rate: float, t_end: float, steps: int) -> Signal:
+    time = np.linspace(0.0, t_end, steps + 1)
+    return Signal(time, mean * (1.0 + share * np.sin(2.0 * np.pi * rate * time)), "linear")
+
+
+@pytest.mark.parametrize(
+    ("pull", "reference", "swing", "first", "last"),
+    [(0.6, 1.0, 0.0, 0.6, 0.6), (0.8, 1.0, 0.0, 0.8, 0.8), (0.6, None, 0.39, None, None), (0.8, None, None, 0.98, 1.51)],
+)
+def test_a_body_under_a_load_that_oscillates_stays_where_it_is(pull, reference, swing, first, last):
+    """The published law swings, and creeps near the limit."""
+    law = LuGre(mu_s=1.2, elasto_plastic=0.9, reference_load=reference)
+    contact = Contact(DistributedModel(ONE, law), _swinging(1.0, 0.3, 2.0, 20.0, 4000))
+    x = 1e6 * simulate(Scene(_body(), contact, 20.0, force=(pull, 0.0, 0.0), save_every=0.01)).data["x"].values
+    if swing is not None:
+        assert np.ptp(x[1850:]) == pytest.approx(swing, abs=0.01 if swing else 1e-6)
+    if first is not None:
+        np.testing.assert_allclose(x[[500, -1]], [first, last], atol=1e-6 if reference else 0.02)
+
+
+def _explicit(model, body, load, pull, t_end, steps):
+    """Integrate a contact on the body by the classical method of Runge and Kutta; return its velocity and place."""
+    dt, mass = t_end / steps, np.array([body.mass, body.mass, body.inertia])
+    size = int(np.prod(model.state_shape))
+
+    def rate(t, y):
+        z, u, f = y[:size].reshape(model.state_shape), y[size : size + 3], float(load(t))
+        cos, sin = np.cos(y[-1]), np.sin(y[-1])
+        turn = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        pulled = pull + turn.T @ model.wrench(z, turn @ u, f)
+        return np.concatenate([model.rate(z, turn @ u, f).ravel(), pulled / mass, u])
+
+    y = np.zeros(size + 6)
+    for k in range(steps):
+        t = k * dt
+        a = rate(t, y)
+        b = rate(t + 0.5 * dt, y + 0.5 * dt * a)
+        c = rate(t + 0.5 * dt, y + 0.5 * dt * b)
+        y = y + dt / 6.0 * (a + 2.0 * b + 2.0 * c + rate(t + dt, y + dt * c))
+    return y[size:]
+
+
+@pytest.mark.parametrize("patch", [ONE, DISCS], ids=["points", "discs"])
+@pytest.mark.parametrize("ratio", [None, 0.8])
+def test_the_solver_agrees_with_a_fine_explicit_integration(patch, ratio):
+    """The load falls below what the bristles hold, again and again."""
+    law = LuGre(mu_s=1.2, sigma_0=1e4, sigma_1=20.0, elasto_plastic=ratio, reference_load=1.5)
+    model, body, t_end = DistributedModel(patch, law), _body(0.05, 2e-5), 0.1
+    load = Signal([0.0, 0.02, 0.04, 0.06, 0.08, 0.1], [1.5, 2.5, 0.4, 1.6, 0.5, 1.2], "linear")
+    pull = np.array([0.7, 0.1, 3e-3])
+    wanted = _explicit(model, body, load, pull, t_end, 10_000)
+    data = simulate(Scene(body, Contact(model, load, mounted_on="body"), t_end, force=pull, save_every=t_end, rtol=1e-8, atol=1e-9)).data
+    found = np.array([data[name][-1] for name in ("vx", "vy", "omega", "x", "y", "theta")])
+    assert np.abs(wanted[3:]).min() > 1e-5
+    np.testing.assert_allclose(found, wanted, rtol=2e-4, atol=1e-9)
+
+
+@pytest.mark.parametrize("patch", [ONE, DISCS], ids=["points", "discs"])
+def test_a_load_that_drops_at_once_leaves_no_force_above_the_limit(patch):
+    law = LuGre(elasto_plastic=0.9, reference_load=1.0)
+    load = Signal([0.0, 0.01, 0.02, 0.03], [2.0, 0.5, 0.0, 3.0])
+    velocity = Signal([0.0, 0.005], [[2e-4, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    scene = Scene(_body(), Contact(DistributedModel(patch, law), load), 0.04, velocity=velocity, save_every=1e-3)
+    pull = -simulate(scene).data["fx"].values[:, 0]
+    np.testing.assert_allclose(pull[[6, 10]], 1.0, rtol=1e-6)  # sigma_0 f_ref 1 um
+    np.testing.assert_allclose(pull[[11, 19]], 0.5, rtol=1e-4)
+    assert not pull[[21, 29]].any() and np.abs(pull[31:]).max() < 1e-12
+
+
+@pytest.mark.parametrize("ratio", [None, 0.9])
+def test_the_force_of_a_held_contact_never_grows_with_the_load(ratio):
+    law = LuGre(sigma_1=0.0, elasto_plastic=ratio, reference_load=1.0)
+    model = DistributedModel(DISCS, law)
+    loads = _swinging(1.0, 0.8, 5.0, 1.0, 1000)
+    velocity = Signal([0.0, 0.001], [[8e-4, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    data = simulate(Scene(_body(), Contact(model, loads), 1.0, velocity=velocity, save_every=2e-3, rtol=1e-8, atol=1e-8)).data
+    force = np.abs(data["fx"].values[:, 0])
+    assert 0.5 < force[1] <= 0.8 + 1e-6
+    assert (np.diff(force[1:]) <= 1e-6).all() and force[-1] < 0.3
+
+
+@pytest.mark.parametrize("start", ["equilibrium", "sliding"])
+def test_a_scene_may_start_under_load_or_sliding(start):
+    law = LuGre(elasto_plastic=0.9, reference_load=1.0)
+    contact = Contact(ReducedModel(_GRID, law), 2.5, mounted_on="body")
+    given = {"force": (1.5, 0.2, 0.0)} if start == "equilibrium" else {"velocity": (0.01, 0.0, 0.3)}
+    data = simulate(Scene(_body(), contact, 0.05, start=start, save_every=0.01, **given)).data
+    force = np.array([data["fx"].values[:, 0], data["fy"].values[:, 0]])
+    if start == "equilibrium":
+        np.testing.assert_allclose(force.T, np.tile([-1.5, -0.2], (force.shape[1], 1)), rtol=1e-6)
+        assert np.abs(data["x"]).max() < 1e-12
+    else:
+        np.testing.assert_allclose(force, force[:, :1] * np.ones(force.shape[1]), rtol=1e-5, atol=1e-12)
+
+
+def test_derivatives_of_scenes_refuse():
+    scene = Scene(_body(), Contact(DistributedModel(ONE, LuGre(reference_load=1.0)), 1.0), 0.01)
+    with pytest.raises(InvalidValueError, match="law must have no reference_load for derivatives of scenes"):
+        scene_sensitivities(scene, ["mass"])
+
+
+def test_a_pressure_that_follows_the_load_refuses():
+    contact = Contact(DistributedModel(_GRID, LuGre(reference_load=1.0)), 1.0, mounted_on="body", pressure="follows")
+    with pytest.raises(InvalidValueError, match="law must have no reference_load for a pressure that follows the load"):
+        simulate(Scene(_body(), contact, 0.01))
