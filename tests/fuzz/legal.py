@@ -116,7 +116,6 @@ def objects() -> dict[str, Any]:
         "controller": None, "start": "rest", "margin": 0.5, "ramp": 0.01, "fall": 2.0,
         "rtol": 1e-4, "atol": 1e-3, "t": 0.05, "elasto_plastic": 0.9, "creep_speed": 1e-5, "relaxation_time": 0.01,
         "breakaway_ratio": 0.5, "k_per_newton": None, "radius_max": 0.02, "error": None,
-        "load_error": 0.01,
         "arm": 0.06, "share": 0.5, "forefoot": model,
         "times_repeated": 2, "gravity": (0.0, -9.81), "size": (0.15, 0.08), "fingers": 2, "phase": 0.0,
         # arrays

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
+from planarfriction.derivatives import PARAMETERS, parameters_of, rollout
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.identify import FitOptions, Log, differentiated, identify_lugre
 from planarfriction.identify.logs import columns_of
-from planarfriction.identify.parameters import Coordinates, soft_finger_moments
+from planarfriction.identify.parameters import Coordinates, scaled_patch, soft_finger_moments
+from planarfriction.identify.simulators import SIMULATORS
 from planarfriction.identify.uncertainty import covariance
 from planarfriction.identify.verdicts import speed_gap
 from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, fitted, noisy, truth
@@ -327,3 +329,16 @@ def test_bad_logs_are_named(log):
         identify(log, PATCH, surface=pf.ReducedModel)
     with pytest.raises(InvalidValueError, match="log must be a Log"):
         identify([], PATCH)
+
+
+def test_discs_grow_and_move_with_their_patch():
+    """The simulation through twists is that of the scaled patch, whose radii are scaled too."""
+    patch, law = pf.ContactPatch.rectangle(0.03, 0.02, 11).discs(30), pf.LuGre(mu_s=1.2)
+    scaled = scaled_patch(patch, 1.3, np.array([0.002, -0.001]))
+    vector = parameters_of(pf.ReducedModelPublished(patch, law)).copy()
+    for name, value in {"contact_radius": 1.3 * patch.contact_radius(), "centre_x": 0.002, "centre_y": -0.001}.items():
+        vector[PARAMETERS.index(name)] = value
+    twists, loads = np.sin(np.linspace(0, 7, 300)[:, None] * [1, 1.7, 2.3]) * [0.01, 0.01, 1], np.ones(300)
+    wrenches = SIMULATORS["distributed"](patch, law).wrenches(twists, loads, 2e-3, vector)
+    expected = rollout(pf.DistributedModel(scaled, law), None, twists, loads, 2e-3).wrenches
+    np.testing.assert_allclose(wrenches, expected, rtol=1e-9, atol=1e-12)
