@@ -27,7 +27,7 @@ def _host(seed: int, load: float | None = None, response: float = 0.0) -> HostSt
 
 
 @pytest.mark.parametrize("load", [1.0, 2.5])
-def test_at_a_held_load_it_is_the_published_law_of_another_sigma_0(load):
+def test_at_a_held_load_it_is_a_law_of_another_sigma_0(load):
     fixed, published = _patches(1.0), _patches(None, 1e6 / load)
     z, y = fixed.rest(), published.rest()
     for seed in range(10):

@@ -106,7 +106,7 @@ def test_easier_one_way_than_the_other():
 
 
 def test_a_line_spins_against_its_coefficient_across():
-    line = pf.ContactPatch.line(0.02, 9, direction="x")
+    line = dataclasses.replace(pf.ContactPatch.line(0.02, 9, direction="x"), radii=None)  # points
     grained = line.with_friction_metric(pf.friction_metric(0.0, 0.3, 0.7))
     assert grained.contact_radius() == pytest.approx(0.7 * line.contact_radius(), rel=1e-14)
     assert grained.second_moment() == pytest.approx(0.49 * line.second_moment(), rel=1e-14)

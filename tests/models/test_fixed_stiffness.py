@@ -44,7 +44,7 @@ def _twists(seed: int, count: int = 40):
 @every_patch
 @every_law
 @pytest.mark.parametrize("load", [REFERENCE, 3.0, 0.4])
-def test_at_a_held_load_it_is_the_published_law_of_another_sigma_0(patch, kind, given, load):
+def test_at_a_held_load_it_is_a_law_of_another_sigma_0(patch, kind, given, load):
     """With the reference load the published law itself, to rounding."""
     fixed = DistributedModel(patch, kind(**given, reference_load=REFERENCE))
     published = DistributedModel(patch, kind(**given, sigma_0=1e6 * REFERENCE / load))
@@ -75,7 +75,7 @@ def test_a_held_contact_keeps_its_force_when_it_is_pressed_harder(patch):
 
 
 @every_patch
-def test_a_bristle_beyond_its_limit_is_brought_back_onto_it_when_the_load_falls(patch):
+def test_a_bristle_beyond_its_limit_returns_when_the_load_falls(patch):
     law = LuGre(mu_c=0.8, mu_s=1.1, elasto_plastic=0.9, reference_load=REFERENCE)
     model = DistributedModel(patch, law)
     bent = np.zeros(model.state_shape)
@@ -90,7 +90,7 @@ def test_a_bristle_beyond_its_limit_is_brought_back_onto_it_when_the_load_falls(
         np.testing.assert_allclose(pull, wanted, rtol=1e-11, atol=1e-15)
 
 
-def test_without_load_bristles_are_forgotten_and_a_load_from_zero_begins_without_force():
+def test_a_load_from_zero_begins_without_force():
     model = ReducedModel(_DISC, LuGre(reference_load=REFERENCE))
     state, pull = model.step(model.rest() + 1e-7, np.zeros(3), 0.0, 1e-3)
     assert not state.any() and not pull.any()
@@ -102,7 +102,7 @@ def test_without_load_bristles_are_forgotten_and_a_load_from_zero_begins_without
 
 @every_patch
 @pytest.mark.parametrize("ratio", [None, 0.9])
-def test_stored_energy_never_grows_while_only_the_load_moves(patch, ratio):
+def test_stored_energy_never_grows_with_the_load(patch, ratio):
     law = LuGre(sigma_1=0.0, elasto_plastic=ratio, reference_load=REFERENCE)
     model, rng = DistributedModel(patch, law), np.random.default_rng(2)
     shares, state = law.sigma_0 * REFERENCE * patch.weights(), 1e-6 * rng.normal(size=model.state_shape)
@@ -118,7 +118,7 @@ def test_stored_energy_never_grows_while_only_the_load_moves(patch, ratio):
 
 @every_patch
 @pytest.mark.parametrize("ratio", [None, 0.9])
-def test_no_work_comes_out_that_was_not_put_in_over_10000_cycles_of_loads_and_twists(patch, ratio):
+def test_no_work_comes_out_that_was_not_put_in(patch, ratio):
     """Paths of the twist are closed, whatever the loads do meanwhile; the published law gives work out in some."""
     count, steps = 10_000, 12
     rng = np.random.default_rng(3)

@@ -82,7 +82,7 @@ def test_discs_are_nearer_than_the_published_model(result):
         assert ratios["maximum"] < 0.6 and ratios["torque maximum"] < 0.6 and ratios["torque third quartile"] < 0.25
 
 
-def test_largest_errors_of_a_disc_for_every_cell_are_below_those_of_points(result):
+def test_a_disc_for_every_cell_errs_less_than_points(result):
     for each in result.numbers["driven"].values():
         for name in ("maximum", "torque maximum"):
             assert each[ladder.ALL][name] < each["full"][name]
@@ -106,7 +106,7 @@ def test_the_default_is_far_below_the_published_model(result):
     assert few["steady, force"] < 1.0 and few["largest"] < 0.35
 
 
-def test_contacts_that_hold_creep_as_far_with_few_discs_as_with_fine_cells(result):
+def test_contacts_that_hold_creep_with_few_discs_as_with_fine_cells(result):
     for level, found in result.numbers["creep"]["disc"].items():
         few, fine = found[f"{ladder.DEFAULT} discs"], found["refined(2)"]
         assert abs(few - fine) < (1e-9 if float(level) < 0.7 else 2e-8), level
