@@ -73,3 +73,10 @@ def test_a_sample_late_or_a_wrong_stiffness_would_be_noticed(result):
     for wrong in (np.append(theta[1:], theta[-1]), 1.001 * theta):
         row = compare_curve("theta", time, wrong, "drift/d_ep/theta", allowance=allowance, cause="wrong")
         assert not row.holds, row
+
+
+def test_nothing_moves_with_a_fixed_stiffness(result):
+    """The deflection of a stiffness that grows with the load is `F/(sigma_0 f_N)`: it follows the normal force."""
+    swing = result.numbers["swing"]
+    assert swing["grows"]["x"] > 1e-8 and swing["grows"]["theta"] > 1e-6
+    assert swing["fixed"]["x"] < 1e-15 and swing["fixed"]["theta"] < 1e-13

@@ -65,7 +65,8 @@ def run(work: Work) -> Result:
     moves = {(load, model): partial(_move, load, model, rtol, atol) for load, each in MODELS.items() for model in each}
     found = work.pieces(moves, lambda key: f"drift, {', '.join(key)}")
     straight = work.piece("drift, straight ramp", lambda: _straight_ramp(rtol, atol))
-    numbers = _numbers(found, straight)
+    fixed = work.piece("drift, fixed stiffness", lambda: _fixed_stiffness(rtol, atol))
+    numbers = _numbers(found, straight) | {"swing": _swings({"grows": found["normal", "d_ep"], "fixed": fixed})}
     creep = numbers["creep"]
     grown = creep["normal force"]
     moved = {f"{what}; {WORDS[model]}": each for what, models in creep.items() for model, each in models.items()}
@@ -101,6 +102,22 @@ def _move(load: Load, model: str, rtol: float, atol: float) -> Arrays:
     kind: Any = model[0]
     scene = drift(runs.published_model(kind, "Circle", LAWS[model[1:]][0], width=WIDTH), load=load)
     return runs.simulated(scene, rtol=rtol, atol=atol)
+
+
+def _fixed_stiffness(rtol: float, atol: float) -> Arrays:
+    """Simulate the distributed model under the normal load, with the stiffness that it has under the weight."""
+    law = dataclasses.replace(runs.LAW, reference_load=GRAVITY)
+    return runs.simulated(drift(runs.published_model("d", "Circle", law, width=WIDTH), load="normal"), rtol=rtol, atol=atol)
+
+
+def _swings(moved: dict[str, Arrays]) -> dict[str, dict[str, float]]:
+    """Return the ranges of x [m] and theta [rad] over three periods of the normal force."""
+    _, start, end = WINDOWS["normal force"]
+    ranges = {}
+    for name, each in moved.items():
+        inside = (each["time"] >= start) & (each["time"] <= end)
+        ranges[name] = {axis: float(np.ptp(each[axis][inside])) for axis in ("x", "theta")}
+    return ranges
 
 
 def _straight_ramp(rtol: float, atol: float) -> Arrays:
