@@ -132,7 +132,7 @@ NUMBERS = {
     "normal_force": lambda x: pf.LimitSurfaceCells(SQUARE, normal_force=x),
     "segments": lambda x: pf.LimitSurfaceTable(SQUARE, x),
     "samples": lambda x: ELLIPSOID.compare(ELLIPSOID, samples=x),
-    "cells": lambda x: pf.ReducedModel(SQUARE, pf.LuGre(), cells=x),
+    "discs": lambda x: pf.ReducedModel(SQUARE, pf.LuGre(), cells=x),
     "n": SQUARE.discs,
 }
 ARRAYS = {
@@ -163,7 +163,7 @@ ARRAYS = {
     "wrench": ELLIPSOID.twist,
     "coefficients": lambda x: pf.LimitSurfaceQuartic(SQUARE, coefficients=x),
 }
-CALLED = {"elasto_plastic": "", "parts": ""}
+CALLED = {"discs": "cells", "elasto_plastic": "", "parts": ""}
 """Parameters whose messages may speak of what they are part of: breakaway_ratio, cells."""
 MASKS = ("weights", "pressure", "profile")
 """Pressures: an array of truth values is a mask."""

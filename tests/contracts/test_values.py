@@ -97,7 +97,9 @@ MAKERS = {
     "RODAS3": lambda: copy.deepcopy(solvers.RODAS3),
     "comparison": lambda: SURFACES["LimitSurfaceCells"]().compare(SURFACES["LimitSurfaceEllipsoid"]()),
     "jacobians": lambda: MODELS["ReducedModelPublished of a square"]().jacobians(np.zeros(3), (0.1, 0.0, 0.0), 1.0),
-    "step jacobians": lambda: MODELS["ReducedModelPublished of a square"]().step_jacobians(np.zeros(3), (1, 0, 0), 1.0, 1e-3),
+    "step jacobians": lambda: MODELS["ReducedModelPublished of a square"]().step_jacobians(
+        np.zeros(3), (1, 0, 0), 1.0, 1e-3
+    ),
     "published shape": lambda: MODELS["ReducedModelPublished of a finger"]().shape_at(1.0),
     "surface numbers": lambda: SURFACES["LimitSurfaceTable"]().numbers,
     "roll-out": lambda: pf.rollout(MODELS["DistributedModel of a square"](), None, np.ones((5, 3)), 1.0, 1e-3),

@@ -224,9 +224,7 @@ def test_the_adjoint_is_the_transpose_of_the_jacobians(name):
     assert sum(backwards) == pytest.approx(sum(forwards), abs=case.rounding * np.abs(forwards).sum())
 
 
-@pytest.mark.parametrize(
-    "name", ["published published, elasto-plastic", "soft cells", "cells, many"]
-)
+@pytest.mark.parametrize("name", ["published published, elasto-plastic", "soft cells", "cells, many"])
 def test_a_batch_is_a_loop(name):
     case, random = CASES[name], np.random.default_rng(8)
     model = case.model
@@ -258,9 +256,7 @@ def test_a_batch_is_a_loop(name):
         assert got == pytest.approx(wanted, rel=1e-11, abs=1e-12 * np.abs(wanted).max())
 
 
-@pytest.mark.parametrize(
-    "name", ["published ellipsoid, elasto-plastic", "cells, wide, around"]
-)
+@pytest.mark.parametrize("name", ["published ellipsoid, elasto-plastic", "cells, wide, around"])
 def test_kept_states_and_several_threads_change_nothing(name):
     case = CASES[name]
     model, (state, twists, loads) = case.model, drive(case, steps=500)

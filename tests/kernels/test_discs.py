@@ -30,7 +30,7 @@ def _mean_speed(q):
 
 def _surface(q):
     """Return mean speed, force and own torque of a disc of radius 1 that spins at 1 and slides at q."""
-    c_t, c_s, speed, (along, _, spin) = sliding((q, 0.0, KAPPA))
+    _, _, speed, (along, _, spin) = sliding((q, 0.0, KAPPA))
     return speed, along / speed, KAPPA * spin / speed
 
 
@@ -114,7 +114,11 @@ def test_passes_step_as_the_function_they_come_from(count):
     """Sums run in another order, and functions are polynomials: 1e-12 of the largest term."""
     rng = np.random.default_rng(count)
     law = LuGre(mu_c=1.0, mu_s=1.2, v_s=1e-3, sigma_0=1e6, sigma_1=8e2, sigma_2=0.2, elasto_plastic=0.9)
-    places, radii, pressure = rng.normal(size=(count, 2)) * 5e-3, rng.uniform(size=count) * 3e-3, rng.uniform(size=count)
+    places, radii, pressure = (
+        rng.normal(size=(count, 2)) * 5e-3,
+        rng.uniform(size=count) * 3e-3,
+        rng.uniform(size=count),
+    )
     patch = ContactPatch(places, np.full(count, 1e-6), pressure, radii=radii)
     twist, z = tuple(rng.normal(size=3) * (1e-3, 1e-3, 0.2)), rng.normal(size=(3, count)) * 5e-7
     new, wrench = DistributedModel(patch, law).step(z, twist, 2.0, 1e-4)

@@ -1,4 +1,4 @@
-"""Derivatives of steps of bristles, cells and the published model against 60 digits, also where cap and rounding meet."""
+"""Derivatives of steps of bristles, cells and the published model against 60 digits, also where the cap is met."""
 
 from __future__ import annotations
 

@@ -29,7 +29,9 @@ PATCHES = {
     "discs": _patch(0.004, None), "turned discs": _patch(0.004, METRIC),
 }  # fmt: skip
 LAWS = {
-    "lugre": (LuGre, {"mu_s": 1.3}), "elasto-plastic": (LuGre, {"mu_s": 1.3, "elasto_plastic": 0.9}), "dahl": (Dahl, {}),
+    "lugre": (LuGre, {"mu_s": 1.3}),
+    "elasto-plastic": (LuGre, {"mu_s": 1.3, "elasto_plastic": 0.9}),
+    "dahl": (Dahl, {}),
 }  # fmt: skip
 
 every_patch = pytest.mark.parametrize("patch", PATCHES.values(), ids=PATCHES)
@@ -58,7 +60,9 @@ def test_at_a_held_load_it_is_a_law_of_another_sigma_0(patch, kind, given, load)
         np.testing.assert_allclose(
             fixed.rate(z, twist, load), published.rate(y, twist, load), rtol=0.0, atol=1e-10 * np.abs(twist).max()
         )
-        np.testing.assert_allclose(fixed.wrench(z, twist, load), published.wrench(y, twist, load), rtol=1e-11, atol=1e-12)
+        np.testing.assert_allclose(
+            fixed.wrench(z, twist, load), published.wrench(y, twist, load), rtol=1e-11, atol=1e-12
+        )
 
 
 @every_patch
@@ -122,7 +126,9 @@ def test_no_work_comes_out_that_was_not_put_in(patch, ratio):
     """Paths of the twist are closed, whatever the loads do meanwhile; the published law gives work out in some."""
     count, steps = 10_000, 12
     rng = np.random.default_rng(3)
-    path = np.cumsum(rng.normal(size=(count, steps, 3)) * [1e-6, 1e-6, 1e-4] * 10.0 ** rng.uniform(-2, 0, (count, 1, 1)), 1)
+    path = np.cumsum(
+        rng.normal(size=(count, steps, 3)) * [1e-6, 1e-6, 1e-4] * 10.0 ** rng.uniform(-2, 0, (count, 1, 1)), 1
+    )
     path[:, -1] = 0.0
     moves, loads = np.diff(path, axis=1, prepend=0.0), 10.0 ** rng.uniform(-1.0, 1.0, (count, steps))
     least = {}
@@ -138,7 +144,10 @@ def test_no_work_comes_out_that_was_not_put_in(patch, ratio):
 
 
 def _differences(function, size, at):
-    return [(a - b) / (2.0 * size * at) for a, b in zip(function(at * (1.0 + size)), function(at * (1.0 - size)), strict=True)]
+    return [
+        (a - b) / (2.0 * size * at)
+        for a, b in zip(function(at * (1.0 + size)), function(at * (1.0 - size)), strict=True)
+    ]
 
 
 @every_patch
@@ -160,7 +169,10 @@ def test_derivatives_are_those_of_differences(patch, kind, given, load):
         rates = [model.rate(state + s * d_state, twist + s * d_twist, load) for s in (1.0, -1.0)]
         new, pull = (0.5 * (a - b) for a, b in zip(above, below, strict=True))
         if found == "state":
-            mine = np.einsum("abn,bn->an", step.state_state, d_state), np.einsum("dan,an->d", step.wrench_state, d_state)
+            mine = (
+                np.einsum("abn,bn->an", step.state_state, d_state),
+                np.einsum("dan,an->d", step.wrench_state, d_state),
+            )
             of_rate = np.einsum("abn,bn->an", slopes.rate_state, d_state)
         else:
             mine, of_rate = (step.state_twist @ d_twist, step.wrench_twist @ d_twist), slopes.rate_twist @ d_twist
@@ -177,7 +189,7 @@ def test_a_bristle_at_rest_never_holds_more_than_its_limit(load, reference, mu_s
     law = LuGre(mu_s=mu_s, elasto_plastic=ratio, reference_load=reference)
     patch = ContactPatch.points([[-0.01, 0.0], [0.01, 0.0]])
     model = DistributedModel(patch, law)
-    state, pull = model.step(np.repeat(np.array(bent)[:, None], 2, 1), np.zeros(3), load, 1e-3)
+    _, pull = model.step(np.repeat(np.array(bent)[:, None], 2, 1), np.zeros(3), load, 1e-3)
     assert math.hypot(*pull[:2]) <= mu_s * load * (1.0 + 1e-12)
     held = law.sigma_0 * reference * math.hypot(*bent)
     np.testing.assert_allclose(math.hypot(*pull[:2]), min(held, mu_s * load), rtol=1e-9, atol=1e-300)
@@ -196,7 +208,11 @@ def test_a_single_bristle_follows_the_same_equations():
 
 
 def test_rollouts_are_steps_and_their_derivatives_refuse():
-    model, twists, loads = DistributedModel(_DISC, LuGre(reference_load=REFERENCE)), _twists(5), np.linspace(0.5, 3.0, 40)
+    model, twists, loads = (
+        DistributedModel(_DISC, LuGre(reference_load=REFERENCE)),
+        _twists(5),
+        np.linspace(0.5, 3.0, 40),
+    )
     done, state = rollout(model, None, twists, loads, 1e-3), model.rest()
     for t, (twist, load) in enumerate(zip(twists, loads, strict=True)):
         state, pull = model.step(state, twist, load, 1e-3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import dataclasses
 import json
 
@@ -126,9 +127,12 @@ def test_discs_of_a_symmetric_patch_are_symmetric(n):
             assert discs.radii[image] == pytest.approx(discs.radii, rel=EXACT)
 
 
+APART = np.array([0.01, 0.003])
+
+
 def test_two_equal_pads_pull_in_one_line():
     pad = pf.ContactPatch.rectangle(0.004, cells=9).positions
-    pads = pf.ContactPatch.points(np.concatenate([pad - [0.01, 0.003], pad + [0.01, 0.003]]))
+    pads = pf.ContactPatch.points(np.concatenate([pad - APART, pad + APART]))
     wrench = pf.LimitSurfaceCells(pads.discs(10)).wrench((1.0, 0.0, 0.0))
     assert wrench == pytest.approx([-1.0, 0.0, 0.0], abs=1e-15)
     assert (pads.discs(10).positions[:, 0] > 0.0).sum() == 5
@@ -168,7 +172,7 @@ def test_errors_of_friction_fall_with_the_number_of_discs(name):
     fine = SHAPES[name].refined(3)
     errors = [wrench_error(SHAPES[name].discs(n), fine) for n in (8, 16, 32, 128)]
     assert errors[-1] < 0.3 * errors[0]
-    for less, more in zip(errors[:-1], errors[1:], strict=True):
+    for less, more in itertools.pairwise(errors):
         assert more < 1.2 * less
 
 

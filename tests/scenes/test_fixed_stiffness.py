@@ -26,7 +26,12 @@ def _swinging(mean: float, share: float, rate: float, t_end: float, steps: int) 
 
 @pytest.mark.parametrize(
     ("pull", "reference", "swing", "first", "last"),
-    [(0.6, 1.0, 0.0, 0.6, 0.6), (0.8, 1.0, 0.0, 0.8, 0.8), (0.6, None, 0.39, None, None), (0.8, None, None, 0.98, 1.51)],
+    [
+        (0.6, 1.0, 0.0, 0.6, 0.6),
+        (0.8, 1.0, 0.0, 0.8, 0.8),
+        (0.6, None, 0.39, None, None),
+        (0.8, None, None, 0.98, 1.51),
+    ],
 )
 def test_a_body_under_a_load_that_oscillates_stays_where_it_is(pull, reference, swing, first, last):
     """The published law swings, and creeps near the limit."""
@@ -70,7 +75,9 @@ def test_the_solver_agrees_with_a_fine_explicit_integration(patch, ratio):
     load = Signal([0.0, 0.02, 0.04, 0.06, 0.08, 0.1], [1.5, 2.5, 0.4, 1.6, 0.5, 1.2], "linear")
     pull = np.array([0.7, 0.1, 3e-3])
     wanted = _explicit(model, body, load, pull, t_end, 10_000)
-    data = simulate(Scene(body, Contact(model, load, mounted_on="body"), t_end, force=pull, save_every=t_end, rtol=1e-8, atol=1e-9)).data
+    data = simulate(
+        Scene(body, Contact(model, load, mounted_on="body"), t_end, force=pull, save_every=t_end, rtol=1e-8, atol=1e-9)
+    ).data
     found = np.array([data[name][-1] for name in ("vx", "vy", "omega", "x", "y", "theta")])
     assert np.abs(wanted[3:]).min() > 1e-5
     np.testing.assert_allclose(found, wanted, rtol=2e-4, atol=1e-9)
@@ -94,7 +101,9 @@ def test_the_force_of_a_held_contact_never_grows_with_the_load(ratio):
     model = DistributedModel(DISCS, law)
     loads = _swinging(1.0, 0.8, 5.0, 1.0, 1000)
     velocity = Signal([0.0, 0.001], [[8e-4, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    data = simulate(Scene(_body(), Contact(model, loads), 1.0, velocity=velocity, save_every=2e-3, rtol=1e-8, atol=1e-8)).data
+    data = simulate(
+        Scene(_body(), Contact(model, loads), 1.0, velocity=velocity, save_every=2e-3, rtol=1e-8, atol=1e-8)
+    ).data
     force = np.abs(data["fx"].values[:, 0])
     assert 0.5 < force[1] <= 0.8 + 1e-6
     assert (np.diff(force[1:]) <= 1e-6).all() and force[-1] < 0.3

@@ -11,8 +11,8 @@ from planarfriction_studies.experiments.runs import LAW
 from tests.support.repository import script
 
 MOST = np.array([5e-6, 3e-5])
-"""Largest errors of ends, distance [m] and angle [rad], for motions of 2 cm and up to 1.8 rad: 0.5 um and 17 urad at the
-default tolerances, 0.8 um and 28 urad at 1.5 times those."""
+"""Largest errors of ends, distance [m] and angle [rad], for motions of 2 cm and up to 1.8 rad: 0.5 um and 17 urad at
+the default tolerances, 0.8 um and 28 urad at 1.5 times those."""
 
 
 accuracy = script("docs/default_accuracy.py")

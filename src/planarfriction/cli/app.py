@@ -18,6 +18,7 @@ from planarfriction.cli.options import FILE, cells_option, complete_scene, patch
 from planarfriction.cli.sweep import sweep
 from planarfriction.families import MODELS, SCENES, SURFACES, Family
 
+
 class MemberOf(click.Choice):
     """A choice among the members of a family, those that are registered later too, and a few words more."""
 

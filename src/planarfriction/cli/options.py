@@ -113,7 +113,9 @@ def complete_patch(context: object, parameter: object, incomplete: str) -> list[
 def _replaced(context: object, parameter: click.Parameter, value: Any) -> None:
     """Refuse an option that another one has replaced."""
     if value is not None:
-        raise InvalidValueError("--parts", "be left out: write --cells, the number of discs of the reduced model", value)
+        raise InvalidValueError(
+            "--parts", "be left out: write --cells, the number of discs of the reduced model", value
+        )
 
 
 def cells_option(function: Any) -> Any:

@@ -73,9 +73,7 @@ class CompiledModel:
     those that are not plain and in order; then the checks of the model decide.
     """
 
-    def __init__(
-        self, functions: StepFunctions, state_shape: tuple[int, ...], square_shape: tuple[int, ...]
-    ) -> None:
+    def __init__(self, functions: StepFunctions, state_shape: tuple[int, ...], square_shape: tuple[int, ...]) -> None:
         self.functions, self.state_shape = functions, state_shape
         self._size, self._square, self._flat = math.prod(state_shape), math.prod(square_shape), len(state_shape) == 1
         """Number of states, and numbers of d new state / d state, whose shape is `square_shape`."""

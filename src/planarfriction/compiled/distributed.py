@@ -166,7 +166,11 @@ class CompiledDistributed(CompiledModel):
             self.size * count,
             rows * count,
             np.full(self.size * count, self.law.largest_deflection),
-            float(np.hypot(np.hypot(*(positions - positions.mean(axis=0)).T), KAPPA * self.patch.lever_radii[chosen]).mean()),
+            float(
+                np.hypot(
+                    np.hypot(*(positions - positions.mean(axis=0)).T), KAPPA * self.patch.lever_radii[chosen]
+                ).mean()
+            ),
             (weights, numbers),
             chosen,
             reference=self.reference,

@@ -26,7 +26,9 @@ def following(
     (weights, numbers), positions = packed.keepalive, compiled.patch.positions[packed.cells]
     count, (x, y) = weights.shape[1], np.ascontiguousarray(positions.T)
     middle, slopes, radius = _moved(weights, positions)
-    pressed, trial, scratch, zero, rows = (np.zeros(size) for size in (count, count, *(packed.states + STATES,) * 2, 12))
+    pressed, trial, scratch, zero, rows = (
+        np.zeros(size) for size in (count, count, *(packed.states + STATES,) * 2, 12)
+    )
     held, tried = (row_of(compiled.record(numbers, each)[0]) for each in (pressed, trial))
     calls = calls_of(packed.functions, change=True)
     record = FollowingContact(

@@ -67,7 +67,7 @@ class CompiledPublished(CompiledModel):
             yield rows, self._at(shape), centre[rows] - shape.place
 
     def linearisation(self, shape: Any, state: np.ndarray, twist: np.ndarray) -> np.ndarray:
-        """Return linearisations `[B, L]` at flat states and twists (see `kernels.published_contact.LinearPublished`)."""
+        """Return linearisations `[B, L]` at flat states and twists (see `published_contact.LinearPublished`)."""
         return linearised(self._at(shape), state, twist)
 
     def _at(self, shape: Any) -> PackedModel:

@@ -102,7 +102,7 @@ class Writer:
         yield f"{indent}}}"
 
 
-SQRT = """#if defined(__AVX2__) && !defined(__NO_MATH_ERRNO__) /* the one of math.h may set errno, which no vector does */
+SQRT = """#if defined(__AVX2__) && !defined(__NO_MATH_ERRNO__) /* that of math.h may set errno, which no vector does */
     const union { real x; unsigned long long bits; } same = { x };
     const real half = 0.5 * x;
     real y = of_bits(0x5fe6eb50c7b537a9 - (long long)(same.bits >> 1));

@@ -12,7 +12,15 @@ import numpy as np
 from planarfriction import formulas
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, cells_rollout, disc_cells, discs, distributed_step, moment_steps, published_step
+from planarfriction.kernels import (
+    cells,
+    cells_rollout,
+    disc_cells,
+    discs,
+    distributed_step,
+    moment_steps,
+    published_step,
+)
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.law import grip
 from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, Root
@@ -33,6 +41,7 @@ MOST_RUNGS = 512
 
 NARROW = 1e-3
 """Relative distance of rungs [-] between which nothing is put: a shape that jumps there stays as it is."""
+
 
 class Ladder(NamedTuple):
     """Shares of the load at some loads, linear in the load between them and constant beyond."""

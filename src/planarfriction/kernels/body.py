@@ -33,7 +33,6 @@ from planarfriction.kernels.settle import bring_back, factor_at
 from planarfriction.kernels.small_matrices import applied, inverse
 from planarfriction.kernels.vectors import applied_back, plus, put, put_all, three
 
-
 NO_LOAD = 1e-6
 """Share of the reference load of a fixed stiffness below which bristles cannot follow the load (see `settle_all`)."""
 

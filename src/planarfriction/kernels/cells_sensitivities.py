@@ -15,7 +15,7 @@ from planarfriction.compiler.calls import pointer
 from planarfriction.compiler.memory import at
 from planarfriction.kernels import distributed_step
 from planarfriction.kernels.bind import bind
-from planarfriction.kernels.cell_blocks import BLOCK, LANES, WEIGHT, Z, Kind, divided, lever_at
+from planarfriction.kernels.cell_blocks import BLOCK, LANES, WEIGHT, Kind, Z, divided, lever_at
 from planarfriction.kernels.cells_rollout import POINTS, TURNED_POINTS, _lay, _read, _write
 from planarfriction.kernels.forward import forwards
 from planarfriction.kernels.law import law_of

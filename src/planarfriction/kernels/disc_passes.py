@@ -11,7 +11,7 @@ from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import at
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import cells, cells_rollout, cells_sensitivities, disc_cells, discs, distributed_step
-from planarfriction.kernels.cell_blocks import BAR, BLOCK, BY_LOAD, LANES, WEIGHT, Z, Kind, divided, room
+from planarfriction.kernels.cell_blocks import BAR, BLOCK, BY_LOAD, LANES, WEIGHT, Kind, Z, divided, room
 from planarfriction.kernels.cell_slopes import StepBars
 from planarfriction.kernels.cells import Lever
 from planarfriction.kernels.cells_rollout import BY, bound

@@ -42,8 +42,7 @@ def sliding(u):
 @kernel
 def mean_speed(u):
     """Return S."""
-    c_t, c_s, speed, pull = sliding(u)
-    return speed
+    return sliding(u)[2]
 
 
 @kernel

@@ -20,6 +20,7 @@ from planarfriction.kernels.rules import ratio
 from planarfriction.kernels.settle import recovery
 from planarfriction.kernels.vectors import dot, matrix_applied, norm, plus, put, scatter, three, times
 
+
 @kernel
 def evaluate_point(law, z, u):
     """Return z' and the traction of a point."""

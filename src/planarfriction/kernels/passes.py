@@ -9,6 +9,7 @@ comparisons, are done again where they are needed.
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -112,7 +113,7 @@ def _parts(block: Block, inputs: Mapping[str, str], stores: Sequence[str], count
     again = _done_again(operations, inputs, short)
     own = [each for each in operations if each.name not in again]
     cuts = _cuts(own, again, block, count)
-    spans = list(zip(cuts, cuts[1:], strict=False))
+    spans = list(itertools.pairwise(cuts))
     part_of = {each.name: k for k, span in enumerate(spans) for each in own[slice(*span)]}
     made = [max((part_of.get(name, 0) for name in _needed([each], again)), default=0) for each in block.results]
     for k, place in enumerate(stores):
@@ -145,7 +146,7 @@ def _arguments(operation: Operation) -> Iterator[str]:
 
 
 def _done_again(operations: Sequence[Operation], inputs: Mapping[str, str], short: int) -> dict[str, Operation]:
-    """Return the operations that passes do again: short ones, comparisons, and those of numbers that all cells share."""
+    """Return operations that passes do again: short ones, comparisons, and those of numbers that all cells share."""
     steps = dict.fromkeys(inputs, 0)
     alike = {name for name, source in inputs.items() if not source.endswith("+ i]")}
     found = {}

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from planarfriction.compiler import compiled_math, memory
-from planarfriction.kernels.trace import CompiledMathematics, Mathematics, Number, Table, flat
 from planarfriction.kernels import published_contact, vectors
+from planarfriction.kernels.trace import CompiledMathematics, Mathematics, Number, Table, flat
 
 
 def _plus(a: Any, c: Any, b: Any) -> Any:

@@ -23,7 +23,6 @@ from planarfriction.models.base import FrictionModel, ModelJacobians
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_cell_metrics, same_metric
 
-
 REMEMBERED = 64
 """Number of loads whose shapes are remembered."""
 

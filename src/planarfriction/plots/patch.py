@@ -26,8 +26,8 @@ def plot_patch(patch: pf.ContactPatch, *, normal_force: float | None = None) -> 
     """Draw the pressure on a patch, and its centre of pressure.
 
     Cells of a grid are drawn with their true area at their true centroid and coloured by their pressure; a
-    patch without a grid is drawn as points, or as its discs, coloured by the force on them, `w f_N`. Without `normal_force` [N] the
-    colours show both per newton of load. Lengths in mm.
+    patch without a grid is drawn as points, or as its discs, coloured by the force on them, `w f_N`. Without
+    `normal_force` [N] the colours show both per newton of load. Lengths in mm.
 
     Raises InvalidValueError unless `patch` is a patch, for a load below zero, and without a load that is needed.
     """

@@ -223,7 +223,11 @@ class SegmentBatches:
         self.state = np.concatenate([self._first(), body.velocity, body.position, [body.angle]])
         """Bristles as the scene starts, body velocity, pose."""
         self.state_scale = np.concatenate(
-            [*(b * m.state_scale for b, m in zip(self._bends, self.models, strict=True)), speed * arm, self._length * arm]
+            [
+                *(b * m.state_scale for b, m in zip(self._bends, self.models, strict=True)),
+                speed * arm,
+                self._length * arm,
+            ]
         )
         """Natural scale of each state: mu_c/sigma_0 for deflections and positions, a share of v_s for velocities (that
         of a creep, `compiled.PackedModel.velocity_scale`), angles over r.

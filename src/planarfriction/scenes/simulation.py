@@ -155,7 +155,9 @@ def _histories(scene: Scene, batches: SegmentBatches, output: Output) -> dict[st
             if cells is not None:
                 size = contact.model.state_shape[0]
                 full = np.zeros((len(part), size, len(cells)))
-                full[:, :, cells] = part[:, : size * cells.sum()].reshape(len(part), size, -1)  # no place of the pressure
+                full[:, :, cells] = part[:, : size * cells.sum()].reshape(
+                    len(part), size, -1
+                )  # no place of the pressure
                 axis = "axis" if size == 2 else "component"
                 histories[name] = History(("time", axis, f"cell_{contact.name}"), full, {"units": "m"})
             else:

@@ -46,6 +46,7 @@ KINDS = {
 Numbers are those of the lever, with the asymmetry behind them.
 """
 
+
 class Cells(NamedTuple):
     """A patch as arrays."""
 

@@ -35,9 +35,7 @@ def evaluate(xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, 
     return equations.narrow(rate), load[..., None] * equations.wrench(xp, contact.shape, pull)
 
 
-def step(
-    xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, load: Any, dt: Any
-) -> tuple[Any, Any]:
+def step(xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, load: Any, dt: Any) -> tuple[Any, Any]:
     """Return the state after `dt` [s] of a constant twist, and the wrench at the end; without load bristles relax."""
     given, z = (contact.law.sigma_0, state, twist), equations.wide(xp.widened(state))
     by = equations.drive(xp, *contact, xp.widened(twist))

@@ -10,9 +10,9 @@ import numpy as np
 from planarfriction.export.c_source import Writer
 from planarfriction.export.library import PARAMETERS, PRECISIONS, tilt_of
 from planarfriction.export.pieces import Pieces, pieces_of
+from planarfriction.kernels import coupling
 from planarfriction.kernels.trace import Block, Number, Trace, traced
 from planarfriction.kernels.twins import twin
-from planarfriction.kernels import coupling
 from planarfriction.models import FrictionModel
 
 ROUNDING = {"double": (coupling.ROUNDING,) * 2, "float": (3e-7, 1e-5)}
@@ -91,9 +91,7 @@ def _shortening(trace: Trace) -> Any:
     return twin(coupling.too_far)(*slopes), twin(coupling.shortening_of)(*slopes)
 
 
-def _described(
-    models: Sequence[Described], precision: str, slopes: bool
-) -> tuple[list[dict[str, Any]], np.ndarray]:
+def _described(models: Sequence[Described], precision: str, slopes: bool) -> tuple[list[dict[str, Any]], np.ndarray]:
     """Return what a template needs of each model, and the tables of all of them."""
     writer, described = Writer(precision), []
     joined: list[np.ndarray] = []

@@ -17,7 +17,6 @@ from pydrake.systems.framework import DiagramBuilder
 from planarfriction.adapters.drake.patches import Placed
 from planarfriction.errors import InvalidValueError
 
-
 _ORIGIN = np.zeros(3)
 
 

@@ -44,7 +44,7 @@ _MOST_STEPS = 60
 @kernel
 def _pull(u):
     """Return the friction `W/S` of a disc."""
-    c_t, c_s, speed, pull = sliding(u)
+    _, _, speed, pull = sliding(u)
     return times(1.0 / speed, pull)
 
 

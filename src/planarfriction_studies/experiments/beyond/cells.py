@@ -303,9 +303,7 @@ def pooled(found: dict[str, Any]) -> dict[str, dict[str, float]]:
     """Return by model the columns of the table over the runs on all shapes [%]."""
     names = list(next(iter(found.values()))["stops"])
     runs = lambda what, name: np.concatenate([each[what][name] for each in found.values()])  # noqa: E731
-    return {
-        name: {words: 100.0 * float(of(runs(what, name))) for words, (what, of) in SHOWN.items()} for name in names
-    }
+    return {name: {words: 100.0 * float(of(runs(what, name))) for words, (what, of) in SHOWN.items()} for name in names}
 
 
 def tables(errors: dict[str, dict[str, float]], creeps: dict[str, Any]) -> tuple[Table, Table]:

@@ -147,8 +147,7 @@ def _numbers(rows: list[ladder.Row], shifts: dict[str, float], errors: Numbers) 
         "driven ratios, all": ladder.ratios(moved, ladder.ALL),
         "in hand": ends,
         "in hand score": {
-            model: {f"load {load}": ladder.score(ends, load, model) for load in (1, 2)}
-            for model in SHOWN
+            model: {f"load {load}": ladder.score(ends, load, model) for load in (1, 2)} for model in SHOWN
         },
         # median over all runs of the time in the solver over that of the distributed model
         "run costs": {name: float(np.median([row.time for row in rows if row.model == name])) for name in models},

@@ -107,7 +107,9 @@ def _move(load: Load, model: str, rtol: float, atol: float) -> Arrays:
 def _fixed_stiffness(rtol: float, atol: float) -> Arrays:
     """Simulate the distributed model under the normal load, with the stiffness that it has under the weight."""
     law = dataclasses.replace(runs.LAW, reference_load=GRAVITY)
-    return runs.simulated(drift(runs.published_model("d", "Circle", law, width=WIDTH), load="normal"), rtol=rtol, atol=atol)
+    return runs.simulated(
+        drift(runs.published_model("d", "Circle", law, width=WIDTH), load="normal"), rtol=rtol, atol=atol
+    )
 
 
 def _swings(moved: dict[str, Arrays]) -> dict[str, dict[str, float]]:
