@@ -185,15 +185,15 @@ def _cuts(own: Sequence[Operation], again: Mapping[str, Operation], block: Block
     """Return where passes begin: about evenly by cost, where few numbers are handed on."""
     costs = [next((cost for text, cost in COSTS.items() if text in each.text), 1) for each in own]
     reached = [sum(costs[:k]) / sum(costs) * count for k in range(len(own))]
-    made = [each.name for each in own]
-
-    def handed(end: int) -> int:
-        return len(_names_needed([*own[end:], *_as_operations(block.results)], again).intersection(made[:end]))
-
+    made, last = {each.name: k for k, each in enumerate(own)}, [0] * len(own)
+    for k, each in enumerate([*own, *_as_operations(block.results)]):
+        for name in _needed(list(_arguments(each)), again) & made.keys():
+            last[made[name]] = k
+    handed = [sum(use >= end for use in last[:end]) for end in range(len(own))]
     ends = set()
     for middle in range(1, count):
         near = [k for k in range(1, len(own)) if abs(reached[k] - middle) < 0.25]
-        ends.add(min(near or [1], key=handed))
+        ends.add(min(near or [1], key=handed.__getitem__))
     return [0, *sorted(ends), len(own)]
 
 
