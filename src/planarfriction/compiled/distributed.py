@@ -15,22 +15,15 @@ from planarfriction.compiled.rates import linearised
 from planarfriction.compiled.shapes_by_load import ShapesByLoad, cells_by_load
 from planarfriction.compiler.memory import places_of, rows_of, size_of
 from planarfriction.kernels import cells as contacts
-from planarfriction.kernels import disc_cells, disc_passes, fixed_stiffness
+from planarfriction.kernels import disc_cells
 from planarfriction.kernels import distributed_step as steps
 from planarfriction.kernels.contacts import ModelFunctions
+from planarfriction.kernels.disc_steps import functions_of_discs
 from planarfriction.kernels.discs import KAPPA
 from planarfriction.kernels.general_cells import LINEAR, MATRICES, A, C, E, F
 from planarfriction.kernels.leaning_cells import RATES_OF_LEANING, STEPS_OF_LEANING
 from planarfriction.kernels.steps import StepFunctions
 from planarfriction.patch.tilt import tilted
-
-_FIXED = {
-    (2, False): fixed_stiffness.POINTS,
-    (2, True): fixed_stiffness.TURNED_POINTS,
-    (3, False): fixed_stiffness.DISCS,
-    (3, True): fixed_stiffness.TURNED_DISCS,
-}
-"""Rates of a fixed stiffness, by the components of a bristle, and whether friction is anisotropic."""
 
 LOAD_STEP = 1e-5
 """Step of the central differences of weights by the load, as a share of it [-]; their relative error is 1e-10."""
@@ -47,7 +40,9 @@ class CompiledDistributed(CompiledModel):
         """Load [N] of `reference_load`, or 0."""
         self._contact, functions = self._functions()
         if self.reference > 0.0:
-            self._contact = _FIXED[self.size, patch.anisotropic]
+            from planarfriction.kernels import fixed_stiffness
+
+            self._contact = fixed_stiffness.RATES_OF[self.size, patch.anisotropic]
         cells = len(patch.positions)
         super().__init__(functions, (self.size, cells), (self.size, self.size, cells))
 
@@ -56,9 +51,7 @@ class CompiledDistributed(CompiledModel):
         if self.size == 3:
             if self.patch.asymmetric:
                 return disc_cells.RATES_OF_LEANING_DISCS, disc_cells.STEPS_OF_LEANING_DISCS
-            if turned:
-                return disc_passes.TURNED_SOLVED, disc_passes.TURNED_STEPS
-            return disc_passes.SOLVED, disc_passes.STEPS
+            return functions_of_discs(turned)[:2]
         if self.patch.asymmetric:
             return RATES_OF_LEANING, STEPS_OF_LEANING
         return (contacts.TURNED, steps.TURNED) if turned else (contacts.ISOTROPIC, steps.ISOTROPIC)
@@ -67,7 +60,7 @@ class CompiledDistributed(CompiledModel):
         """Return the record of a contact, and how many numbers of a linearisation each cell has."""
         rows = LINEAR * self.size**2 if self.size == 3 or self.patch.asymmetric else contacts.LINEAR_ROWS
         if self.reference > 0.0:
-            rows = MATRICES * self.size**2 + fixed_stiffness.ROWS_BEHIND
+            rows = MATRICES * self.size**2 + 1  # the factor on the stiffness behind
         return contacts.CellsContact(self.law.numbers, numbers.shape[1], numbers, weights), rows
 
     # ------------------------------------------------------------------ at given loads

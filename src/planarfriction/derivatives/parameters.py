@@ -13,7 +13,7 @@ from planarfriction.compiler import threads
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
-from planarfriction.kernels import cells_rollout, cells_sensitivities, disc_passes, published_step
+from planarfriction.kernels import cells_rollout, cells_sensitivities, disc_rollouts, published_step
 from planarfriction.kernels.cell_blocks import divided
 from planarfriction.kernels.law import LAW
 from planarfriction.kernels.published_rollouts import gradient, rollout, sensitivities, tangent
@@ -107,8 +107,8 @@ CELLS, TURNED_CELLS = (
 """`DistributedModel` of points, isotropic or with a friction metric."""
 
 DISCS, TURNED_DISCS = (
-    _cells(disc_passes.ROLLOUTS, disc_passes.SENSITIVITIES, 3),
-    _cells(disc_passes.TURNED_ROLLOUTS, disc_passes.TURNED_SENSITIVITIES, 3),
+    _cells(*disc_rollouts.DISCS, 3),
+    _cells(*disc_rollouts.TURNED_DISCS, 3),
 )
 """`DistributedModel` of discs."""
 

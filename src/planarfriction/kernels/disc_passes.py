@@ -1,28 +1,21 @@
-"""Steps of discs in blocks, their adjoint and their derivatives: vector loops written from the step of one disc.
+"""Steps, rates and their derivatives of discs in blocks as vector loops, written from the functions of one disc.
 
-See `passes` for how loops come out of a trace, `cells_rollout` for what runs them.
+See `passes` for how loops come out of a trace, `disc_steps` and `disc_rollouts` for what runs them.
 """
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import at
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, cells_rollout, cells_sensitivities, disc_cells, discs, distributed_step
-from planarfriction.kernels.cell_blocks import BAR, BLOCK, BY_LOAD, LANES, WEIGHT, Kind, Z, divided, room
-from planarfriction.kernels.cell_slopes import StepBars
+from planarfriction.kernels import discs
+from planarfriction.kernels.cell_blocks import BAR, BY_LOAD, LANES, WEIGHT, Z
 from planarfriction.kernels.cells import Lever
-from planarfriction.kernels.cells_rollout import BY, bound
-from planarfriction.kernels.contacts import ModelFunctions, functions_of
+from planarfriction.kernels.cells_rollout import BY
 from planarfriction.kernels.derive import derive
-from planarfriction.kernels.general_cells import RATES
 from planarfriction.kernels.passes import Passes, passes
-from planarfriction.kernels.steps import StepFunctions, step_functions
 from planarfriction.kernels.trace import Number, Trace, traced
 from planarfriction.kernels.twins import twin
-from planarfriction.kernels.vectors import plus, put, reader_of, three
 
 FORWARD, BACKWARD = {"count": 8, "short": 2}, {"count": 6, "short": 6}
 RATE, SLOPES = {"count": 5, "short": 0}, {"count": 4, "short": 2}
@@ -122,88 +115,3 @@ def slope_passes(lever: Lever, numbers: int) -> Passes:
 
     stores = [f"block[{SLOPES_AT + m * LANES} + i]" for m in range(18)]
     return passes("slopes of discs", traced(slopes), _sources(numbers), stores, **SLOPES)
-
-
-def kind_of(lever: Lever, numbers: int) -> Kind:
-    """Return the functions of discs with a lever of so many numbers."""
-    forth, back = forward_passes(lever, numbers), backward_passes(lever, numbers)
-    step, adjoint, forth_numbers, back_numbers = forth.run, back.run, LANES * forth.rows, LANES * back.rows
-
-    @kernel
-    def advance(lever, law, w, blocks, lanes, twist, dt):
-        work, total = room(forth_numbers), (0.0, 0.0, 0.0)
-        for k in range(blocks):
-            total = plus(total, 1.0, step(law, twist, (dt,), at(w, k * BLOCK), work, lanes))
-        return total
-
-    @kernel
-    def retreat(lever, law, block, lanes, held, pull, load):
-        given = held[1], load, 0.0 if load == 0.0 else 1.0, pull[0], pull[1], pull[2]
-        s = adjoint(law, held[0], given, block, room(back_numbers), lanes)
-        return StepBars((s[0], s[1], s[2]), s[3], (s[4], s[5], s[6], s[7], s[8], s[9], s[10], s[11]))
-
-    return Kind(lever, 3, advance, retreat, cells_rollout.pushed_of(discs.step), reader_of(3))
-
-
-DISCS, TURNED_DISCS = kind_of(disc_cells.POSITIONS, 3), kind_of(disc_cells.LEVERS, 6)
-
-
-def _run(written: Passes) -> Any:
-    """Return `(law, v, block, lanes)`, which runs passes in memory of their own."""
-    run, numbers = written.run, LANES * written.rows
-
-    @kernel
-    def passed(law, v, block, lanes):
-        return run(law, v, (0.0,), block, room(numbers), lanes)
-
-    return passed
-
-
-def evaluate(lever, rate, contact, z, v, zdot, w):
-    """Write `z'`, and `W`."""
-    own, twist, total, block = cells.read(contact), three(v), (0.0, 0.0, 0.0), room(SOLVER_BLOCK)
-    n, (_, lanes) = own.count, divided(own.count)
-    for first in range(0, n, lanes):
-        count = min(lanes, n - first)
-        distributed_step.fill(lever, 3, own, z, first, count, lanes, block)
-        total = plus(total, 1.0, rate(own.law, twist, block, lanes))
-        for m in range(3):
-            distributed_step.copy(count, at(block, RATES_AT + m * LANES), at(zdot, m * n + first))
-    put(w, total)
-
-
-def linearise(lever, slope, contact, z, v, lin):
-    """Write A and F of each cell (see `general_cells`)."""
-    own, twist, block = cells.read(contact), three(v), room(SOLVER_BLOCK)
-    n, (_, lanes) = own.count, divided(own.count)
-    for first in range(0, n, lanes):
-        count = min(lanes, n - first)
-        distributed_step.fill(lever, 3, own, z, first, count, lanes, block)
-        slope(own.law, twist, block, lanes)
-        for m in range(18):
-            distributed_step.copy(count, at(block, SLOPES_AT + m * LANES), at(lin, m * n + first))
-
-
-SOLVER_BLOCK = SLOPES_AT + LANES * 18
-"""Numbers of a block of the solver."""
-
-
-def _rates(lever: Lever, numbers: int, name: str) -> ModelFunctions:
-    """Return the functions of discs for the solver: rates and slopes in passes, the rest disc by disc."""
-    model = {"lever": lever, "bristle": disc_cells.BRISTLE, "read": cells.read}
-    vector = {"rate": _run(rate_passes(lever, numbers)), "slope": _run(slope_passes(lever, numbers))}
-    return functions_of(name, (evaluate, linearise, *RATES[2:]), **model, **vector)
-
-
-SOLVED, TURNED_SOLVED = _rates(disc_cells.POSITIONS, 3, "discs"), _rates(disc_cells.LEVERS, 6, "turned_discs")
-
-
-def _steps(kind: Kind, name: str) -> StepFunctions:
-    model = {"lever": kind.lever, "advance": kind.advance, "size": 3, "bristle": disc_cells.BRISTLE, "read": cells.read}
-    return step_functions(name, distributed_step.TEMPLATES, **model)
-
-
-STEPS, TURNED_STEPS = _steps(DISCS, "discs"), _steps(TURNED_DISCS, "turned_discs")
-ROLLOUTS, TURNED_ROLLOUTS = bound(DISCS, "discs"), bound(TURNED_DISCS, "turned_discs")
-SENSITIVITIES = cells_sensitivities.bound(DISCS, discs.step, "discs")
-TURNED_SENSITIVITIES = cells_sensitivities.bound(TURNED_DISCS, discs.step, "turned_discs")

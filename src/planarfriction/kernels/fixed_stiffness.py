@@ -53,7 +53,7 @@ def evaluate(lever, bristle, read, contact, z, v, zdot, w):
 
 
 def linearise(lever, bristle, read, contact, z, v, lin):
-    """Write A, F, C and E of each cell, and l behind all; `v` as in `evaluate`."""
+    """Write A, F, C and E of each cell, and l in a row [n] behind all; `v` as in `evaluate`."""
     own, twist, factor = read(contact), three(v), v[3]
     n = own.count
     for i in range(n):
@@ -85,11 +85,15 @@ _OWN = {each.__name__: each for each in (evaluate, linearise, change)}
 RATES = tuple(_OWN.get(each.__name__, each) for each in general_cells.RATES)
 """Loops over cells, those of `general_cells` but for three."""
 
-ROWS_BEHIND = 1
-"""Rows [n] of a linearisation behind its matrices; the first number of them is l."""
-
 _POINT, _DISC = bristle(evaluate_point, None, 2), bristle(evaluate_disc, None, 3)
-POINTS = functions_of("fixed_points", RATES, lever=cells.POSITIONS, bristle=_POINT, read=cells.read)
-TURNED_POINTS = functions_of("fixed_turned_points", RATES, lever=cells.LEVERS, bristle=_POINT, read=cells.read)
-DISCS = functions_of("fixed_discs", RATES, lever=disc_cells.POSITIONS, bristle=_DISC, read=cells.read)
-TURNED_DISCS = functions_of("fixed_turned_discs", RATES, lever=disc_cells.LEVERS, bristle=_DISC, read=cells.read)
+_KINDS = (
+    ("points", cells.POSITIONS, _POINT),
+    ("turned_points", cells.LEVERS, _POINT),
+    ("discs", disc_cells.POSITIONS, _DISC),
+    ("turned_discs", disc_cells.LEVERS, _DISC),
+)
+RATES_OF = {
+    (each.size, "turned" in name): functions_of(f"fixed_{name}", RATES, lever=lever, bristle=each, read=cells.read)
+    for name, lever, each in _KINDS
+}
+"""Functions of contacts by the components of a bristle and whether there is a metric."""
