@@ -42,7 +42,8 @@ def sliding(u):
 @kernel
 def mean_speed(u):
     """Return S."""
-    return sliding(u)[2]
+    _, _, speed, _ = sliding(u)
+    return speed
 
 
 @kernel
