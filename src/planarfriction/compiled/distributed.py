@@ -34,7 +34,7 @@ class CompiledDistributed(CompiledModel):
 
     def __init__(self, law: Any, patch: Any) -> None:
         self.law, self.patch = law, patch
-        self.size = 3 if patch.radii.any() else 2
+        self.size = patch.bristles
         """Number of bristles of a cell: two of a point, three of a disc."""
         self.reference = 0.0 if law.reference_load is None else law.reference_load
         """Load [N] of `reference_load`, or 0."""

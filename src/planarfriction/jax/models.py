@@ -123,7 +123,7 @@ class ReducedModelPublished(FrictionPytree):
 
 
 class ReducedModel(DistributedModel):
-    """The reduced model (`planarfriction.ReducedModel`) as a pytree: distributed friction on few cells.
+    """The reduced model (`planarfriction.ReducedModel`) as a pytree: distributed friction on few discs.
 
     All but `cells`, their number, is as in `DistributedModel`.
 

@@ -156,7 +156,7 @@ class ReducedModelPublished(FrictionModule):
 
 
 class ReducedModel(DistributedModel):
-    """Reduced LuGre friction, differentiable: distributed friction on the few cells that stand for the patch.
+    """Reduced LuGre friction, differentiable: distributed friction on the few discs that stand for the patch.
 
     The equations, the settings and the numbers of `planarfriction.ReducedModel`; all else as in `DistributedModel`.
 

@@ -1,1 +1,1 @@
-"""Beyond the paper: exact limit surfaces, another reduced model, few cells, loads, anisotropic friction."""
+"""Beyond the paper: exact limit surfaces, another reduced model, few discs, loads, anisotropic friction."""

@@ -1,4 +1,4 @@
-"""Beyond the paper: exact limit surfaces, another reduced model, few cells, loads, anisotropic friction."""
+"""Beyond the paper: exact limit surfaces, another reduced model, few discs, loads, anisotropic friction."""
 
 from __future__ import annotations
 
