@@ -130,9 +130,7 @@ def numbers_of_scene(model: Any) -> dict[str, list[float]]:
     scene = pf.Scene(pf.Body(0.2, 1e-5, gravity=(0.0, 0.0)), [contact], 0.15, force=push, save_every=0.15)
     end = pf.simulate(scene)
     numbers = {"end": [float(end.histories[name].values[-1]) for name in MOTION]}
-    if not isinstance(
-        model, pf.ReducedModelPublished
-    ):  # slopes of tables jump, so steps do
+    if not isinstance(model, pf.ReducedModelPublished):  # slopes of tables jump, so steps do
         with contextlib.suppress(pf.FrictionError):
             by_start = derivatives.scene_sensitivities(scene, (), initial=("vx", "omega"))
             numbers["end by start"] = sums(by_start.d_motion[-1])
