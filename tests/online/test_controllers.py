@@ -9,9 +9,9 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import friction_filter
 from planarfriction.online import FrictionObserver, Gripper, Hinge, Hold, Measurement, Parts, SlideBy, TurnBy
 from planarfriction.online.controllers import trapezoid
+from planarfriction.online.loops import friction_filter
 from planarfriction.online.trials import known_model, random_parts, trial
 
 COUNT = 4
