@@ -315,7 +315,7 @@ def _estimate(settings, s, e):
 
 @jit
 def update(settings, states, samples, found):
-    """Update states `[P, STATE]` with a sample each; `found [P]` of dtype `ESTIMATE` gets what is knknown.
+    """Update states `[P, STATE]` with a sample each; `found [P]` of dtype `ESTIMATE` gets what is known.
 
     Samples `[P, 8]` are time, wrench, load and slip velocity; NaN is none. `flags` is the sum of what was odd: 1 no or
     bad wrench or load, 2 time that does not go on, 4 saturated sensor.
