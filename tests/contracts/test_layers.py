@@ -18,6 +18,7 @@ import pytest
 
 from planarfriction.compiler import FOLDERS
 from planarfriction.pictures import PICTURES
+from tests.support.repository import script
 
 ROOT = Path(__file__).parents[2]
 LIBRARY, STUDIES, EXPLORER = "planarfriction", "planarfriction_studies", "planarfriction_explorer"
@@ -139,6 +140,11 @@ def test_every_module_has_a_floor():
     for module, _ in _sources():
         if "." in module and not module.startswith(EXPLORER):
             assert _floor(module) in floors, f"{module}: add it to the layers in pyproject.toml"
+
+
+def test_maintainers_read_about_every_layer():
+    house = script("docs/make_house.py")
+    assert not {name for names in house.floors() for name in names} - set(house.words())
 
 
 def test_imports_only_go_down():

@@ -12,7 +12,7 @@ GROUP = "planarfriction.commands"
 STUDIES = "planarfriction-studies"
 """Distribution of experiments, measured data, the referee of simulators, benchmarks, and the rig of grippers."""
 
-ELSEWHERE = f"Experiments, measured data and benchmarks come with {STUDIES}: pip install {STUDIES}."
+ELSEWHERE = f"Experiments, measured data and benchmarks are in {STUDIES} (pip install ./studies)."
 """Line below the commands where that distribution is missing."""
 
 
