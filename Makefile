@@ -1,11 +1,11 @@
-# make demo: the main job, with everything it needs.   make test: the tests.   The rest is for development.
+# make demo: the main job, with the library alone.   make test: the tests, with the studies too.   The rest: development.
 # make test-generic: the tests of numbers once more, compiled for any x86-64 or ARM processor instead of this one.
 # make test-bounds: tests of compiled loops once more, with every index checked; BOUNDED=tests/limit_surface: other ones.
 # make test-memory: tests of compiled code once more, with the checks of glibc's malloc.
 # make test-lowest: the tests with the lowest versions of everything.
 # make fuzz MINUTES=60: attacks with random examples, an hour long; ATTACKS=coupling: those alone whose name begins so.
-# make dist: wheel and source distribution in dist, checked; TAG=v1.2.3: that of a release, which has to be the version.
-# make dist-install: that wheel in empty environments; PYTHONS="3.11 3.14": Pythons, or their paths.
+# make dist: wheels and source distributions in dist, checked; TAG=v1.2.3: that of a release, which has to be the version.
+# make dist-install: those wheels in empty environments; PYTHONS="3.11 3.14": Pythons, or their paths.
 # make bench-compare BASE=main: benchmarks of another commit, then of this folder, as a table.   make doctor: is it sound?
 # make docs: the site, in build/docs; scripts of its gallery run once, and again when they have changed.
 
@@ -15,8 +15,8 @@ BIN := $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 LOWEST := .venv-lowest
 TOOLS := .venv-tools
 
-# The package is installed in place, so that sources count at once and compiled kernels, which are kept beside them,
-# survive from run to run. What is installed changes with pyproject.toml only.
+# Both packages are installed in place, so that sources count at once and compiled kernels, which are kept beside them,
+# survive from run to run. What is installed changes with their pyproject.toml only.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 .PHONY: demo test test-generic test-bounds test-memory test-lowest fuzz docs lint lint-workflows lint-recipe bench bench-compare doctor dist dist-install clean
@@ -56,7 +56,7 @@ test-bounds: $(VENV)/.test
 MEMORY := fuzz derivatives models solvers kernels scenes planning online limit_surface identify tensors test_coupling.py
 
 test-memory: $(VENV)/.test
-	LD_PRELOAD=libc_malloc_debug.so.0 MALLOC_CHECK_=3 MALLOC_PERTURB_=165 $(PYTEST) $(MEMORY:%=tests/%) $(ARGS)
+	LD_PRELOAD=libc_malloc_debug.so.0 MALLOC_CHECK_=3 MALLOC_PERTURB_=165 $(PYTEST) $(MEMORY:%=tests/%) studies/tests/test_gripper.py $(ARGS)
 
 # The lowest versions that pyproject.toml promises, without the optional front ends.
 test-lowest: $(LOWEST)/.test
@@ -86,17 +86,17 @@ RECIPE := from rattler_build import RenderConfig, Stage0Recipe, VariantConfig; \
 lint-recipe: $(TOOLS)/.ready
 	$(TOOLS)/bin/python -c '$(RECIPE)'
 
-bench: $(VENV)/.package
+bench: $(VENV)/.studies
 	$(BIN)/planarfriction bench $(ARGS)
 
 BASE ?= main
 COMPARED ?= in_hand.distributed in_hand.reduced step.reduced.loop step.distributed.loop gradient.reduced sweep import
 
-bench-compare: $(VENV)/.package
+bench-compare: $(VENV)/.studies
 	rm -rf build/base
 	mkdir -p build/base
 	git archive $(BASE) | tar -x -C build/base
-	PYTHONPATH=build/base/src $(BIN)/planarfriction bench --rounds 3 --json $(COMPARED:%=--only %) > build/base.json
+	PYTHONPATH=build/base/src:build/base/studies/src $(BIN)/planarfriction bench --rounds 3 --json $(COMPARED:%=--only %) > build/base.json
 	$(BIN)/planarfriction bench --compare build/base.json $(ARGS)
 
 doctor: $(VENV)/.package
@@ -107,8 +107,10 @@ dist: $(TOOLS)/.ready
 	rm -rf build/source build/direct dist
 	mkdir -p build/source
 	git archive HEAD | tar -x -C build/source
-	$(TOOLS)/bin/python -m build --outdir dist build/source
-	$(TOOLS)/bin/python -m build --wheel --outdir build/direct build/source
+	for folder in build/source build/source/studies; do \
+	  $(TOOLS)/bin/python -m build --outdir dist $$folder && \
+	  $(TOOLS)/bin/python -m build --wheel --outdir build/direct $$folder || exit 1; \
+	done
 	$(TOOLS)/bin/twine check --strict dist/*
 	$(TOOLS)/bin/python .ci/check_dist.py dist build/direct $(TAG)
 
@@ -118,8 +120,8 @@ dist-install: dist
 	.ci/install_dist $(TOOLS)/bin/uv $(PYTHONS)
 
 clean:
-	rm -rf $(VENV) $(LOWEST) $(TOOLS) out build dist docs/api docs/gallery docs/notebooks .pytest_cache .ruff_cache .hypothesis .import_linter_cache src/*.egg-info
-	find src tests examples -name __pycache__ -type d -prune -exec rm -rf {} +
+	rm -rf $(VENV) $(LOWEST) $(TOOLS) out build dist docs/api docs/gallery docs/notebooks .pytest_cache .ruff_cache .hypothesis .import_linter_cache src/*.egg-info studies/src/*.egg-info studies/build
+	find src tests studies examples -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
 	$(PYTHON) -c "import sys; sys.exit('planarfriction needs Python 3.11 or later, ' + sys.executable + ' is ' + sys.version.split()[0]) if sys.version_info < (3, 11) else None"
@@ -129,16 +131,20 @@ $(VENV)/.package: pyproject.toml | $(BIN)/python
 	$(PIP) --editable .
 	touch $@
 
+$(VENV)/.studies: studies/pyproject.toml $(VENV)/.package
+	$(PIP) --editable ./studies
+	touch $@
+
 # Tests of the optional front ends skip with their reason where a package is missing; here they run. This version of
 # PyTorch comes as a build for the CPU alone; others bring gigabytes for GPUs.
-$(VENV)/.test: $(VENV)/.package
+$(VENV)/.test: $(VENV)/.studies
 	$(PIP) --editable '.[test,torch,jax,quartic,mujoco,mjx,mujoco-warp,drake,warp,casadi,sweep,explore,browser,examples]' torch==2.13.0
 	touch $@
 
-$(LOWEST)/.test: pyproject.toml
+$(LOWEST)/.test: pyproject.toml studies/pyproject.toml
 	$(PYTHON) -m venv --clear $(LOWEST)
 	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check uv
-	$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST) --resolution lowest-direct --editable '.[test]'
+	$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST) --resolution lowest-direct --editable '.[test]' --editable ./studies
 	touch $@
 
 $(TOOLS)/.ready:

@@ -37,7 +37,6 @@ extensions = [
     "sphinx_gallery.gen_gallery",
     "api_pages",
     "code_links",
-    "glossary_links",
     "mathml",
     "repository_links",
 ]

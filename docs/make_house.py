@@ -1,6 +1,6 @@
 """Draw the floors of the code from the import contracts in pyproject.toml: `python docs/make_house.py [FILE]`.
 
-The words beside each floor are those of the table in CONTRIBUTING.md.
+The words beside each floor are those of the table in docs/maintaining.md.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 
 ROOT = Path(__file__).resolve().parents[1]
 COLOURS = {"front": "#dbe9f6", "scene": "#e3f1df", "model": "#fdf0d5", "code": "#f6dede", "base": "#ececec"}
-GROUPS = {"cli": "front", "scenes": "scene", "models": "model", "kernels": "code", "geometry": "base"}
+GROUPS = {"__main__": "front", "scenes": "scene", "models": "model", "kernels": "code", "geometry": "base"}
 """First floor, from the top, of each group of floors."""
 
 
@@ -28,8 +28,9 @@ def floors() -> list[list[str]]:
 
 
 def words() -> dict[str, str]:
-    """Return the description of each module from the table in CONTRIBUTING.md."""
-    rows = re.findall(r"^\| (`[^|]+) \| ([^|]+) \|$", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), re.M)
+    """Return the description of each module from the table in docs/maintaining.md."""
+    page = (ROOT / "docs" / "maintaining.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (`[^|]+) \| ([^|]+) \|$", page, re.M)
     return {name: text.replace("`", "") for names, text in rows for name in re.findall(r"`(\w+)`", names)}
 
 
@@ -39,7 +40,7 @@ def draw() -> plt.Figure:
     figure, axes = plt.subplots(figsize=(10.0, 0.36 * (len(found) + 3)), layout="constrained")
     axes.set(xlim=(0.0, 10.0), ylim=(-len(found) - 0.1, 2.2))
     axes.axis("off")
-    uppers = [("planarfriction_studies", "what proves it: experiments, measured data, benchmarks"),
+    uppers = [("planarfriction_studies", "a distribution of its own: experiments, measured data, benchmarks"),
               ("planarfriction_explorer", "the interactive page in the browser")]  # fmt: skip
     for i, (package, text) in enumerate(uppers):
         box(axes, 5.0 * i, 1.0, 4.9, "#ffffff", package, text, stacked=True)

@@ -19,7 +19,7 @@ import numpy as np
 import planarfriction as pf
 from planarfriction.adapters.mujoco import Friction, PatchContact, prepare
 from planarfriction.online import FrictionObserver, Hold, Measurement, Sensors
-from planarfriction.online.baselines import hold_rule
+from planarfriction_studies.rig.baselines import hold_rule
 
 DT, DELAY, END = 1e-3, 20, 5.0  # time step [s], delay of the sensors [steps], duration [s]
 MU, MASS, ARM, RADIUS = 0.8, 0.2, 0.008, 0.012  # [-], [kg], from the pads to the centre of mass, of the pads [m]

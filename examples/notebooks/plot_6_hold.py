@@ -9,9 +9,10 @@ while it holds, compares its grip with a rule that was told the friction, and th
 import numpy as np
 
 import planarfriction as pf
-from planarfriction.online import FrictionObserver, Gripper, Hold, Parts, TurnBy
-from planarfriction.online.baselines import ellipsoid_load
+from planarfriction.online import FrictionObserver, Hold, TurnBy
 from planarfriction.plots.style import new_figure
+from planarfriction_studies.rig import Gripper, Parts
+from planarfriction_studies.rig.baselines import ellipsoid_load
 
 # %%
 # Parts and what is known of them

@@ -6,8 +6,10 @@ import contextlib
 import csv
 import dataclasses
 import json
+import re
 import sys
 import tomllib
+from importlib.metadata import EntryPoint, PackageNotFoundError, entry_points
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -20,7 +22,6 @@ import planarfriction as pf
 from planarfriction import __version__, scenes
 from planarfriction.cli import commands, main, output
 from planarfriction.cli.app import app
-from planarfriction.cli.commands import OWN
 from planarfriction.cli.options import find_patch
 from planarfriction.cli.run import build_scenes, largest_differences
 from planarfriction.errors import SimulationInterrupted, SolverError
@@ -28,6 +29,9 @@ from planarfriction.kernels import rosenbrock
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.plots import animation
 from tests.support import synthetic
+
+LIBRARY = ["doctor", "explore", "export", "identify", "limit-surface", "run", "sweep", "warm"]
+"""Commands of a library alone."""
 
 
 def test_ctrl_c_before_the_first_sample_is_no_traceback(monkeypatch, capsys):
@@ -479,39 +483,38 @@ def test_an_own_shape_without_parameters_keeps_the_names_of_patches(monkeypatch)
 
 @pytest.fixture
 def only_the_library(monkeypatch):
-    """Take the commands of other packages away, as before the first look for them."""
-    monkeypatch.setattr(app, "commands", {name: app.commands[name] for name in app.commands if name not in OWN})
+    """Take the commands of other packages away, as in an installation of the library alone."""
+    entries = [each for each in entry_points(group=commands.GROUP) if each.name == "explore"]
+    monkeypatch.setattr(commands, "entry_points", lambda *, group: entries)
+    monkeypatch.setattr(app, "commands", {name: app.commands[name] for name in LIBRARY if name in app.commands})
 
 
-@pytest.mark.parametrize("installed", [True, False])
-def test_every_command_of_the_distribution_is_there(only_the_library, monkeypatch, installed):
-    if not installed:  # or installed before there were entry points
-        monkeypatch.setattr(commands, "entry_points", lambda *, group: [])
-    assert set(OWN) <= set(app.list_commands(click.Context(app)))
+def test_a_bare_library_says_what_it_has_and_where_the_rest_is(only_the_library, monkeypatch, capsys):
+    def missing(name):
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr(commands, "distribution", missing)
+    assert app.list_commands(click.Context(app)) == LIBRARY
+    assert main(["--help"]) == 0
+    out = capsys.readouterr().out
+    assert " ".join(out.split()).endswith(commands.ELSEWHERE) and "bench" not in re.findall(
+        r"^  (\S+)", out, re.MULTILINE
+    )
+    assert main(["bench"]) == 2
+    assert "No such command 'bench'" in capsys.readouterr().err
 
 
-def test_entry_points_are_those_of_the_project():
-    project = Path(__file__).parents[2] / "pyproject.toml"
+@pytest.mark.parametrize("folder", [".", "studies"])
+def test_entry_points_of_each_distribution_are_its_commands(folder):
+    project = Path(__file__).parents[2] / folder / "pyproject.toml"
     if not project.exists():
         pytest.skip("no project beside these tests")
-    settings = tomllib.loads(project.read_text(encoding="utf-8"))["project"]
-    assert settings["entry-points"][commands.GROUP] == OWN
-
-
-def test_a_command_whose_package_is_missing_says_what_to_install(only_the_library, monkeypatch, capsys):
-    for package in ("planarfriction_studies", "planarfriction_explorer"):
-        for loaded in [each for each in sys.modules if each.partition(".")[0] == package]:
-            monkeypatch.delitem(sys.modules, loaded)
-        monkeypatch.setitem(sys.modules, package, None)
-    for name, where in OWN.items():
-        package = where.partition(".")[0]
-        assert main([name, "--quick"]) == 2
-        assert capsys.readouterr().err == (
-            f"error: planarfriction {name} needs the package {package}, which comes with planarfriction:"
-            " run pip install --force-reinstall --no-deps planarfriction\n"
-        )
-    assert main(["--help"]) == 0
-    assert "bench" not in capsys.readouterr().out
+    entries = tomllib.loads(project.read_text(encoding="utf-8"))["project"]["entry-points"][commands.GROUP]
+    for name, value in entries.items():
+        command = EntryPoint(name, value, commands.GROUP).load()
+        assert isinstance(command, click.Command) and (command.name == name) and command.get_short_help_str()
+    listed = app.list_commands(click.Context(app))
+    assert set(entries) <= set(listed) and commands.ELSEWHERE not in app.get_help(click.Context(app))
 
 
 def test_commands_of_ones_own_package_are_added_but_replace_none(monkeypatch, capsys):

@@ -15,6 +15,7 @@ import planarfriction
 from tests.support.repository import ROOT, script
 
 check = script(".ci/check_dist.py")
+KIND = check.DISTRIBUTIONS["planarfriction"]
 CODE = {"planarfriction/__init__.py", "planarfriction/py.typed"}
 
 
@@ -22,7 +23,7 @@ def wheel(folder: Path, names: set[str], content: bytes = b"") -> Path:
     """Write a wheel with these files and all licences."""
     folder.mkdir()
     path = folder / "planarfriction-1.2.3-py3-none-any.whl"
-    licences = {f"planarfriction-1.2.3.dist-info/licenses/{name}" for name in check.LICENCES}
+    licences = {f"planarfriction-1.2.3.dist-info/licenses/{name}" for name in KIND.licences}
     with zipfile.ZipFile(path, "w") as archive:
         for name in sorted(names | licences):
             archive.writestr(name, content)
@@ -40,8 +41,8 @@ def source(folder: Path, names: set[str]) -> Path:
 
 def faults(folder: Path, *, code: set[str] = CODE, beside: set[str] = frozenset(), **options) -> list[str]:
     """Lines about a release that has these files."""
-    sent = source(folder, {f"src/{name}" for name in code} | check.BESIDE | beside)
-    return check.faults(sent, wheel(folder / "a", code), wheel(folder / "b", code), CODE, **options)
+    sent = source(folder, {f"src/{name}" for name in code} | KIND.beside | beside)
+    return check.faults(KIND, sent, wheel(folder / "a", code), wheel(folder / "b", code), CODE, **options)
 
 
 def test_a_release_has_the_tracked_files_and_its_tag(tmp_path):
@@ -61,17 +62,21 @@ def test_what_does_not_belong_is_named(tmp_path, options, words):
     assert words in faults(tmp_path, **options)
 
 
-def test_wheels_that_differ_or_grow_are_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(check, "MAX_WHEEL", 100.0)
-    sent = source(tmp_path, {f"src/{name}" for name in CODE} | check.BESIDE)
-    found = check.faults(sent, wheel(tmp_path / "a", CODE), wheel(tmp_path / "b", CODE, b"more"), CODE)
+def test_wheels_that_differ_or_grow_are_named(tmp_path):
+    sent = source(tmp_path, {f"src/{name}" for name in CODE} | KIND.beside)
+    small = KIND._replace(most=100.0)
+    found = check.faults(small, sent, wheel(tmp_path / "a", CODE), wheel(tmp_path / "b", CODE, b"more"), CODE)
     assert any(line.startswith("not the same in a wheel") and "py.typed" in line for line in found)
     assert any(line.startswith("the wheel has ") for line in found)
 
 
 def test_the_version_is_the_same_everywhere():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert project["version"] == planarfriction.__version__
+    library, studies = (
+        tomllib.loads((ROOT / folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+        for folder in (".", "studies")
+    )
+    assert library["version"] == studies["version"] == planarfriction.__version__
+    assert studies["dependencies"] == [f"planarfriction=={planarfriction.__version__}"]
     assert f"\nversion: {planarfriction.__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     newest = re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert newest and newest[1] == planarfriction.__version__
@@ -91,5 +96,8 @@ def test_the_conda_recipe_needs_what_the_project_needs():
 
 
 def test_this_repository_has_what_a_release_needs():
-    assert {"planarfriction/__init__.py", "planarfriction/py.typed"} <= check.tracked()
-    assert all((ROOT / name).is_file() for name in check.BESIDE)
+    for kind in check.DISTRIBUTIONS.values():
+        assert any(name.endswith("/__init__.py") for name in check.tracked(ROOT / kind.folder))
+        assert all((ROOT / kind.folder / name).is_file() for name in kind.beside)
+    assert check.tracked(ROOT) >= CODE
+    assert (ROOT / "LICENSE").read_bytes() == (ROOT / "studies" / "LICENSE").read_bytes()

@@ -186,7 +186,7 @@ def docstrings(code: str) -> Iterator[tuple[int, str]]:
                     yield each.lineno, str(each.value.value).lstrip()
 
 
-@pytest.mark.parametrize("folder", ["src", "tests"])
+@pytest.mark.parametrize("folder", ["src", "tests", "studies"])
 def test_docstrings_stand_alone(folder):
     found = [
         f"{file.relative_to(ROOT)}:{line}: {text.splitlines()[0]}"

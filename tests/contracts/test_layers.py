@@ -18,10 +18,11 @@ import pytest
 
 from planarfriction.compiler import FOLDERS
 from planarfriction.pictures import PICTURES
+from tests.support.repository import script
 
 ROOT = Path(__file__).parents[2]
-SOURCES = ROOT / "src"
 LIBRARY, STUDIES, EXPLORER = "planarfriction", "planarfriction_studies", "planarfriction_explorer"
+SOURCES = {LIBRARY: ROOT / "src", STUDIES: ROOT / "studies" / "src", EXPLORER: ROOT / "src"}
 HEAVY = (
     "PIL",
     "click",
@@ -45,7 +46,7 @@ HEAVY = (
 HOMES = {
     "numba": ("compiled",),
     "llvmlite": ("compiled",),
-    "matplotlib": ("plots",),
+    "matplotlib": ("plots", "planarfriction_studies.rig"),
     "rich": ("cli",),
     "click": ("cli", "planarfriction_studies.commands", "planarfriction_explorer.command"),
     "torch": ("torch",),
@@ -75,8 +76,8 @@ def _floors() -> dict[str, int]:
     return found
 
 
-def _module_name(file: Path) -> str:
-    parts = file.relative_to(SOURCES).with_suffix("").parts
+def _module_name(file: Path, folder: Path) -> str:
+    parts = file.relative_to(folder).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
@@ -106,8 +107,8 @@ def _is_compiled(module: str) -> bool:
 
 @functools.cache
 def _sources() -> list[tuple[str, ast.AST]]:
-    files = [file for package in (LIBRARY, STUDIES, EXPLORER) for file in sorted((SOURCES / package).rglob("*.py"))]
-    return [(_module_name(file), ast.parse(file.read_text(encoding="utf-8"))) for file in files]
+    files = [(file, home) for package, home in SOURCES.items() for file in sorted((home / package).rglob("*.py"))]
+    return [(_module_name(file, home), ast.parse(file.read_text(encoding="utf-8"))) for file, home in files]
 
 
 def _floor(module: str) -> str:
@@ -162,6 +163,11 @@ def test_every_module_has_a_floor():
     for module, _ in _sources():
         if "." in module and not module.startswith(EXPLORER):
             assert _floor(module) in floors, f"{module}: add it to the layers in pyproject.toml"
+
+
+def test_maintainers_read_about_every_layer():
+    house = script("docs/make_house.py")
+    assert not {name for names in house.floors() for name in names} - set(house.words())
 
 
 def test_imports_only_go_down():

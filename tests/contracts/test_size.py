@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+SOURCES = ("src", "studies/src")
 
 MAX_FILE = 400
 """Lines of a source file; a longer one is two things."""
@@ -37,12 +38,13 @@ def lines(function: ast.FunctionDef) -> int:
 
 
 def test_files_stay_short():
-    number = {file: len(file.read_text(encoding="utf-8").splitlines()) for file in (ROOT / "src").rglob("*.py")}
+    files = [file for folder in SOURCES for file in (ROOT / folder).rglob("*.py")]
+    number = {file: len(file.read_text(encoding="utf-8").splitlines()) for file in files}
     assert {str(file): count for file, count in number.items() if count > MAX_FILE} == {}
 
 
 def test_functions_stay_short():
-    number = {name: lines(function) for name, function in functions("src")}
+    number = {name: lines(function) for folder in SOURCES for name, function in functions(folder)}
     assert {name for name, count in number.items() if count > MAX_FUNCTION} <= TOO_LONG
 
 
@@ -53,6 +55,11 @@ def test_lines_of_a_function_are_counted_without_its_docstring():
 
 
 def test_names_of_tests_stay_short():
-    titles = [name for _, function in functions("tests") if (name := function.name).startswith("test_")]
+    titles = [
+        name
+        for folder in ("tests", "studies/tests")
+        for _, function in functions(folder)
+        if (name := function.name).startswith("test_")
+    ]
     assert len(titles) > 1000
     assert [title for title in titles if len(title) > MAX_TITLE] == []

@@ -135,7 +135,8 @@ def test_pyright_accepts_the_python_of_every_page(tmp_path):
     settings = {"typeCheckingMode": "strict", **dict.fromkeys(LAX, False)}
     (tmp_path / "pyrightconfig.json").write_text(json.dumps(settings))
     command = [sys.executable, "-m", "pyright", "--outputjson", "--pythonpath", sys.executable]
-    where = {**os.environ, "PYTHONPATH": str(ROOT / "src"), "PYRIGHT_PYTHON_IGNORE_WARNINGS": "1"}
+    path = os.pathsep.join((str(ROOT / "src"), str(ROOT / "studies" / "src")))
+    where = {**os.environ, "PYTHONPATH": path, "PYRIGHT_PYTHON_IGNORE_WARNINGS": "1"}
     run = subprocess.run(command, cwd=tmp_path, env=where, capture_output=True, text=True, check=False)
     found = json.loads(run.stdout)
     assert found["summary"]["filesAnalyzed"] == len(codes) + 1

@@ -98,7 +98,7 @@ def test_rollouts_share_their_arguments_and_first_results():
 def pages_and_sources() -> Iterator[Path]:
     """Everything that is read; compiled sources are left out, as a changed comment compiles all of them again."""
     yield from (ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "pyproject.toml"))
-    for folder in ("docs", "examples", "src", "tests"):
+    for folder in ("docs", "examples", "src", "tests", "studies"):
         for pattern in READ:
             yield from (ROOT / folder).rglob(pattern)
 

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
 
 import pytest
 
+from planarfriction.cli.commands import ELSEWHERE
 from tests.support.repository import ROOT, script
+
+DISTRIBUTIONS = script(".ci/check_dist.py").DISTRIBUTIONS
 
 LOG = """
 import numpy as np
@@ -30,9 +34,11 @@ np.savetxt("log.csv", rows, delimiter=",", header="t,vx,vy,omega,fx,fy,tau,norma
 @pytest.mark.slow
 def test_wheel_in_an_empty_environment(tmp_path):
     source, elsewhere = tmp_path / "source", tmp_path / "elsewhere"
-    shutil.copytree(ROOT / "src", source / "src", ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
-        shutil.copy(ROOT / name, source)
+    for folder in (".", "studies"):
+        ignored = shutil.ignore_patterns("__pycache__", "*.egg-info")
+        shutil.copytree(ROOT / folder / "src", source / folder / "src", ignore=ignored)
+        for name in ("pyproject.toml", "README.md", "LICENSE"):
+            shutil.copy(ROOT / folder / name, source / folder)
     elsewhere.mkdir()
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "NUMBA"))}
 
@@ -43,15 +49,25 @@ def test_wheel_in_an_empty_environment(tmp_path):
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout + done.stderr
 
-    run(sys.executable, "-m", "pip", "wheel", "--no-deps", "--wheel-dir", tmp_path, source)
+    run(sys.executable, "-m", "pip", "wheel", "--no-deps", "--wheel-dir", tmp_path, source, source / "studies")
     run(sys.executable, "-m", "venv", tmp_path / "empty")
     python = tmp_path / "empty" / "bin" / "python"
-    run(python, "-m", "pip", "install", *tmp_path.glob("*.whl"))
-    (wheel,) = tmp_path.glob("*.whl")
-    assert wheel.stat().st_size < script(".ci/check_dist.py").MAX_WHEEL
-    run(python, "-c", LOG)
+    wheels = {name: next(tmp_path.glob(f"{name}-*.whl")) for name in DISTRIBUTIONS}
+    for name, kind in DISTRIBUTIONS.items():
+        assert wheels[name].stat().st_size < kind.most
+    run(python, "-m", "pip", "install", wheels["planarfriction"])
     command = python.with_name("planarfriction")
+    listed = run(command, "--help")
+    assert " ".join(listed.split()).endswith(ELSEWHERE)
+    assert run(python, "-m", "planarfriction", "--help") == listed
+    for name in re.findall(r"^  (\w[\w-]*)", listed.partition("Commands:")[2], re.MULTILINE):
+        run(command, name, "--help")
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"^```python\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)
+    assert "success" in run(python, "-c", code)
+    run(python, "-c", LOG)
     assert "times faster than real time" in run(command, "run", "in-hand")
+    run(python, "-m", "pip", "install", "--no-deps", wheels["planarfriction_studies"])
     assert "0 out of tolerance" in run(command, "reproduce", "--only", "drift", "--quick")
     assert "exact surface" in run(command, "measured", "--list") and "in_hand" in run(command, "bench", "--help")
     asked = subprocess.run([command, "explore"], env=environment, capture_output=True, text=True, check=False)

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.online import FrictionObserver, Hold, SlideBy
-from planarfriction.online.gripper import Measurement
+from planarfriction.online import FrictionObserver, Hold, Measurement, SlideBy
 from tests.support.c_libraries import DISC, LAW, STRICT
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")

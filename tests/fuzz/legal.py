@@ -31,7 +31,6 @@ SKIPPED = {
     "solvers.integrate": "is called by `simulate` alone, which checks",
     "FrictionError": "an error",
     "identify.identify_motion": "fits for seconds; its logs are attacked as files",
-    "online.Gripper.step": "says by NaN which sensors have no sample; tests/online/test_gripper.py attacks it",
     "planning.plan_grip": "plans for a second; tests/planning/test_grip.py attacks it",
     "planning.plan_push": "plans for seconds; tests/planning/test_pushing.py attacks it",
     "identify.identify_lugre": "fits for seconds; its logs are attacked as files",
@@ -95,7 +94,6 @@ def objects() -> dict[str, Any]:
     surface = pf.LimitSurfaceCells(PATCH)
     signal = pf.Signal.sampled([0.0, 0.1], [1.0, 2.0])
     watcher = pf.online.FrictionObserver(pf.ReducedModel(PATCH, LAW, cells=9), surface=pf.LimitSurfaceEllipsoid(PATCH))
-    held = pf.online.Parts([0.2], [3e-4], [(0.01, 0.0)], [0.5])
     return {
         # parts
         "patch": PATCH, "law": LAW, "model": model, "scene": scene, "solution": solution, "solutions": solution,
@@ -147,7 +145,7 @@ def objects() -> dict[str, Any]:
         "FrictionObserver": watcher,
         **{name: getattr(pf.online, name)(watcher) for name in ("Hold", "Hinge")},
         **{name: getattr(pf.online, name)(watcher, 0.02) for name in ("SlideBy", "TurnBy")},
-        "Parts": held, "Sensors": pf.online.Sensors(), "Gripper": pf.online.Gripper(held, 5.0, cells=3),
+        "Sensors": pf.online.Sensors(),
         "Slider": pf.planning.Slider(pf.LimitSurfaceEllipsoid(PATCH), SQUARE),
         **{name: getattr(pf, name)(PATCH) for name in pf.__all__ if name.startswith("LimitSurface")},
     }  # fmt: skip
@@ -165,21 +163,6 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "start": (0.0, 0.0, 0.0),
         "samples": 5,
     },
-    "online.Parts": {
-        "mass": [0.2, 0.3],
-        "inertia": [3e-4, 4e-4],
-        "centre": [(0.01, 0.0)] * 2,
-        "mu_c": [0.4, 0.6],
-        "radius": 6e-3,
-        "exponent": 4.0,
-        "delay": 0.01,
-        "bias": (0.0, 0.0, 0.0),
-        "tap": (0.0, 0.0, 0.0),
-        "tap_time": 0.1,
-        "tilt": 0.1,
-        "tilt_time": 0.1,
-    },
-    "online.Gripper": {"parts": Fresh(lambda: objects()["Parts"]), "grip": 5.0, "sensors": pf.online.Sensors()},
     "online.FrictionObserver": {
         "model": pf.ReducedModel(PATCH, LAW, cells=9),
         "batch": (),

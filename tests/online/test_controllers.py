@@ -9,10 +9,11 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
-from planarfriction.online import FrictionObserver, Gripper, Hinge, Hold, Measurement, Parts, SlideBy, TurnBy
+from planarfriction.online import FrictionObserver, Hinge, Hold, Measurement, SlideBy, TurnBy
 from planarfriction.online.controllers import trapezoid
 from planarfriction.online.loops import friction_filter
-from planarfriction.online.trials import known_model, random_parts, trial
+from planarfriction_studies.rig import Gripper, Parts
+from planarfriction_studies.rig.trials import known_model, random_parts, trial
 
 COUNT = 4
 

@@ -9,8 +9,9 @@ opens until they slip, then follows the speed that it wants, with force, torque 
 import numpy as np
 
 import planarfriction as pf
-from planarfriction.online import FrictionObserver, Gripper, Parts, SlideBy
+from planarfriction.online import FrictionObserver, SlideBy
 from planarfriction.plots.style import new_figure
+from planarfriction_studies.rig import Gripper, Parts
 
 GOAL, DT, STEPS = -0.02, 1e-3, 4000
 mu_c = np.array([0.4, 0.6, 0.9])

@@ -13,7 +13,6 @@ from planarfriction import __version__
 from planarfriction.cli.commands import Commands
 from planarfriction.cli.doctor import doctor
 from planarfriction.cli.identify_plan import FitOrPlan, complete_log
-from planarfriction.cli.online import online
 from planarfriction.cli.options import FILE, cells_option, complete_scene, patch_option, width_option
 from planarfriction.cli.sweep import sweep
 from planarfriction.families import MODELS, SCENES, SURFACES, Family
@@ -222,5 +221,4 @@ def warm() -> None:
 
 
 app.add_command(doctor)
-app.add_command(online)
 app.add_command(sweep)

@@ -1,21 +1,10 @@
-"""Friction while a gripper holds: an observer, controllers, a rig to try them on, and published rules beside them."""
+"""Friction while a gripper holds: an observer of its sensors, and controllers of its force."""
 
 from planarfriction.online.controllers import Hinge, Hold, SlideBy, TurnBy
-from planarfriction.online.gripper import Gripper, Measurement, Parts, Sensors
 from planarfriction.online.observer import Estimate, FrictionObserver
+from planarfriction.online.sensors import Measurement, Sensors
 
-__all__ = [
-    "Estimate",
-    "FrictionObserver",
-    "Gripper",
-    "Hinge",
-    "Hold",
-    "Measurement",
-    "Parts",
-    "Sensors",
-    "SlideBy",
-    "TurnBy",
-]
+__all__ = ["Estimate", "FrictionObserver", "Hinge", "Hold", "Measurement", "Sensors", "SlideBy", "TurnBy"]
 
 
 def __dir__() -> list[str]:

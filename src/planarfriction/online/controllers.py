@@ -10,9 +10,9 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.online.gripper import GRAVITY, Measurement
 from planarfriction.online.loops import grips
 from planarfriction.online.observer import Estimate, FrictionObserver, estimate_of
+from planarfriction.online.sensors import GRAVITY, Measurement
 
 trapezoid = functools.partial(grips.trapezoid.py_func, np)
 """Place, speed and acceleration at times [s] of a displacement whose ramps take a quarter each of the duration."""

@@ -13,8 +13,8 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.laws.base import refuse_fixed_stiffness
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models import FrictionModel
-from planarfriction.online.gripper import Measurement, Sensors
 from planarfriction.online.loops import friction_filter as kernels
+from planarfriction.online.sensors import Measurement, Sensors
 
 PARAMETERS = ("mu_c", "mu_s", "radius")
 """Names of what is estimated beside the twist, in the order of `Estimate.determined` and `covariance`."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 
 from planarfriction.cli import main
-from planarfriction.cli.online import WORDS
-from planarfriction.online import trials
+from planarfriction_studies.commands.online import WORDS
+from planarfriction_studies.rig import trials
 
 
 def test_the_table_of_the_trials_is_written(tmp_path, capsys, monkeypatch):
@@ -29,11 +29,10 @@ def test_too_few_parts_are_refused(capsys):
 
 
 def test_a_film_is_written(tmp_path, monkeypatch, capsys):
-    from planarfriction.online import demo
-    from planarfriction.plots import grip
+    from planarfriction_studies.rig import demo, pictures
 
     monkeypatch.setattr(demo, "record_hold", lambda seed: seed)
-    monkeypatch.setattr(grip, "write_grip_film", lambda path, record: path.write_text(str(record)))
+    monkeypatch.setattr(pictures, "write_grip_film", lambda path, record: path.write_text(str(record)))
     assert main(["online", "demo", "--out", str(tmp_path / "hold.gif"), "--seed", "3"]) == 0
     assert (tmp_path / "hold.gif").read_text() == "3"
     assert main(["online", "demo", "--out", str(tmp_path / "hold.bmp")]) != 0

@@ -65,8 +65,8 @@ def trials(parts: int, seed: int, file: Path | None) -> None:
     """Run the trials (the help above is what users see)."""
     from planarfriction import validation
     from planarfriction.cli.console import note, print_table, work_progress
-    from planarfriction.online.trials import KINDS, run_trials
     from planarfriction.writing import check_writable, write_text
+    from planarfriction_studies.rig.trials import KINDS, run_trials
 
     parts, seed = validation.count("--parts", parts, len(KINDS)), validation.count("--seed", seed, 0)
     if file is not None:
@@ -101,10 +101,10 @@ def demo(out: Path, seed: int) -> None:
     """Write the film (the help above is what users see)."""
     from planarfriction import validation
     from planarfriction.cli.console import note, work_progress
-    from planarfriction.online.demo import record_hold
     from planarfriction.plots.film_files import check_kind
-    from planarfriction.plots.grip import write_grip_film
     from planarfriction.writing import check_writable
+    from planarfriction_studies.rig.demo import record_hold
+    from planarfriction_studies.rig.pictures import write_grip_film
 
     seed = validation.count("--seed", seed, 0)
     check_kind(out)

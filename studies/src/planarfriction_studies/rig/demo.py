@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction.online.controllers import Hold
-from planarfriction.online.gripper import Gripper, Parts
 from planarfriction.online.observer import FrictionObserver
-from planarfriction.online.trials import known_model
 from planarfriction.validation import count
+from planarfriction_studies.rig.gripper import Gripper, Parts
+from planarfriction_studies.rig.trials import known_model
 
 EVERY = 10
 """Steps between the rows of a record."""

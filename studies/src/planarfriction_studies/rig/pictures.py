@@ -14,7 +14,7 @@ from planarfriction.plots.film_files import check_kind, write_frames
 from planarfriction.writing import replacing
 
 if TYPE_CHECKING:
-    from planarfriction.online.demo import GripRecord
+    from planarfriction_studies.rig.demo import GripRecord
 
 HALF = np.array([0.035, 0.022])
 """Half sides of the part that is drawn [m]."""

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.online import baselines
 from planarfriction.planning import holding_load
+from planarfriction_studies.rig import baselines
 
 GRAVITY = 9.81
 MU, RADIUS = 0.4931, 5.568e-3

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.coupling import CoupledPatches, HostStep
-from planarfriction.equality import ByValue, by_parts
+from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import LuGre
 from planarfriction.models import DistributedModel
+from planarfriction.online.sensors import GRAVITY, Measurement, Sensors
 from planarfriction.patch import ContactPatch, SoftFinger
-
-GRAVITY = 9.81
-"""Gravity [m/s^2]."""
 
 DT = 1e-3
 """Time step, and time between samples of force and torque [s]."""
@@ -32,21 +29,6 @@ UNIT = 0.01
 
 PROPORTIONAL, INTEGRAL, EVERY = 100.0, 2.0, 2
 """Gains of the loop of the grip force [1/s, 1/s^2], and steps between its samples (500 Hz)."""
-
-
-@by_parts
-class Measurement(NamedTuple):
-    """Sensors at one instant; leading axes are parts."""
-
-    time: Any
-    """Time of the samples [s], `[...]`."""
-    wrench: Any
-    """Friction wrench of one finger on the part, about the grip's centre, axes of the hand `[..., 3]` [N, N, N m]."""
-    normal_force: Any
-    """Grip force [N], `[...]`."""
-    slip_velocity: Any = None
-    """Mean velocity of the part over its finger since the last such sample, `[..., 3]` [m/s, m/s, rad/s]; NaN or None
-    between samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,30 +100,6 @@ class Parts(ByValue):
 
     def __len__(self) -> int:
         return len(self.mass)
-
-
-@dataclass(frozen=True, eq=False)
-class Sensors(ByValue):
-    """Noise and rates of the sensors of a `Gripper`.
-
-    Raises InvalidValueError for a value out of range.
-    """
-
-    force_noise: float = 0.02
-    """Standard deviation of the forces, also of the grip force [N]."""
-    torque_noise: float = 2e-4
-    """Standard deviation of the torque [N m]."""
-    slip_rate: float = 120.0
-    """Rate of the slip velocity [Hz]; 0 for no such sensor."""
-    quantum: float = 0.95e-3
-    """Smallest slip velocity [m/s]: the sensor counts places, so that what a sample leaves out is in the next."""
-    base: float = 0.01
-    """Distance of the two counters whose difference is the spin [m]."""
-
-    def __post_init__(self) -> None:
-        for each in dataclasses.fields(self):
-            check = validation.positive if each.name in ("quantum", "base") else validation.non_negative
-            self._set(**{each.name: check(each.name, getattr(self, each.name))})
 
 
 class Gripper:

@@ -7,8 +7,9 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
-from planarfriction.online import Gripper, Parts, Sensors
+from planarfriction.online import Sensors
 from planarfriction.planning import holding_load
+from planarfriction_studies.rig import Gripper, Parts
 
 QUIET = Sensors(force_noise=0.0, torque_noise=0.0)
 

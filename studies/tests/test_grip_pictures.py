@@ -7,9 +7,9 @@ import pytest
 from PIL import Image
 
 from planarfriction.errors import FileError
-from planarfriction.online import Parts
-from planarfriction.online.demo import GripRecord, record_hold
-from planarfriction.plots.grip import plot_grip, write_grip_film
+from planarfriction_studies.rig import Parts
+from planarfriction_studies.rig.demo import GripRecord, record_hold
+from planarfriction_studies.rig.pictures import plot_grip, write_grip_film
 
 
 def record(rows=40) -> GripRecord:

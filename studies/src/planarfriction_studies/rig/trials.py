@@ -11,11 +11,12 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.laws import LuGre
 from planarfriction.models import ReducedModel
-from planarfriction.online.baselines import LINEAR_RULE, ROTATION_RULE, ellipsoid_load, hinge_rule, hold_rule
 from planarfriction.online.controllers import Hinge, Hold, SlideBy, TurnBy, trapezoid
-from planarfriction.online.gripper import DT, GRAVITY, UNIT, Gripper, Measurement, Parts
 from planarfriction.online.observer import FrictionObserver
+from planarfriction.online.sensors import GRAVITY, Measurement
 from planarfriction.patch import ContactPatch, SoftFinger
+from planarfriction_studies.rig.baselines import LINEAR_RULE, ROTATION_RULE, ellipsoid_load, hinge_rule, hold_rule
+from planarfriction_studies.rig.gripper import DT, UNIT, Gripper, Parts
 
 NOMINAL_MU, FACTOR = 0.52, 3.0
 """Middle of the friction coefficients of the trials, and largest over least [-]."""
