@@ -266,10 +266,10 @@ def increasing(time: ArrayLike, name: str = "time", at_least: int = 0) -> np.nda
     result = validation.array("time", time, (None,))
     if len(result) < at_least:
         raise InvalidValueError(name, f"hold at least {at_least} samples", f"{len(result)}")
-    steps = np.diff(result)
-    if not (steps > 0.0).all():
-        row = int(np.argmax(steps <= 0.0)) + 1
-        raise InvalidValueError(name, "increase", f"{result[row]:g} after {result[row - 1]:g} s")
+    falls = np.flatnonzero(np.diff(result) <= 0.0).tolist()
+    if falls:
+        before, after = result[falls[0] : falls[0] + 2].tolist()
+        raise InvalidValueError(name, "increase", f"{after} after {before} s in sample {falls[0] + 2}")
     return result
 
 
