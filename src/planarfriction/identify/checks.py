@@ -1,4 +1,4 @@
-"""Checks of logs and slides before they are fitted: each finding is one line that says what is odd, and what it means."""
+"""Checks of logs and slides before they are fitted: each finding is one line on what is odd, and what it may mean."""
 
 from __future__ import annotations
 
@@ -327,8 +327,7 @@ def check_sampling(log: Log, sigma_0: float, sigma_1: float) -> Finding | None:
 def check_slide_units(slides: Sequence[Slide], patch: ContactPatch, body: SlidingBody) -> Finding | None:
     """Check that decelerations are those of friction, and alike in all slides, for times in s, places in m and angles
     in rad."""
-    load = body.mass * body.gravity
-    size = float(patch.contact_radius(load) if patch.depends_on_load else patch.contact_radius())
+    size = _size_at(body.mass * body.gravity, patch)
     as_read, in_degrees = (_friction_of_slides(slides, body, size, unit) for unit in (1.0, np.pi / 180.0))
     if len(as_read) == 0:
         return None
@@ -379,4 +378,13 @@ def _load(log: Log) -> float:
 
 def size_of(log: Log, patch: ContactPatch) -> float:
     """Return the length that turns spin into speed [m]: the contact radius at the load of the log."""
-    return float(patch.contact_radius(_load(log)) if patch.depends_on_load else patch.contact_radius())
+    return _size_at(_load(log), patch)
+
+
+def _size_at(load: float, patch: ContactPatch) -> float:
+    """Return the contact radius at a load [m]. Raises InvalidValueError for a single point."""
+    size = float(patch.contact_radius(load) if patch.depends_on_load else patch.contact_radius())
+    if not size > 0.0:
+        rule = "be wider than a point for an identification (a disc of 0.1 mm pulls like a point)"
+        raise InvalidValueError("patch", rule, f"{patch.cells} cell with a contact radius of {size:g} m")
+    return size

@@ -99,9 +99,7 @@ def scene_from_dict(data: dict[str, Any], *, folder: str | Path | None = None, s
     prescribed = "velocity" in table
     options = {key: table.get(key) for key in _OPTIONS if key in table}
     signals = {key: read_signal(table, key) for key in ("force", "velocity") if key in table}
-    # A body that is moved as prescribed needs no mass; whoever leaves it out does not mean to say anything about it.
-    moved = {"mass": 1.0, "inertia": 1.0, "gravity": [0.0, 0.0]}
-    body = _body(table.section("body", moved) if prescribed and "body" not in table else table.section("body"))
+    body = None if prescribed and "body" not in table else _body(table.section("body"))
     t_end = table.get("t_end")
     with table.located():
         return Scene(body, contacts, t_end, **signals, **options)
