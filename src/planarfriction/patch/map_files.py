@@ -88,7 +88,7 @@ class MapReading(Checked):
             values = values.reshape(-1, *self.frame_shape)
         several = isinstance(values, list) or values.ndim == 3
         place = self.place(what, len(values) if several else 1)
-        return values[place] if several else np.asarray(values)
+        return values[place] if several else values  # pyright: ignore[reportReturnType]
 
     def place(self, what: str, count: int) -> int:
         """Return the index of the frame among `count`. Raises InvalidValueError if there is none, or several."""
