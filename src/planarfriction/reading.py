@@ -12,7 +12,7 @@ import re
 import stat
 from array import array
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from operator import length_hint
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -34,6 +34,7 @@ AT_ONCE = 50_000
 SEPARATORS = (";", ",", "\t")
 """Separators of cells; the first that a file has is taken."""
 
+_UNIT = re.compile(r"[\[(]?[A-Za-zµ°%1][\w\s/*^·.°µ%-]*[\])]?")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
@@ -138,6 +139,14 @@ def _with_point(cell: str) -> str:
     return cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell
 
 
+def _is_unit(cell: str) -> bool:
+    """Return True if a cell below a name may be its unit, or is empty."""
+    with suppress(ValueError):
+        float(cell)
+        return False
+    return not cell or _UNIT.fullmatch(cell) is not None
+
+
 class Table:
     """A CSV file with a header line and rows of numbers, read once: `names` first, then the columns that are wanted."""
 
@@ -146,12 +155,23 @@ class Table:
         first = [*itertools.islice((each for each in self._lines if _holds_cells(each[1])), 1)]
         self._separator = _separator(first[0][1]) if first else ","
         line, self.names = next(_rows(path, itertools.chain(first, self._lines), self._separator), (0, []))
-        """Names of the columns."""
+        """Names of the columns, with units in brackets that stand below them."""
         if not self.names:
             raise FileError(f"{path}: is empty (expected a header line and rows of numbers)")
         for name in filter(None, self.names):
             if self.names.count(name) > 1:
                 raise FileError(f"{path}: line {line} has two columns {shown(repr(name))}")
+        self._read_units()
+
+    def _read_units(self) -> None:
+        """Put units in brackets behind the names if the row below them has units in place of numbers."""
+        second = [*itertools.islice((each for each in self._lines if _holds_cells(each[1])), 1)]
+        units = [cell.strip() for cell in second[0][1].split(self._separator)] if second else []
+        if len(units) == len(self.names) and any(units) and all(map(_is_unit, units)):
+            pairs = zip(self.names, [unit.strip("[]()") for unit in units], strict=True)
+            self.names = [f"{name} [{unit}]" if unit and "[" not in name else name for name, unit in pairs]
+        else:
+            self._lines = itertools.chain(second, self._lines)
 
     def numbers(self, names: Sequence[str], spare: Sequence[str] = ()) -> np.ndarray:
         """Return the columns `names`, finite, `[rows, len(names)]`; raises FileError with the line and the column.

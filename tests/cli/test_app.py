@@ -166,14 +166,14 @@ def test_drift_has_the_published_width():
 
 @pytest.mark.parametrize("name", PUBLISHED_PATCHES)
 def test_published_patches_by_name(name):
-    assert find_patch(name.lower(), cell_size=None).to_dict() == PUBLISHED_PATCHES[name]().to_dict()
+    assert find_patch(name.lower(), {}).to_dict() == PUBLISHED_PATCHES[name]().to_dict()
 
 
 def test_disc_rectangle_and_pressure_map(tmp_path):
-    assert find_patch("disc", cell_size=None).area() == pytest.approx(np.pi * 1e-4, rel=1e-9)
-    assert find_patch("rectangle", cell_size=None).area() == pytest.approx(4e-4, rel=1e-12)
+    assert find_patch("disc", {}).area() == pytest.approx(np.pi * 1e-4, rel=1e-9)
+    assert find_patch("rectangle", {}).area() == pytest.approx(4e-4, rel=1e-12)
     (tmp_path / "pad.csv").write_text("1,1\n0,2\n", encoding="utf-8")
-    patch = find_patch(str(tmp_path / "pad.csv"), cell_size=1e-3)
+    patch = find_patch(str(tmp_path / "pad.csv"), {"cell_size": 1e-3})
     assert patch.weights() == pytest.approx([0.25, 0.25, 0.5])
     assert patch.positions[0] == pytest.approx([-5e-4, 5e-4])  # row 0 is the top
 
@@ -475,7 +475,7 @@ def test_an_own_shape_without_parameters_keeps_the_names_of_patches(monkeypatch)
     from planarfriction.families import SHAPES
 
     SHAPES.register("thumb", lambda: pf.ContactPatch.disc(0.01))
-    assert find_patch("disc", cell_size=None).name == "disc"
+    assert find_patch("disc", {}).name == "disc"
 
 
 # ---------------------------------------------------------------------- commands of other packages
@@ -528,3 +528,15 @@ def test_commands_of_ones_own_package_are_added_but_replace_none(monkeypatch, ca
     assert main(["hello"]) == 0
     assert capsys.readouterr().out == "hello\n"
     assert app.commands["run"] is not hello
+
+
+def test_options_of_maps_on_the_command_line(capsys, tmp_path):
+    (tmp_path / "pad.csv").write_text("0,1,2\n5,6,1\n\n7,8,9\n5,0,5\n")
+    command = ["limit-surface", "--patch", str(tmp_path / "pad.csv"), "--width", "0.003"]
+    assert "first row is 0, 1, 2: labels" in fails(capsys, *command)
+    assert "frame must be one of the 2 frames" in fails(capsys, *command, "--no-header")
+    assert main([*command, "--no-header", "--frame", "1", "--threshold", "0.6"]) == 0
+    assert re.search(r"loaded cells\W+3\b", capsys.readouterr().out)
+    assert "--frame must be given only for a pressure map" in fails(capsys, "limit-surface", "--frame", "1")
+    assert main(["limit-surface", "--patch", "disc", "--width", "0.002"]) == 0
+    assert re.search(r"contact radius r \[mm\]\W+0.66", capsys.readouterr().out)

@@ -347,3 +347,35 @@ def test_run_writes_logs_that_identify_reads(solution, tmp_path, capsys):
     assert "mu_c" in capsys.readouterr().out
     assert main(["identify", str(two), *options]) == 2
     assert "has the contacts other, pad: choose one of them" in capsys.readouterr().err
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_patch_of_one_point_is_refused_in_one_line(log):
+    with pytest.raises(InvalidValueError, match="patch must be wider than a point for an identification"):
+        check_logs([log], pf.ContactPatch.points([[0.0, 0.01]]))
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("t", "twist.linear.x", "twist.linear.y", "twist.angular.z", "force.x", "force.y", "torque.z", "force.z"),
+        ("t", "vx", "vy", "wz", "wrench.force.x", "wrench.force.y", "wrench.torque.z", "wrench.force.z"),
+        ("Time", "vx", "vy", "omega", "Fx", "Fy", "Mz", "Fz"),
+        ("t", "vx", "vy", "omega", "/ft/force/x", "/ft/force/y", "Tz", "FZ"),
+    ],
+)
+@pytest.mark.parametrize("units", ["", "s,m/s,m/s,rad/s,N,N,N m,N\n", "[s],(m/s),[m/s],[rad/s],,N,[Nm],\n"])
+def test_names_of_sensors_and_ros_and_units_below_them(log, tmp_path, names, units):
+    path = written(tmp_path / "log.csv", dict(zip(names, columns_of(log).values(), strict=True)))
+    head, _, rest = path.read_text().partition("\n")
+    path.write_text(f"{head}\n{units}{rest}")
+    read = Log.from_csv(path)
+    assert all(np.array_equal(getattr(read, name), getattr(log, name)) for name in ("twist", "wrench", "normal_force"))
+
+
+def test_units_below_the_names_are_checked(log, tmp_path):
+    path = written(tmp_path / "log.csv", columns_of(log))
+    head, _, rest = path.read_text().partition("\n")
+    path.write_text(f"{head}\ns,mm/s,m/s,rad/s,N,N,Nm,N\n{rest}")
+    with pytest.raises(FileError, match=r"column .vx \[mm/s\]. must be in SI units, got mm/s"):
+        Log.from_csv(path)

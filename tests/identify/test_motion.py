@@ -8,6 +8,7 @@ import pytest
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import Slide, SlidingBody, fit_start, identify_motion, predict_slide
+from planarfriction.identify.checks import check_slides
 from planarfriction.identify.slides import slide_poses
 
 BODY = SlidingBody(0.37, 8.1e-4)
@@ -140,3 +141,54 @@ def test_a_pushed_slide_is_named_and_changes_nothing(without, push, reason):
         blind = identify_motion(strange, PATCH, BODY, parameters=("mu_c",), start=LAW, model=ellipsoid, loss="squares")
         assert abs(blind.estimates["mu_c"] / without.estimates["mu_c"] - 1.0) > 0.03
         assert any("without the pushed one" in str(each) for each in blind.verdicts)
+
+
+# ---------------------------------------------------------------------- slides that are misread
+
+
+def remade(slide: Slide, time=1.0, pose=(1.0, 1.0, 1.0)) -> Slide:
+    return Slide(time * slide.time, slide.pose * pose, name=slide.name)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"pose": (1.0, 1.0, 180.0 / np.pi)}, r"theta of the slides must be in rad, .* % if it is in deg"),
+        ({"time": 1e3}, r"time of the slides must be in s, .*: is it in ms\?"),
+        ({"pose": (1e3, 1e3, 1.0)}, r"x and y of the slides must be in m, .*: are they in mm\?"),
+    ],
+)
+def test_units_of_slides_are_seen_before_they_are_fitted(change, words):
+    """Degrees made mu 3.26 for 0.3, and milliseconds a simulation of five minutes."""
+    with pytest.raises(InvalidValueError, match=words):
+        identify_motion([remade(each, **change) for each in slides(6)], PATCH, BODY, start=LAW, model=ellipsoid)
+
+
+@pytest.mark.parametrize("frozen", [(10, 17), (20, 24), (0, 7)])
+def test_a_tracker_that_froze_is_named(frozen):
+    bad = slides(2)
+    pose = bad[1].pose.copy()
+    pose[frozen[0] : frozen[1] + 1] = pose[frozen[0]]
+    bad[1] = Slide(bad[1].time, pose, name="slide 1")
+    words = rf"pose of slide 1 must follow the body .*no motion for {1e3 * (frozen[1] - frozen[0]) / 150:.3g} ms"
+    with pytest.raises(InvalidValueError, match=words):
+        identify_motion(bad, PATCH, BODY, start=LAW, model=ellipsoid)
+    kept = np.r_[: frozen[0] + 1, frozen[1] + 1 : len(pose)]
+    check_slides([Slide(bad[1].time[kept], pose[kept])], PATCH, BODY)
+
+
+def test_nothing_is_found_in_slides_as_they_should_be():
+    for spin, noise in ((0.0, 1e-4), (3.0, 1e-4), (10.0, 1e-3)):
+        check_slides(slides(8, spin=spin, noise=noise), PATCH, BODY)
+    still = slides(1)[0]
+    check_slides([Slide(still.time, np.zeros_like(still.pose))], PATCH, BODY)
+    coarse = [Slide(each.time, np.round(each.pose, 3)) for each in slides(8)]
+    held = [Slide(each.time, each.pose[np.arange(45) // 3 * 3]) for each in slides(4)]
+    check_slides([*coarse, *held], PATCH, BODY)
+
+
+def test_times_that_stand_still_are_shown_with_all_digits():
+    time = 1.7e9 + np.arange(45) / 150.0
+    time[7] = time[6]
+    with pytest.raises(InvalidValueError, match=r"time of slide must increase, got 1700000000\.04 after .* sample 8"):
+        Slide(time, slides(1)[0].pose)

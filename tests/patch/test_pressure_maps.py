@@ -10,7 +10,7 @@ from hypothesis.extra import numpy as hnp
 from PIL import Image
 
 import planarfriction as pf
-from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.errors import FileError, FrictionError, InvalidValueError
 
 ROUNDING = 1e-15
 """Relative: a handful of operations, each rounded at 1e-16."""
@@ -141,7 +141,7 @@ def test_broken_arrays(values, cell_size, message):
         ("pad.npy", "", "not a readable .npy file"),
         ("pad.png", "1,2\n3,4\n", "not a readable .png file"),
         ("pad.png", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "not a readable .png file"),
-        ("pad.txt", "1,2\n3,4\n", "unknown kind '.txt', use .csv, .npy or a grey image"),
+        ("pad.txt", "1,2\n3,4\n", "unknown kind '.txt', use .csv, .npy, .npz, .mat, .asf or a grey image"),
         ("pad", "1,2\n3,4\n", "unknown kind ''"),
     ],
 )
@@ -206,3 +206,164 @@ def test_pixels_that_are_no_numbers_are_refused_without_a_warning(tmp_path):
     (tmp_path / "map.tif").write_bytes(content.replace(ones, signalling + ones[4:], 1))
     with pytest.raises(InvalidValueError, match=r"must be finite, got nan at index \(0, 0\)"):
         pf.ContactPatch.from_pressure(tmp_path / "map.tif", 0.001)
+
+
+# ---------------------------------------------------------------------- files as others write them
+
+PRESSURES = np.array([[0.5, 1.25, 2.5], [3.5, 4.0, 5.25], [6.5, 0.75, 8.0], [9.0, 1.5, 2.0]])
+
+
+def read(path, **options):
+    return pf.patch.read_pressure_map(path, **options)
+
+
+@pytest.mark.parametrize(
+    ("writing", "options"),
+    [
+        ({}, {}),
+        ({"index_label": "row"}, {}),
+        ({"index": False}, {"header": True}),
+        ({"header": False}, {"index": True}),
+        ({"header": list("abc")}, {}),
+        ({"header": list("abc"), "index": False}, {}),
+        ({"header": False, "index": False}, {}),
+        ({"sep": ";", "decimal": ","}, {}),
+    ],
+)
+def test_labels_of_pandas_are_no_pressures(tmp_path, writing, options):
+    import pandas
+
+    path = tmp_path / "pad.csv"
+    pandas.DataFrame(PRESSURES).to_csv(path, **writing)
+    np.testing.assert_array_equal(read(path, **options), PRESSURES)
+    patch = pf.ContactPatch.from_pressure(path, 1e-3, **options)
+    assert patch.contact_radius() == pf.ContactPatch.from_pressure(PRESSURES, 1e-3).contact_radius()
+
+
+def test_labels_that_may_be_pressures_are_asked_about(tmp_path):
+    path = tmp_path / "pad.csv"
+    path.write_text("0,1,2\n5,6,7\n")
+    with pytest.raises(FileError, match=r"first row is 0, 1, 2: labels \(header = true\) or pressures \(header = fal"):
+        read(path)
+    assert read(path, header=True).tolist() == [[5, 6, 7]]
+    assert read(path, header=False).tolist() == [[0, 1, 2], [5, 6, 7]]
+    path.write_text("0,5\n1,6\n2,7\n3,8\n")
+    with pytest.raises(FileError, match=r"first column is 0, 1, 2, \.\.\.: labels \(index = true\)"):
+        read(path)
+    assert read(path, index=False).shape == (4, 2)
+
+
+def test_frames_are_chosen_and_never_stacked(tmp_path):
+    import pandas
+
+    frames, names = [PRESSURES, 2.0 * PRESSURES, 3.0 * PRESSURES[:, ::-1]], []
+    tables = [pandas.DataFrame(each).to_csv() for each in frames]
+    for name, text in {
+        "blank.csv": "\n".join("".join(",".join(map(str, row)) + "\n" for row in each) for each in frames),
+        "remark.csv": "".join(f"# frame {i}\n{pandas.DataFrame(f).to_csv()}" for i, f in enumerate(frames)),
+        "appended.csv": "".join(tables),
+    }.items():
+        (tmp_path / name).write_text(text)
+        names.append(name)
+    np.save(tmp_path / "pad.npy", np.array(frames))
+    np.savez_compressed(tmp_path / "pad.npz", np.array(frames))
+    from scipy.io import savemat
+
+    savemat(tmp_path / "pad.mat", {"p": np.moveaxis(frames, 0, -1), "rate": 100.0})
+    images = [Image.fromarray((4 * each).astype(np.uint8)) for each in frames]
+    images[0].save(tmp_path / "pad.tif", save_all=True, append_images=images[1:])
+    for name in (*names, "pad.npy", "pad.npz", "pad.mat", "pad.tif"):
+        scale = 4.0 if name == "pad.tif" else 1.0
+        with pytest.raises(FrictionError, match=rf"frame must be one of the 3 frames of .*{name}, 0 to 2, got None"):
+            read(tmp_path / name)
+        with pytest.raises(FrictionError, match="got 3"):
+            read(tmp_path / name, frame=3)
+        for i, each in enumerate(frames):
+            np.testing.assert_array_equal(read(tmp_path / name, frame=i), scale * each, err_msg=name)
+    np.testing.assert_array_equal(pf.ContactPatch.from_pressure(np.array(frames), 1e-3, frame=1).cells, 12)
+
+
+def test_blank_lines_behind_every_row_part_nothing(tmp_path):
+    (tmp_path / "pad.csv").write_bytes(b"5,6\r\r\n7,8\r\r\n")
+    assert read(tmp_path / "pad.csv").tolist() == [[5, 6], [7, 8]]
+    (tmp_path / "pad.csv").write_text("5,6\n7,8\n\n1,2\n")
+    with pytest.raises(FileError, match="blocks of 2, 1 rows"):
+        read(tmp_path / "pad.csv")
+    assert read(tmp_path / "pad.csv", frame=1).tolist() == [[1, 2]]
+
+
+def test_frames_in_rows_and_one_below_another_have_a_shape(tmp_path):
+    frames = np.stack([PRESSURES, 2.0 * PRESSURES])
+    np.savetxt(tmp_path / "rows.csv", np.column_stack([[0.0, 0.1], frames.reshape(2, -1)]), delimiter=",")
+    np.savetxt(tmp_path / "stacked.csv", frames.reshape(-1, 3), delimiter=",")
+    for name, index in (("rows.csv", True), ("stacked.csv", None)):
+        found = read(tmp_path / name, index=index, frame_shape=(4, 3), frame=1)
+        np.testing.assert_array_equal(found, frames[1])
+    with pytest.raises(InvalidValueError, match="frame_shape must divide the 24 values"):
+        read(tmp_path / "stacked.csv", frame_shape=(5, 3))
+
+
+@pytest.mark.parametrize("name", ["pad.asf", "pad.csv"])
+def test_exports_of_tekscan(tmp_path, name):
+    head = "DATA_TYPE MOVIE\nVERSION Fast Export\nROWS 2\nCOLS 3\nUNITS kPa\nASCII_DATA @@\n"
+    (tmp_path / name).write_text(head + "Frame 1\nB,1,2\nB,B,3\n\nFrame 2\nB,4,5\nB,B,6\n@@\n")
+    assert read(tmp_path / name, frame=1).tolist() == [[0, 4, 5], [0, 0, 6]]
+    with pytest.raises(FrictionError, match="one of the 2 frames"):
+        read(tmp_path / name)
+
+
+def disc_image(radius=20.3, pixels=64):
+    y, x = np.mgrid[:pixels, :pixels] - 0.5 * (pixels - 1)
+    return np.where(np.hypot(x, y) < radius, 255, 0).astype(np.uint8)
+
+
+def test_ringing_of_jpeg_is_no_pressure_and_is_told(tmp_path):
+    Image.fromarray(disc_image()).save(tmp_path / "pad.jpg", quality=75)
+    with pytest.warns(UserWarning, match=r"pad.jpg: .* of 1\d\d\d cells, up to 0.1 of the peak, count as empty"):
+        patch = pf.ContactPatch.from_pressure(tmp_path / "pad.jpg", 1e-3)
+    drawn = pf.ContactPatch.from_pressure(disc_image(), 1e-3)
+    assert abs(patch.cells - drawn.cells) < 0.02 * drawn.cells
+    raw = pf.ContactPatch.from_pressure(tmp_path / "pad.jpg", 1e-3, threshold=0.0)
+    assert raw.cells > 1.2 * drawn.cells
+    assert pf.ContactPatch.from_pressure(tmp_path / "pad.jpg", 1e-3, threshold=0.2).cells == drawn.cells
+    assert pf.ContactPatch.from_pressure([[1.0, 9.0, 10.0]], 1e-3, threshold=0.2).cells == 2
+
+
+def test_prints_are_asked_about_and_inverted(tmp_path):
+    rng = np.random.default_rng(1)
+    paper = 250.0 - 0.8 * disc_image() + rng.integers(-3, 4, (64, 64))
+    Image.fromarray(paper.astype(np.uint8)).save(tmp_path / "print.png")
+    with pytest.raises(FileError, match=r"ink on paper \(invert = true\) or pressure \(invert = false\)"):
+        read(tmp_path / "print.png")
+    patch = pf.ContactPatch.from_pressure(tmp_path / "print.png", width=0.064, invert=True, threshold=0.1)
+    np.testing.assert_array_equal(patch.positions, pf.ContactPatch.from_pressure(disc_image(), 1e-3).positions)
+    assert read(tmp_path / "print.png", invert=False).min() > 0.0
+    Image.fromarray(disc_image()).save(tmp_path / "mask.png")
+    assert read(tmp_path / "mask.png").sum() == disc_image().sum(dtype=float)
+    Image.new("L", (4, 4), 255).save(tmp_path / "full.png")
+    assert read(tmp_path / "full.png").all()
+
+
+def test_width_stands_in_for_the_cell_size():
+    wide = pf.ContactPatch.from_pressure(PRESSURES, width=0.006)
+    assert (wide.grid.cell_width, wide.grid.cell_height) == pytest.approx((0.002, 0.002), rel=1e-15)
+    for sizes in ({}, {"cell_size": 1e-3, "width": 1e-3}):
+        with pytest.raises(InvalidValueError, match="cell_size must be given, or else the width"):
+            pf.ContactPatch.from_pressure(PRESSURES, **sizes)
+    with pytest.raises(InvalidValueError, match="width must be > 0"):
+        pf.ContactPatch.from_pressure(PRESSURES, width=0.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"header": 1}, "header must be True or False"),
+        ({"threshold": 1.0}, "threshold must be < 1"),
+        ({"frame": -1}, "frame must be"),
+        ({"frame_shape": 4}, r"frame_shape must be \(rows, columns\)"),
+        ({"inverted": True}, "inverted"),
+    ],
+)
+def test_options_that_break_their_rule(options, message):
+    with pytest.raises(InvalidValueError, match=message):
+        pf.ContactPatch.from_pressure(PRESSURES, 1e-3, **options)

@@ -366,3 +366,13 @@ def test_published_patches_check_their_width(tmp_path, width):
     path.write_text(f"t_end = 0.1\n[body]\nmass = 1.0\ninertia = 1.0\n{contact}")
     with pytest.raises(pf.FrictionError, match=r"\[contact\.patch\]: width must be a number"):
         pf.Scene.from_file(path)
+
+
+def test_maps_in_scene_files_take_the_options_of_maps(tmp_path):
+    (tmp_path / "map.csv").write_text(",a,b\nx,9,1\ny,0,5\n\n,a,b\nx,1,1\ny,1,9\n")
+    start, end = GOOD.index('shape = "disc"'), GOOD.index("[contact.law]")
+    table = 'shape = "pressure-map"\nfile = "map.csv"\nwidth = 0.004\nframe = 1\nthreshold = 0.5\n'
+    patch = read(tmp_path, GOOD[:start] + table + GOOD[end:]).contacts[0].model.patch
+    assert patch.positions.tolist() == [[0.001, -0.001]]
+    with pytest.raises(FrictionError, match="frame must be one of the 2 frames"):
+        read(tmp_path, GOOD[:start] + table.replace("frame = 1\n", "") + GOOD[end:])

@@ -275,3 +275,13 @@ def test_digests_tell_scenes_apart():
 def test_only_models_of_the_library_have_a_written_form():
     with pytest.raises(FrictionError, match="to be written to a file, got SimpleNamespace"):
         in_hand(stand_in()).to_dict()
+
+
+def test_a_prescribed_velocity_needs_no_body():
+    contact = Contact(pf.DistributedModel(ContactPatch.disc(0.01, cells=3), LuGre()), 1.0)
+    table = a_scene(contacts=contact, velocity=[0.1, 0.0, 0.0]).to_dict()
+    del table["body"]
+    scene = pf.Scene.from_dict(table)
+    assert pf.Scene(None, scene.contacts, scene.t_end, velocity=[0.1, 0.0, 0.0]).body == scene.body
+    with pytest.raises(FrictionError, match="body must be a Body, got None"):
+        a_scene(body=None)

@@ -167,6 +167,12 @@ def test_short_forms_of_plain_data(tmp_path):
     ("times", "values", "hold", "message"),
     [
         ([0, 2, 1], [1, 2, 3], "previous", "times must increase, got 2 s, then 1 s at index 2 (unsorted)"),
+        (
+            [2e9, 1999999999.5],
+            [1, 2],
+            "previous",
+            "times must increase, got 2000000000 s, then 1999999999.5 s at index 1 (unsorted)",
+        ),
         ([0, 1, 1], [1, 2, 3], "previous", "times must increase, got 1 s, then 1 s at index 2 (a duplicate)"),
         ([], [], "previous", "times must have at least one sample, got an empty array"),
         ([0, 1], [1, 2, 3], "previous", "values must have one row per time (2), got shape [3]"),

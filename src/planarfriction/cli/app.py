@@ -13,7 +13,7 @@ from planarfriction import __version__
 from planarfriction.cli.commands import Commands
 from planarfriction.cli.doctor import doctor
 from planarfriction.cli.identify_plan import FitOrPlan, complete_log
-from planarfriction.cli.options import FILE, cells_option, complete_scene, patch_option, width_option
+from planarfriction.cli.options import FILE, cells_option, complete_scene, map_options, patch_option
 from planarfriction.cli.sweep import sweep
 from planarfriction.families import MODELS, SCENES, SURFACES, Family
 
@@ -77,7 +77,7 @@ def app() -> None:
 )
 @cells_option
 @patch_option("Default: the scene's (mostly Circle), or the file's.")
-@click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
+@map_options
 @click.option("--t-end", type=float, help="Duration in s. Default: the scene's.")
 @click.option("--rtol", type=float, help="Relative tolerance of the solver. Default: the scene's.")
 @click.option("--max-steps", type=int, help="Largest number of steps of the solver. Default: 50 million.")
@@ -117,17 +117,17 @@ def run(scene: str, out: Path | None, plot: bool, animate: bool, **options: Any)
     """,
 )
 @patch_option("Default: Circle.")
-@click.option("--pressure", type=FILE, help="Pressure map (.csv, .npy, grey image); row 0 is the top.")
-@click.option("--cell-size", type=float, help="Side of a cell of the pressure map in m.")
+@click.option("--pressure", type=FILE, help="Pressure map, as with --patch.")
+@map_options
 @click.option("--surface", type=MemberOf(SURFACES), default="exact", show_default=True, help="Kind of limit surface.")
 @click.option("--out", type=FILE, help="Picture to write (.png, .pdf, .svg, or .html to rotate it with the mouse).")
 @click.option("--alone", is_flag=True, help="Draw the surface without the ellipsoid.")
 @click.option("--csv", type=FILE, help="Table of samples to write (.csv).")
-def limit_surface(patch: str | None, pressure: Path | None, cell_size: float | None, **options: Any) -> None:
+def limit_surface(patch: str | None, pressure: Path | None, size: dict[str, Any], **options: Any) -> None:
     """Show a limit surface (the help above is what users see)."""
     from planarfriction.cli import limit_surface as command
 
-    command.show(command.choose_patch(patch, pressure, cell_size), **options)
+    command.show(command.choose_patch(patch, pressure, size), **options)
 
 
 @app.command(
@@ -179,8 +179,7 @@ def export(file: Path, **options: Any) -> None:
 )
 @click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True, shell_complete=complete_log)
 @patch_option("Default: Circle.")
-@click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
-@width_option
+@map_options
 @click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: law and radius.")
 @click.option("--start", metavar="NAME=VALUE", multiple=True, help="Initial guess, or fixed value if not estimated.")
 @click.option("--normal-force", type=float, help="Normal force in N, if the logs have no such column.")
@@ -193,12 +192,12 @@ def export(file: Path, **options: Any) -> None:
 @click.option("--starts", type=int, default=4, show_default=True, help="Number of starting points of the search.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Random seed of the starting points.")
 @click.option("--out", type=FILE, help="Folder for the estimates (JSON) and the residual plot (PNG).")
-def identify(logs: tuple[Path, ...], patch: str | None, cell_size: float | None, width: float, **options: Any) -> int:
+def identify(logs: tuple[Path, ...], patch: str | None, size: dict[str, Any], **options: Any) -> int:
     """Identify (the help above is what users see)."""
     from planarfriction.cli import identify as command
     from planarfriction.cli.options import find_patch
 
-    return command.identify(logs, find_patch(patch, cell_size=cell_size, width=width), **options)
+    return command.identify(logs, find_patch(patch, size), **options)
 
 
 @app.command(

@@ -9,7 +9,7 @@ import click
 from click.shell_completion import CompletionItem
 
 import planarfriction as pf
-from planarfriction.cli.options import FILE, patch_option, width_option
+from planarfriction.cli.options import FILE, map_options, patch_option
 
 NAME = "plan"
 
@@ -58,8 +58,7 @@ def complete_log(ctx: click.Context, parameter: object, incomplete: str) -> list
 )
 @click.argument("logs", metavar="[LOG]...", type=FILE, nargs=-1)
 @patch_option("Default: Circle.", "patch_name")
-@click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
-@width_option
+@map_options
 @click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: law and radius.")
 @click.option("--wanted", metavar="NAMES", help="Parameters whose information counts. Default: all.")
 @click.option("--start", metavar="NAME=VALUE", multiple=True, help="Guess of a parameter, or fixed value.")
@@ -75,8 +74,7 @@ def complete_log(ctx: click.Context, parameter: object, incomplete: str) -> list
 def plan(
     logs: tuple[Path, ...],
     patch_name: str | None,
-    cell_size: float | None,
-    width: float,
+    size: dict[str, Any],
     parameters: str | None,
     wanted: str | None,
     start: tuple[str, ...],
@@ -92,7 +90,7 @@ def plan(
     from planarfriction.identify import candidate_motions, design_experiment
     from planarfriction.identify.logs import columns_of
 
-    patch = find_patch(patch_name, cell_size=cell_size, width=width)
+    patch = find_patch(patch_name, size)
     names, values, spread = identify.parse_names(parameters), identify.parse_start(start), identify.parse_noise(noise)
     if out is not None:
         output.check_table(out)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -25,13 +26,13 @@ POLAR_SAMPLES, AZIMUTH_SAMPLES = 37, 72
 """Samples of the direction sphere in the CSV: every five degrees."""
 
 
-def choose_patch(patch: str | None, pressure: Path | None, cell_size: float | None) -> pf.ContactPatch:
+def choose_patch(patch: str | None, pressure: Path | None, size: Mapping[str, Any]) -> pf.ContactPatch:
     """Return the patch of `--patch` or of `--pressure`, of which at most one is given; Circle without either."""
     if patch is not None and pressure is not None:
         raise InvalidValueError("--patch", "not be given together with --pressure", patch)
     if pressure is not None:
-        return pressure_map(pressure, cell_size)
-    return find_patch(patch, cell_size=cell_size)
+        return pressure_map(pressure, size)
+    return find_patch(patch, size)
 
 
 def show(patch: pf.ContactPatch, *, surface: str, out: Path | None, alone: bool, csv: Path | None) -> None:

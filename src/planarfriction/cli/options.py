@@ -6,7 +6,7 @@ import functools
 import importlib.util
 import inspect
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -27,31 +27,33 @@ _PER_WIDTH = {"width": 1.0, "length": 1.0, "radius": 0.5}
 """First parameters of shapes that a width decides, and how large they are for a width of 1."""
 
 
-def find_patch(text: str | None, *, cell_size: float | None, width: float = WIDTH) -> pf.ContactPatch:
+def find_patch(text: str | None, size: Mapping[str, Any], width: float = WIDTH) -> pf.ContactPatch:
     """Return the patch called `text` (case does not matter), `width` [m] wide, or the pressure map in the file `text`.
 
-    Circle for None, not for an empty text.
+    Circle for None, not for an empty text. `size` holds the options of `map_options` that were given.
 
     Raises
     ------
     InvalidValueError
-        Unknown name (names the nearest), or a cell size that is missing for a map or given for a name.
+        Unknown name (names the nearest), or options of a map that are missing for one or given for a name.
     FileError
         The pressure map cannot be read.
     """
     text = USUAL if text is None else text
+    width = size.get("width", width)
     makers = _shapes(width)
     makers |= {name.lower(): functools.partial(make, width=width) for name, make in PUBLISHED_PATCHES.items()}
     if make := makers.get(text.lower()):
-        if cell_size is not None:
-            given = f"{cell_size} for the patch {text}"
-            raise InvalidValueError("--cell-size", "be given only for a pressure map", given)
+        for name in size:
+            if name != "width":
+                given = f"{size[name]} for the patch {text}"
+                raise InvalidValueError(f"--{name.replace('_', '-')}", "be given only for a pressure map", given)
         return make()
     if not (Path(text).suffix or (text and os.path.exists(text))):
         from planarfriction import validation  # loads NumPy
 
         validation.choice("patch", text, [*patch_names(), "a pressure map file"])
-    return pressure_map(text, cell_size)
+    return pressure_map(text, size)
 
 
 def patch_names() -> list[str]:
@@ -71,17 +73,16 @@ def _shapes(width: float) -> dict[str, Callable[[], pf.ContactPatch]]:
     return makers
 
 
-def pressure_map(path: str | Path, cell_size: float | None) -> pf.ContactPatch:
-    """Return the patch of a pressure map file with cells of `cell_size` [m]."""
-
-    if cell_size is None:
-        raise InvalidValueError("--cell-size", f"be given for the pressure map {path}", "none")
-    return pf.ContactPatch.from_pressure(path, cell_size)
+def pressure_map(path: str | Path, size: Mapping[str, Any]) -> pf.ContactPatch:
+    """Return the patch of a pressure map file, with the options of `map_options` that were given."""
+    if not {"cell_size", "width"} & set(size):
+        raise InvalidValueError("--cell-size", f"be given (or --width) for the pressure map {path}", "none")
+    return pf.ContactPatch.from_pressure(path, **size)
 
 
 PATCH_HELP = (
-    f"{', '.join(PUBLISHED_PATCHES)}, disc, rectangle, or a pressure map (.csv, .npy, grey image; row 0 is the top) "
-    "with --cell-size."
+    f"{', '.join(PUBLISHED_PATCHES)}, disc, rectangle, or a pressure map (.csv, .npy, .npz, .mat, .asf, grey image; "
+    "row 0 is the top) with --cell-size or --width."
 )
 
 
@@ -131,9 +132,31 @@ def patch_option(default: str, name: str = "patch") -> Callable[[Any], Any]:
     return click.option("--patch", name, metavar="PATCH", shell_complete=complete_patch, help=words)
 
 
-width_option = click.option(
-    "--width", type=float, default=WIDTH, help=f"Width in m of a patch given by name. Default: {WIDTH}."
+_MAP_OPTIONS = (
+    click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m."),
+    click.option("--width", type=float, help=f"Width in m of a patch. Default: {WIDTH}, or the scene's or map's."),
+    click.option("--header/--no-header", default=None, help="First row of a CSV map: names, or pressures."),
+    click.option("--index/--no-index", default=None, help="First column of a CSV map: labels, or pressures."),
+    click.option("--frame", type=int, help="Frame or page of a map that has several, from 0."),
+    click.option("--frame-shape", type=(int, int), metavar="ROWS COLUMNS", help="Shape of frames that are rows."),
+    click.option("--threshold", type=float, help="Share of the peak up to which cells of a map count as empty."),
+    click.option("--invert/--no-invert", default=None, help="In an image, dark means pressure, or bright does."),
 )
+"""Options that say how large a patch is and how a pressure map is read."""
+
+
+def map_options(function: Any) -> Any:
+    """Add the options of pressure maps; the command gets those that were given, by name, as `size`."""
+    names = ("cell_size", "width", "header", "index", "frame", "frame_shape", "threshold", "invert")
+
+    @functools.wraps(function)
+    def command(*arguments: Any, **options: Any) -> Any:
+        size = {name: value for name in names if (value := options.pop(name)) is not None}
+        return function(*arguments, size=size, **options)
+
+    for option in reversed(_MAP_OPTIONS):
+        command = option(command)
+    return command
 
 
 def load_function(option: str, entry: str) -> tuple[str, Callable[[Any], Any]]:

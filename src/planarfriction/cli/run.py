@@ -125,7 +125,7 @@ def scene_makers(
     *,
     cells: int | None = None,
     patch: str | None = None,
-    cell_size: float | None = None,
+    size: Mapping[str, Any] | None = None,
     t_end: float | None = None,
 ) -> dict[str, Callable[..., pf.Scene]]:
     """Return functions that make the scenes of some values, by the kind of their model; "" for the file's own."""
@@ -133,13 +133,13 @@ def scene_makers(
         validation.positive("--t-end", t_end)
     kinds = list(dict.fromkeys(kind for each in models for kind in (BOTH if each == "both" else [each])))
     if Path(name).suffix.lower() in (".toml", ".json"):
-        return _makers_from_file(name, kinds, cells, patch, cell_size)
+        return _makers_from_file(name, kinds, cells, patch, size or {})
     validation.choice("scene", name, [*SCENES, "a scene file (.toml, .json)"])
     of_scene = _USUAL.get(name, Usual())
-    if patch is None and cell_size is None and of_scene.patch is not None:
+    if patch is None and not size and of_scene.patch is not None:
         contact_patch = of_scene.patch()
     else:
-        contact_patch = find_patch(patch, cell_size=cell_size, width=of_scene.width)
+        contact_patch = find_patch(patch, size or {}, of_scene.width)
     law = of_scene.law()
     kinds = kinds or (list(BOTH) if name == "in-hand" else ["distributed"])
     _check_cells(cells, [MODELS[kind] for kind in kinds])
@@ -194,14 +194,15 @@ def _make(make: Any, patch: pf.ContactPatch, law: Any, cells: int | None) -> Any
 
 
 def _makers_from_file(
-    path: str, kinds: Sequence[str], cells: int | None, patch: str | None, cell_size: float | None
+    path: str, kinds: Sequence[str], cells: int | None, patch: str | None, size: Mapping[str, Any]
 ) -> dict[str, Callable[..., pf.Scene]]:
     from planarfriction.sweeps.settings import Settable
 
     make = Settable(path)
-    if patch is None and cell_size is not None:
-        raise InvalidValueError("--cell-size", "be given only if --patch is a pressure map", cell_size)
-    contact_patch = None if patch is None else find_patch(patch, cell_size=cell_size)
+    if patch is None and size:
+        name, value = next(iter(size.items()))
+        raise InvalidValueError(f"--{name.replace('_', '-')}", "be given only with --patch", value)
+    contact_patch = None if patch is None else find_patch(patch, size)
     if not kinds and contact_patch is None and cells is None:
         return {"": make}
     if kinds:

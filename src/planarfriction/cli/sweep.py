@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from planarfriction.cli.options import FILE, cells_option, complete_scene, load_function, patch_option
+from planarfriction.cli.options import FILE, cells_option, complete_scene, load_function, map_options, patch_option
 from planarfriction.families import SCENES
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ KINDS = {"m": "length", "m/s": "speed", "rad": "angle", "N": "force", "N m": "to
 @click.option("--model", metavar="NAME", help="Friction model. Default: the file's, or reduced.")
 @cells_option
 @patch_option("Default: Circle, or the file's.")
-@click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
+@map_options
 @click.option("--t-end", type=float, help="Duration of a ready scene in s.")
 @click.option(
     "--measure", metavar="FILE.py:NAME", help="Function of a solution that returns what to keep. Default: all."

@@ -1,4 +1,4 @@
-"""Checks of logs before they are fitted: each finding is one line that says what was found and what may be wrong."""
+"""Checks of logs and slides before they are fitted: each finding is one line on what is odd, and what it may mean."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.geometry import rotate
 from planarfriction.identify.logs import Log
 from planarfriction.identify.result import Identification
+from planarfriction.identify.slides import Slide, SlidingBody, window_twists
 from planarfriction.identify.verdicts import Verdict
 from planarfriction.patch import ContactPatch
 
@@ -61,6 +62,18 @@ LEAST_MOUNTED, LEAST_TURN = np.radians(20.0), 0.5
 [rad] below which axes of the world and of the contact are the same."""
 
 
+LOW = 1e-4
+"""Friction over load of a slide below which its times are too large: the least of solids is some 1e-3."""
+
+VARIES, STEADIER, FEW = 0.3, 0.5, 4
+"""Spread of the logarithm of friction over slides from which angles may be misread (measured slides: 0.07), share to
+which degrees must lower it (from 0.8 to 0.06), and least number of values."""
+
+STILL, SLOWED, JUMP = 2, 0.1, 2.0
+"""Number of steps without motion that show a frozen tracker, their speed over that behind the jump that ends them, and
+speed of the jump over the same."""
+
+
 @dataclass(frozen=True)
 class Finding:
     """Property of a log that does not look as it should."""
@@ -84,10 +97,22 @@ def check_logs(logs: Sequence[Log], patch: ContactPatch, names: Sequence[str] = 
     Raises InvalidValueError, one line, for what no fit can make sense of.
     """
     findings = [*(finding for log in logs for finding in check_log(log, patch)), *check_loads(logs, names)]
+    _refuse(findings)
+    return tuple(findings)
+
+
+def check_slides(slides: Sequence[Slide], patch: ContactPatch, body: SlidingBody) -> None:
+    """Check slides of a body on `patch`: units of time, places and angles, and trackers that froze.
+
+    Raises InvalidValueError, one line, for what no fit can make sense of.
+    """
+    _refuse([each for each in (check_slide_units(slides, patch, body), *map(check_frozen, slides)) if each])
+
+
+def _refuse(findings: Sequence[Finding]) -> None:
     for finding in findings:
         if finding.refuses:
             raise InvalidValueError(finding.name, finding.rule, finding.found)
-    return tuple(findings)
 
 
 def with_findings(result: Identification, logs: Sequence[Log], findings: Sequence[Finding]) -> Identification:
@@ -296,6 +321,56 @@ def check_sampling(log: Log, sigma_0: float, sigma_1: float) -> Finding | None:
     return Finding(f"samples of {log.name}", rule, f"{rate:.3g} Hz")
 
 
+# ---------------------------------------------------------------------- slides
+
+
+def check_slide_units(slides: Sequence[Slide], patch: ContactPatch, body: SlidingBody) -> Finding | None:
+    """Check that decelerations are those of friction, and alike in all slides, for times in s, places in m and angles
+    in rad."""
+    size = _size_at(body.mass * body.gravity, patch)
+    as_read, in_degrees = (_friction_of_slides(slides, body, size, unit) for unit in (1.0, np.pi / 180.0))
+    if len(as_read) == 0:
+        return None
+    friction = float(np.median(as_read))
+    text = f"friction of {friction:.3g} times the load"
+    if friction < LOW:
+        return Finding("time of the slides", "be in s", f"{text}: is it in ms?", refuses=True)
+    spread, steadier = (float(np.std(np.log(each))) for each in (as_read, in_degrees))
+    if len(as_read) >= FEW and spread > VARIES and steadier < STEADIER * spread:
+        text = f"friction that varies by {100 * spread:.0f} %, by {100 * steadier:.0f} % if it is in deg"
+        return Finding("theta of the slides", "be in rad", text, refuses=True)
+    if friction > HIGH:
+        return Finding("x and y of the slides", "be in m", f"{text}: are they in mm?", refuses=True)
+    return None
+
+
+def _friction_of_slides(slides: Sequence[Slide], body: SlidingBody, size: float, unit: float) -> np.ndarray:
+    """Compute friction over load, `|(a, I alpha/(m size))|/g` > 0, between windows of moving slides."""
+    found = []
+    for slide in slides:
+        times, twists, _ = window_twists(slide)
+        speed = np.hypot(twists[:, 0], twists[:, 1])
+        rates = np.diff(twists, axis=0) / np.diff(times)[:, None] * [1.0, 1.0, unit * body.inertia / (body.mass * size)]
+        moving = np.minimum(speed[:-1], speed[1:]) > FAST * speed.max()
+        found.append(np.linalg.norm(rates[moving], axis=1) / body.gravity)
+    friction = np.concatenate(found)
+    return friction[friction > 0.0]
+
+
+def check_frozen(slide: Slide) -> Finding | None:
+    """Check that a tracked body does not stand still and then jump, as it does where a tracker froze."""
+    steps = np.hypot(*np.diff(slide.pose[:, :2], axis=0).T)
+    speed = steps / np.diff(slide.time)
+    for k in range(STILL, len(speed) - 3):
+        after = float(np.median(speed[k + 1 : k + 4]))
+        if speed[k - STILL : k].max() < SLOWED * after and speed[k] > JUMP * after:
+            still = k - int(np.argmax(np.append(speed[:k][::-1] >= SLOWED * after, True)))
+            rest = f"no motion for {1e3 * (slide.time[k] - slide.time[still]):.3g} ms until t = {slide.time[k]:.4g} s"
+            text = f"{rest}, then a jump of {1e3 * steps[k]:.3g} mm"
+            return Finding(f"pose of {slide.name}", "follow the body (leave out frozen samples)", text, refuses=True)
+    return None
+
+
 def _load(log: Log) -> float:
     loaded = log.normal_force[log.normal_force > 0.0]
     return float(np.median(loaded)) if len(loaded) else 1.0
@@ -303,4 +378,13 @@ def _load(log: Log) -> float:
 
 def size_of(log: Log, patch: ContactPatch) -> float:
     """Return the length that turns spin into speed [m]: the contact radius at the load of the log."""
-    return float(patch.contact_radius(_load(log)) if patch.depends_on_load else patch.contact_radius())
+    return _size_at(_load(log), patch)
+
+
+def _size_at(load: float, patch: ContactPatch) -> float:
+    """Return the contact radius at a load [m]. Raises InvalidValueError for a single point."""
+    size = float(patch.contact_radius(load) if patch.depends_on_load else patch.contact_radius())
+    if not size > 0.0:
+        rule = "be wider than a point for an identification (a disc of 0.1 mm pulls like a point)"
+        raise InvalidValueError("patch", rule, f"{patch.cells} cell with a contact radius of {size:g} m")
+    return size

@@ -15,6 +15,7 @@ from planarfriction import validation
 from planarfriction.equality import ByValue
 from planarfriction.errors import FileError, InvalidValueError, shown
 from planarfriction.geometry import rotate
+from planarfriction.identify.columns import ALIASES, UNITS, column_name
 from planarfriction.reading import Table
 from planarfriction.scenes import Solution
 
@@ -34,20 +35,6 @@ TWIST = ("vx", "vy", "omega")
 MOTION = ("x", "y", "theta")
 WRENCH = ("fx", "fy", "tau")
 LOAD = ("normal_force",)
-
-ALIASES = {"time": "t", "time_s": "t", "t_s": "t", "fn": "normal_force", "wz": "omega"}
-"""Other names of columns, in small letters."""
-
-UNITS = {
-    "t": ("s",),
-    **dict.fromkeys(("vx", "vy"), ("m/s",)),
-    "omega": ("rad/s", "1/s"),
-    **dict.fromkeys(("x", "y"), ("m",)),
-    "theta": ("rad",),
-    **dict.fromkeys(("fx", "fy", "normal_force"), ("n",)),
-    "tau": ("nm", "n*m", "n.m", "n·m"),
-}
-"""Units that may stand in brackets behind a name, in small letters and without spaces."""
 
 AT_ONCE = 50_000
 """Number of samples that are differentiated together."""
@@ -181,7 +168,8 @@ class Log(ByValue):
 
         Other columns and lines that begin with # are ignored, but for a theta of numbers beside the twist, which shows
         if that is `held`. `time` and `fn` are accepted for t and normal_force, capital letters for small ones, and
-        semicolons and tabs for commas. `normal_force` [N] replaces a missing column of that name; `window` is that of
+        semicolons and tabs for commas; Fz, Mz, Tz and the names of ROS (wrench.force.x) too; units may stand below the
+        names. `normal_force` [N] replaces a missing column of that name; `window` is that of
         `from_motion`. If columns are named `contact.vx`, as in the files of `planarfriction run`, those of `contact`
         are read, or those of the only contact.
 
@@ -266,10 +254,10 @@ def increasing(time: ArrayLike, name: str = "time", at_least: int = 0) -> np.nda
     result = validation.array("time", time, (None,))
     if len(result) < at_least:
         raise InvalidValueError(name, f"hold at least {at_least} samples", f"{len(result)}")
-    steps = np.diff(result)
-    if not (steps > 0.0).all():
-        row = int(np.argmax(steps <= 0.0)) + 1
-        raise InvalidValueError(name, "increase", f"{result[row]:g} after {result[row - 1]:g} s")
+    falls = np.flatnonzero(np.diff(result) <= 0.0).tolist()
+    if falls:
+        before, after = result[falls[0] : falls[0] + 2].tolist()
+        raise InvalidValueError(name, "increase", f"{after} after {before} s in sample {falls[0] + 2}")
     return result
 
 
@@ -370,8 +358,7 @@ def _named(path: Path, headings: Sequence[str]) -> dict[str, str]:
     """Map names of columns to headings; an alias counts only where the name itself is missing."""
     named: dict[str, str] = {}
     for heading in headings:
-        prefix, dot, name = _parts(heading)[0].rpartition(".")
-        name = prefix + dot + name.lower()
+        name = column_name(_parts(heading)[0])
         if name in named:
             raise FileError(f"{path}: columns {shown(repr(named[name]))} and {shown(repr(heading))} are the same")
         if name:

@@ -9,6 +9,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.identify.checks import check_slides
 from planarfriction.identify.parameters import check_names, fitted_law, scaled_patch
 from planarfriction.identify.problem import Problem
 from planarfriction.identify.result import Identification
@@ -112,7 +113,7 @@ def identify_motion(
     Raises
     ------
     InvalidValueError
-        A parameter breaks its rule.
+        A parameter breaks its rule; times in ms, places in mm or angles in deg; a tracker that froze.
     IdentificationInterrupted
         Ctrl-C, with the best values so far.
     """
@@ -126,6 +127,7 @@ def identify_motion(
     if samples is not None:
         samples = validation.count("samples", samples, at_least=5)
     robust = validation.choice("loss", loss, ("robust", "squares")) == "robust"
+    check_slides(slides, patch, body)
     strange = contradictions(slides, body) if robust else {}
     left_out = [Verdict("fit", True, f"{slides[i].name} is left out: {why}") for i, why in strange.items()]
     slides = tuple(slide for i, slide in enumerate(slides) if i not in strange)

@@ -196,19 +196,26 @@ def as_slides(slides: Slide | Sequence[Slide]) -> tuple[Slide, ...]:
 
 def speeds(slide: Slide, body: SlidingBody) -> tuple[np.ndarray, np.ndarray, float]:
     """Compute middle times of windows, speeds `sqrt(v^2 + I omega^2/m)` in them, and the sigma of their noise."""
-    count = max(len(slide.time) // WINDOW, 1)
     scale = np.array([1.0, 1.0, np.sqrt(body.inertia / body.mass)])
-    times, found, left = [], [], []
-    for rows in np.array_split(np.arange(len(slide.time)), count):
-        since = slide.time[rows] - slide.time[rows].mean()
-        poses = slide.pose[rows] * scale
-        fit = np.polynomial.polynomial.polyfit(since, poses, 2 if len(rows) > 4 else 1)
-        left.append(poses - np.polynomial.polynomial.polyval(since, fit).T)
-        times.append(slide.time[rows].mean())
-        found.append(np.linalg.norm(fit[1]))
+    times, twists, left = window_twists(slide)
     length = np.median(np.diff(slide.time)) * WINDOW
-    sigma = np.std(np.concatenate(left)) * np.sqrt(12.0 / WINDOW) / length
-    return np.array(times), np.array(found), float(sigma)
+    sigma = np.std(left * scale) * np.sqrt(12.0 / WINDOW) / length
+    return times, np.linalg.norm(twists * scale, axis=1), float(sigma)
+
+
+def window_twists(slide: Slide) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Compute middle times `[W]` of windows, twists `[W, 3]` in them (world axes), and residuals of all poses `[T, 3]`.
+
+    The twist of a window is the slope of a parabola through its poses.
+    """
+    times, twists, left = [], [], []
+    for rows in np.array_split(np.arange(len(slide.time)), max(len(slide.time) // WINDOW, 1)):
+        since = slide.time[rows] - slide.time[rows].mean()
+        fit = np.polynomial.polynomial.polyfit(since, slide.pose[rows], 2 if len(rows) > 4 else 1)
+        left.append(slide.pose[rows] - np.polynomial.polynomial.polyval(since, fit).T)
+        times.append(slide.time[rows].mean())
+        twists.append(fit[1])
+    return np.array(times), np.array(twists), np.concatenate(left)
 
 
 def contradictions(slides: Sequence[Slide], body: SlidingBody) -> dict[int, str]:

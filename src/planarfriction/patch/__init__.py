@@ -4,9 +4,10 @@ from planarfriction.families import PUBLISHED_PATCHES, SHAPES
 from planarfriction.patch.contact_patch import ContactPatch
 from planarfriction.patch.grid import Grid
 from planarfriction.patch.grid_error import GridError
+from planarfriction.patch.map_files import MapReading, read_pressure_map
 from planarfriction.patch.metric import friction_metric
 from planarfriction.patch.pressure import LinearGradient, PerCell, Pressure, SoftFinger, Uniform
-from planarfriction.patch.pressure_maps import PressureMaps, read_pressure_map
+from planarfriction.patch.pressure_maps import PressureMaps
 
 __all__ = [
     "PUBLISHED_PATCHES",
@@ -15,6 +16,7 @@ __all__ = [
     "Grid",
     "GridError",
     "LinearGradient",
+    "MapReading",
     "PerCell",
     "Pressure",
     "PressureMaps",

@@ -25,7 +25,7 @@ from planarfriction.patch.pressure import (
     evaluated,
     pressure_array,
 )
-from planarfriction.patch.pressure_maps import read_maps
+from planarfriction.patch.pressure_maps import map_grid, read_maps
 from planarfriction.patch.tilt import weights_under
 from planarfriction.pictures import picture
 
@@ -252,23 +252,23 @@ class ContactPatch(Moments):
 
     @classmethod
     def from_pressure(
-        cls, pressure: Any, cell_size: float | Sequence[float], *, loads: Any = None, name: str | None = None
-    ) -> ContactPatch:
-        """Return a patch from a pressure map: an array `[rows, columns]`, or the path of a CSV, NPY or grey image file.
+        cls, pressure: Any, cell_size: Any = None, *, width: Any = None, loads: Any = None, name: str | None = None,
+        **reading: Any,
+    ) -> ContactPatch:  # fmt: skip
+        """Return a patch from a pressure map: an array `[rows, columns]`, or the path of a file (`read_pressure_map`).
 
         **Row 0 is the top** (largest y), column 0 the left; the middle of the map is the origin. `cell_size` [m] is the
-        side of a cell or `(width, height)`. Only ratios of the pressures matter. Cells without pressure are dropped.
+        side of a cell or `(width, height)`, or `width` [m] that of the whole map, of square cells. Only ratios of the
+        pressures matter. Cells without pressure are dropped. `reading` are the options of `MapReading`: header, index,
+        frame_shape, frame, threshold, invert.
 
         For maps measured at several loads, give a mapping `{load [N]: map}`, or a list of maps (a stack `[L, rows,
         columns]`) with their `loads` `[L]`; see `PressureMaps`. Raises FileError or InvalidValueError otherwise.
         """
-        law, (rows, columns), file = read_maps(pressure, loads)
-        size = validation.numbers("cell_size", cell_size)
-        size = validation.array("cell_size", size, (2,) if size.ndim else ())
-        width, height = np.broadcast_to([validation.length("cell_size", side) for side in size.flat], 2)
-        grid = Grid.around_origin(columns * width, rows * height, columns, rows)
+        law, shape, file = read_maps(pressure, loads, **reading)
+        grid = map_grid(*shape, cell_size, width)
         name = (file or "pressure map") if name is None else name
-        return cls(grid.centres(), np.full(rows * columns, grid.cell_area), law, grid, name)
+        return cls(grid.centres(), np.full(grid.rows * grid.columns, grid.cell_area), law, grid, name)
 
     def refined(self, parts: int) -> ContactPatch:
         """Return the same patch with every cell divided into `parts` x `parts` (a cell of a line into `parts`).

@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import functools
-import io
-import math
-import warnings
-from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,98 +12,15 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.equality import ByValue
-from planarfriction.errors import FileError, FrictionError, InvalidValueError, shown
-from planarfriction.patch.grid import MOST_CELLS
+from planarfriction.errors import InvalidValueError
+from planarfriction.patch.grid import Grid
+from planarfriction.patch.map_files import MapReading, map_reading, read_pressure_map
 from planarfriction.patch.pressure import Pressure, check_not_negative, pressure_array
-from planarfriction.reading import number, read_bytes, read_rows
-
-IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".pgm", ".jpg", ".jpeg")
-"""Suffixes of the files that are read as grey images."""
-
-MOST_BYTES = 256_000_000
-"""Largest file of a map that is read."""
-
-GREY_MODES = ("1", "L", "I", "F", "I;16", "I;16B", "I;16L", "I;16N")
-"""Pillow's names for images with one channel of numbers."""
-
-
-def read_pressure_map(path: str | Path) -> np.ndarray:
-    """Read a map of relative pressures, shape `[rows, columns]`, row 0 at the top.
-
-    The suffix determines the format: `.csv` (numbers separated by commas, no header, lines that begin with # are
-    skipped), `.npy` (a two-dimensional array), or a grey image (brightness is pressure, black is none).
-
-    Raises
-    ------
-    FileError
-        The file is missing, of an unknown format, or does not contain what its suffix says.
-    """
-    path = validation.path("path", path)
-    readers = {".csv": _read_csv, ".npy": _read_npy, **dict.fromkeys(IMAGE_SUFFIXES, _read_image)}
-    reader = readers.get(path.suffix.lower())
-    if reader is None:
-        kinds = ", ".join(IMAGE_SUFFIXES)
-        raise FileError(f"pressure map {path}: unknown kind {path.suffix!r}, use .csv, .npy or a grey image ({kinds})")
-    try:
-        with np.errstate(all="ignore"):  # what is no number, or too large for a float, no patch takes
-            return reader(path)
-    except FrictionError:
-        raise
-    # Pillow reports a broken PNG as SyntaxError, and other things as what they are in its own code.
-    except Exception as error:
-        reason = shown(" ".join(str(error).split())) or type(error).__name__
-        raise FileError(f"pressure map {path}: not a readable {path.suffix.lower()} file ({reason})") from None
 
 
 def title(path: str | Path) -> str:
     """Return the name of the patch of a map: that of its file, with ? for what cannot be printed."""
     return "".join(each if each.isprintable() else "?" for each in Path(path).stem).strip() or "map"
-
-
-def _read_csv(path: Path) -> np.ndarray:
-    values, width = array("d"), 0
-    for line, cells in read_rows(path, "a pressure map"):
-        width = width or len(cells)
-        if len(cells) != width:
-            raise FileError(f"pressure map {path}: line {line} has {len(cells)} values, the first row has {width}")
-        values.extend(number(f"pressure map {path}", line, f"value {i}", cell) for i, cell in enumerate(cells, 1))
-        _check_size(path, len(values))
-    if not values:
-        raise FileError(f"pressure map {path}: the file holds no numbers")
-    return np.array(values).reshape(-1, width)
-
-
-def _read_npy(path: Path) -> np.ndarray:
-    content = io.BytesIO(read_bytes(path, "a pressure map", MOST_BYTES))
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")  # of a damaged header, which NumPy reads as source code
-        values = np.load(content, allow_pickle=False)
-    if not isinstance(values, np.ndarray) or values.dtype.kind not in "biuf":
-        raise FileError(f"pressure map {path}: the file must hold one array of real numbers")
-    _check_size(path, values.size)
-    return values.astype(float)
-
-
-def _read_image(path: Path) -> np.ndarray:
-    from PIL import Image
-
-    with warnings.catch_warnings(), Image.open(io.BytesIO(read_bytes(path, "a pressure map", MOST_BYTES))) as image:
-        warnings.simplefilter("error", Image.DecompressionBombWarning)
-        _check_size(path, math.prod(image.size))
-        if image.mode in GREY_MODES:
-            return np.asarray(image, dtype=float)
-        red, green, blue, alpha = np.moveaxis(np.asarray(image.convert("RGBA"), dtype=float), -1, 0)
-    if not ((red == green).all() and (red == blue).all()):
-        raise FileError(f"pressure map {path}: this is a colour image; brightness means pressure only in a grey image")
-    if not (alpha == 255).all():
-        raise FileError(f"pressure map {path}: the image is partly transparent; save it without transparency")
-    return red
-
-
-def _check_size(path: Path, cells: int) -> None:
-    """Raise, before memory is asked for, where a map has more cells than a patch may have."""
-    if cells > MOST_CELLS:
-        raise FileError(f"pressure map {path}: has more than {MOST_CELLS} cells, the maximum for a patch")
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,18 +95,20 @@ class PressureMaps(ByValue, Pressure):
         return {"law": self.law, "loads": self.loads.tolist(), "values": self.values.tolist()}
 
 
-def read_maps(pressure: Any, loads: Any = None) -> tuple[Any, tuple[int, int], str | None]:
+def read_maps(pressure: Any, loads: Any = None, **options: Any) -> tuple[Any, tuple[int, int], str | None]:
     """Return the pressure law or numbers, `(rows, columns)` and the name of one map, or of several with `loads` [N].
 
     A map is an array `[rows, columns]` or the path of a file; several are a stack, a list, or a mapping by load.
+    `options` are those of `MapReading`.
     """
+    reading = map_reading(options)
     if isinstance(pressure, Mapping):
         if loads is not None:
             raise InvalidValueError("loads", "be left out, because the mapping has them", loads)
         loads = sorted(pressure, key=lambda load: validation.positive("load of a pressure map", load))
         pressure = [pressure[load] for load in loads]
     if loads is None:
-        values, name = _one_map(pressure)
+        values, name = _one_map(pressure, reading)
         if not values.any():
             raise InvalidValueError(_what(pressure), "have a total > 0", "0")
         return values.ravel(), values.shape, name
@@ -201,7 +116,7 @@ def read_maps(pressure: Any, loads: Any = None) -> tuple[Any, tuple[int, int], s
     count = 1 if isinstance(pressure, (str, Path)) or not hasattr(pressure, "__len__") else len(pressure)
     if count != len(loads) or isinstance(pressure, (str, Path)):
         raise InvalidValueError("pressure", f"have one map for each of {len(loads)} loads", count)
-    maps = [_one_map(each) for each in pressure]
+    maps = [_one_map(each, reading) for each in pressure]
     shape = maps[0][0].shape if maps else (0, 0)
     for each, (values, _) in zip(pressure, maps, strict=True):
         if values.shape != shape:
@@ -210,13 +125,29 @@ def read_maps(pressure: Any, loads: Any = None) -> tuple[Any, tuple[int, int], s
     return PressureMaps(loads, stack if stack else np.empty((0, 0))), shape, maps[0][1]
 
 
+def map_grid(rows: int, columns: int, cell_size: Any, width: Any) -> Grid:
+    """Return the grid of a map: `cell_size` [m] is the side of a cell or `(width, height)`, or `width` that of the map.
+
+    Raises InvalidValueError unless one of both is given, and > 0.
+    """
+    if (cell_size is None) == (width is None):
+        raise InvalidValueError("cell_size", "be given, or else the width of the whole map", cell_size)
+    cell_size = validation.length("width", width) / columns if cell_size is None else cell_size
+    size = validation.numbers("cell_size", cell_size)
+    size = validation.array("cell_size", size, (2,) if size.ndim else ())
+    width, height = np.broadcast_to([validation.length("cell_size", side) for side in size.flat], 2)
+    return Grid.around_origin(columns * width, rows * height, columns, rows)
+
+
 def _what(pressure: Any) -> str:
     return f"pressure map {pressure}" if isinstance(pressure, (str, Path)) else "pressure"
 
 
-def _one_map(pressure: Any) -> tuple[np.ndarray, str | None]:
+def _one_map(pressure: Any, reading: MapReading) -> tuple[np.ndarray, str | None]:
     """Return the values `[rows, columns]` of an array or a file, and the name of the file."""
-    named = isinstance(pressure, (str, Path))
-    values = read_pressure_map(pressure) if named else pressure
+    if isinstance(pressure, (str, Path)):
+        values, name = read_pressure_map(pressure, **vars(reading)), title(pressure)
+    else:
+        values, name = reading.frame_of("pressure", pressure) if isinstance(pressure, np.ndarray) else pressure, None
     values = check_not_negative(_what(pressure), pressure_array(_what(pressure), values, (None, None)))
-    return values, title(pressure) if named else None
+    return values if name else reading.pressures("pressure", values), name

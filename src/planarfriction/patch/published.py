@@ -82,9 +82,13 @@ def _masked(blocks: list[tuple[slice, slice]], cells: int, width: float, name: s
 
 
 def pressure_map(
-    cell_size: Any, file: Any = None, files: Any = None, values: Any = None, loads: Any = None, name: str | None = None
-) -> ContactPatch:
+    cell_size: Any = None, width: Any = None, file: Any = None, files: Any = None, values: Any = None,
+    loads: Any = None, name: str | None = None, *, header: Any = None, index: Any = None, frame_shape: Any = None,
+    frame: Any = None, threshold: Any = None, invert: Any = None,
+) -> ContactPatch:  # fmt: skip
     """Return the patch of one map (a file or its values, rows from the top), or of several with their loads [N].
+
+    The other options are those of `ContactPatch.from_pressure`.
 
     Raises `InvalidValueError` unless exactly one of `file`, `files` and `values` is given.
     """
@@ -94,7 +98,9 @@ def pressure_map(
         raise InvalidValueError("pressure map", rule, " and ".join(given) or "none of them")
     if files is not None and loads is None:
         raise InvalidValueError("loads", "be given: the normal force of each of the files", "none")
-    return ContactPatch.from_pressure(next(iter(given.values())), cell_size, loads=loads, name=name)
+    reading = {"header": header, "index": index, "frame_shape": frame_shape, "frame": frame, "threshold": threshold}
+    options = {"width": width, "loads": loads, "name": name, "invert": invert, **reading}
+    return ContactPatch.from_pressure(next(iter(given.values())), cell_size, **options)
 
 
 def published(name: str, cells: Any = None, width: Any = None) -> ContactPatch:

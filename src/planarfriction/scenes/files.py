@@ -103,10 +103,8 @@ def parts_of_scene(
     contacts = _contacts(table)
     options = {key: table.get(key) for key in _OPTIONS if key in table}
     signals = {key: read_signal(table, key) for key in ("force", "velocity") if key in table}
-    # A body that is moved as prescribed needs no mass; whoever leaves it out does not mean to say anything about it.
-    moved = {"mass": 1.0, "inertia": 1.0, "gravity": [0.0, 0.0]}
     prescribed = "velocity" in table and "body" not in table
-    body = _body(table.section("body", moved) if prescribed else table.section("body"))
+    body = None if prescribed else _body(table.section("body"))
     return table, {"body": body, "contacts": contacts, "t_end": table.get("t_end"), **signals, **options}
 
 

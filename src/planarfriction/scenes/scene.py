@@ -55,7 +55,7 @@ class Scene(ByValue):
     """
 
     body: Body = checked(_body)
-    """The body that moves."""
+    """The body that moves; None: one without weight, moved as `velocity` prescribes."""
     contacts: Sequence[Contact] = checked(_contacts)
     """The contacts it slides on, at least one."""
     t_end: float = checked(validation.positive)
@@ -87,7 +87,7 @@ class Scene(ByValue):
 
         def __init__(
             self,
-            body: Body,
+            body: Body | None,
             contacts: Contact | Sequence[Contact],
             t_end: float,
             force: Signal | ArrayLike | None = None,
@@ -101,6 +101,8 @@ class Scene(ByValue):
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        if self.body is None and self.velocity is not None:
+            self._set(body=Body(1.0, 1.0, gravity=(0.0, 0.0)))
         super().__post_init__()
         if self.velocity is not None:
             for name in ("force", "stop_speed"):

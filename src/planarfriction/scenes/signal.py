@@ -86,7 +86,7 @@ class Signal(ByValue):
             i = int(np.argmax(steps <= 0.0))
             kind = "a duplicate" if steps[i] == 0.0 else "unsorted"
             raise InvalidValueError(
-                "times", "increase", f"{times[i]:g} s, then {times[i + 1]:g} s at index {i + 1} ({kind})"
+                "times", "increase", f"{times[i]:.15g} s, then {times[i + 1]:.15g} s at index {i + 1} ({kind})"
             )
         validation.choice("hold", self.hold, ("previous", "linear"))
         times.setflags(write=False)
