@@ -18,7 +18,7 @@ from planarfriction.kernels.cell_blocks import divided
 from planarfriction.kernels.law import LAW
 from planarfriction.kernels.published_rollouts import gradient, rollout, sensitivities, tangent
 from planarfriction.kernels.rollouts import Inputs
-from planarfriction.laws.base import is_rate_law, refuse_fixed_stiffness
+from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModelPublished
 from planarfriction.models.reduced_published import PublishedShape, axes_of
 
@@ -125,6 +125,8 @@ class Packed(NamedTuple):
     """Symmetric `[3, 3]`, or None: twists go in through it, wrenches come out."""
     inner: tuple[int, ...] = (3,)
     """Shape of the state of one contact."""
+    reference: float = 0.0
+    """Reference load [N] of a law whose stiffness does not grow with the load; 0 of others."""
 
     def turned(self, vectors: np.ndarray) -> np.ndarray:
         """Turn twists into the axes of the compiled loops, or wrenches out of them, `[..., 3]`."""
@@ -169,7 +171,6 @@ def _family(model: Any) -> Family:
     model = getattr(model, "reduction", model)
     if isinstance(model, ReducedModelPublished):
         return PUBLISHED
-    refuse_fixed_stiffness(getattr(model, "law", None), "compiled roll-outs")
     if isinstance(model, DistributedModel) and not (is_rate_law(model.law) or model.patch.asymmetric):
         families = (DISCS, TURNED_DISCS) if model.patch.has_discs else (CELLS, TURNED_CELLS)
         return families[model.patch.anisotropic]
@@ -207,7 +208,7 @@ def _packed(model: Any) -> Packed:
     if isinstance(model, DistributedModel):
         at_loads = model.compiled.at_loads
         shapes = at_loads if model.depends_on_load else at_loads(np.ones(1), False)
-        return Packed(family, np.array(law), shapes, inner=model.state_shape)
+        return Packed(family, np.array(law), shapes, inner=model.state_shape, reference=model.compiled.reference)
     return pack_shape(law, model.shape_at(1.0))
 
 
