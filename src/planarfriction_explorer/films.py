@@ -11,7 +11,7 @@ from typing import NamedTuple
 from planarfriction.families import MODELS, SCENES
 from planarfriction.plots import plot_histories
 from planarfriction.scenes import Scene, simulate
-from planarfriction.scenes.files import read_table, scene_from_dict
+from planarfriction.scenes.files import read_table
 from planarfriction_explorer.drawing import as_file, plain_name
 from planarfriction_explorer.state import State
 
@@ -49,7 +49,7 @@ def read_scene(name: str, content: bytes) -> Scene:
     name = plain_name(name)
     with as_file(name, content) as path:
         table = read_table(path)
-    return scene_from_dict(table, folder=Path.cwd(), source=name)
+    return Scene.from_dict(table, Path.cwd(), name)
 
 
 class Watched(NamedTuple):

@@ -135,6 +135,29 @@ def _upward_imports(sources: list[tuple[str, ast.AST]]) -> list[str]:
     return found
 
 
+def _circle(sources: list[tuple[str, ast.AST]]) -> list[str]:
+    """Modules that import each other in a circle, also inside functions; packages themselves do not count."""
+    names = {module for module, _ in sources}
+    packages = {module.rpartition(".")[0] for module in names}
+    imports = {}
+    for module, tree in sources:
+        seen = {target if target in names else target.rpartition(".")[0] for target in _imports(tree, nested=True)}
+        imports[module] = (seen & names) - packages - {module}
+    while leaves := {module for module in imports if not imports[module] & set(imports)}:
+        imports = {module: seen for module, seen in imports.items() if module not in leaves}
+    return sorted(imports)
+
+
+def test_no_modules_import_each_other():
+    assert _circle([each for each in _sources() if not each[0].startswith(EXPLORER)]) == []
+
+
+def test_a_circle_is_found():
+    first = ("planarfriction.geometry", ast.parse("def f():\n    from planarfriction.errors import FrictionError"))
+    second = ("planarfriction.errors", ast.parse("from planarfriction import geometry"))
+    assert _circle([first, second]) == [second[0], first[0]]
+
+
 def test_every_module_has_a_floor():
     floors = _floors()
     for module, _ in _sources():

@@ -9,9 +9,9 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import friction_filter
 from planarfriction.online import FrictionObserver, Hinge, Hold, Measurement, SlideBy, TurnBy
 from planarfriction.online.controllers import trapezoid
+from planarfriction.online.loops import friction_filter
 from planarfriction_studies.rig import Gripper, Parts
 from planarfriction_studies.rig.trials import known_model, random_parts, trial
 

@@ -13,9 +13,9 @@ from numba import njit
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import friction_filter as kernels
-from planarfriction.kernels import square_root
 from planarfriction.online import FrictionObserver, Measurement, Sensors
+from planarfriction.online.loops import friction_filter as kernels
+from planarfriction.online.loops import square_root
 from planarfriction_studies.rig import Gripper, Parts
 
 LAW = pf.LuGre(mu_c=0.5, mu_s=0.55, v_s=2e-3, sigma_2=0.1)

@@ -8,7 +8,7 @@ from typing import Any
 import planarfriction as pf
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.scenes.files import read_table, scene_from_dict
+from planarfriction.scenes.files import read_table
 from planarfriction.scenes.model_files import model_from_dict
 from planarfriction.scenes.section import Section
 
@@ -24,7 +24,7 @@ def read_model(file: Path, contact: str | None) -> Any:
         if contact is not None:
             raise InvalidValueError("--contact", "be given only for a scene", contact)
         return model_from_dict(Section(table, "", str(file), file.parent).only(["model", "patch", "law"]))
-    models = {each.name: each.model for each in scene_from_dict(table, folder=file.parent, source=str(file)).contacts}
+    models = {each.name: each.model for each in pf.Scene.from_dict(table, file.parent, str(file)).contacts}
     if contact is None:
         first, *others = models.values()
         if any(each != first for each in others):

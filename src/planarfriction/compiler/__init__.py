@@ -8,13 +8,23 @@ from pathlib import Path
 from typing import Any
 
 from numba import njit
+from numba.core.compiler import Compiler
 from numba.extending import register_jitable
 
 from planarfriction import formulas
-from planarfriction.compiler.inner import Inner
-from planarfriction.compiler.machine_code import Sources, kept
+from planarfriction.compiler.internals import part
+from planarfriction.compiler.sources import Sources
 
-FOLDERS = ("compiler", "kernels", "limit_surface/loops", "adapters/mujoco/loops")
+Inner: Any = part("planarfriction.compiler.inner", "Inner", Compiler)
+"""Numba's compiler for inner functions, or its own for all."""
+
+kept: Any = part("planarfriction.compiler.machine_code", "kept", lambda dispatcher, sources: dispatcher)
+"""Function that keeps what a dispatcher compiles on disk, as far as Numba lets it."""
+
+missing: Any = part("planarfriction.compiler.machine_code", "missing", lambda dispatcher, signature: False)
+"""Function that tells if something has yet to be compiled that can be kept on disk."""
+
+FOLDERS = ("compiler", "kernels", "limit_surface/loops", "online/loops", "adapters/mujoco/loops")
 """Folders of the package with compiled code; a compiled function of the package stands in one of them."""
 
 

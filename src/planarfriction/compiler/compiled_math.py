@@ -11,9 +11,10 @@ from __future__ import annotations
 
 from llvmlite import ir
 from numba import njit, types
+from numba.core.compiler import Compiler
 from numba.extending import intrinsic
 
-from planarfriction.compiler.inner import Inner
+from planarfriction.compiler.internals import part
 from planarfriction.formulas import LARGEST
 
 # Not `reassoc`: the two-part constants of the argument reductions rely on the order of operations.
@@ -21,7 +22,7 @@ _inline = njit(
     error_model="numpy",
     fastmath={"contract"},
     forceinline=True,
-    pipeline_class=Inner,
+    pipeline_class=part("planarfriction.compiler.inner", "Inner", Compiler),
     _nrt=False,
     no_cpython_wrapper=True,
     no_cfunc_wrapper=True,

@@ -11,27 +11,31 @@ import ctypes
 from typing import Any
 
 from numba import _dynfunc
-from numba.core import typed_passes, untyped_passes
+from numba.core import typed_passes
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, register_pass
 
-_NEEDLESS = frozenset(
-    (
-        untyped_passes.WithLifting,
-        untyped_passes.InlineClosureLikes,
-        untyped_passes.MakeFunctionToJitFunction,
-        untyped_passes.InlineInlinables,
-        untyped_passes.FindLiterallyCalls,
-        untyped_passes.LiteralUnroll,
-        untyped_passes.LiteralPropagationSubPipelinePass,
-        untyped_passes.RewriteSemanticConstants,
-        typed_passes.InlineOverloads,
-        typed_passes.NopythonRewrites,
-        typed_passes.NoPythonSupportedFeatureValidation,
-        typed_passes.DumpParforDiagnostics,
-    )
-)
+from planarfriction.compiler.internals import need
+
+need(_dynfunc, "make_function")
+need(JITCodeLibrary, "_optimize_final_module", "_finalize_final_module", "_finalize_dynamic_globals")
+need(typed_passes, "NativeLowering")
+
+_NEEDLESS = {
+    "WithLifting",
+    "InlineClosureLikes",
+    "MakeFunctionToJitFunction",
+    "InlineInlinables",
+    "FindLiterallyCalls",
+    "LiteralUnroll",
+    "LiteralPropagationSubPipelinePass",
+    "RewriteSemanticConstants",
+    "InlineOverloads",
+    "NopythonRewrites",
+    "NoPythonSupportedFeatureValidation",
+    "DumpParforDiagnostics",
+}
 """Passes of Numba for what inner functions do not contain: closures, `with`, expressions of arrays, parallel loops."""
 
 
@@ -77,7 +81,7 @@ class Inner(CompilerBase):
         """Return Numba's passes without those that find nothing here, and with another lowering."""
         passes = PassManager("inner")
         for each, words in DefaultPassBuilder.define_nopython_pipeline(self.state).passes:
-            if each not in _NEEDLESS:
+            if each.__name__ not in _NEEDLESS:
                 passes.add_pass(_Lowering if each is typed_passes.NativeLowering else each, words)
         passes.finalize()
         return [passes]

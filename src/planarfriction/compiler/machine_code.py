@@ -13,16 +13,12 @@ import hashlib
 import os
 import pickle
 import shutil
-import sys
 import warnings
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import llvmlite
-import numba
-import numpy as np
 from numba.core import config
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
@@ -31,9 +27,13 @@ from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 from numba.misc.appdirs import AppDirs
 
-from planarfriction.compiler.interrupts import heard_between_passes
+from planarfriction.compiler.internals import need, part
+from planarfriction.compiler.sources import Sources, digest_of
 from planarfriction.compiler.together import wait_for
 from planarfriction.writing import replacing
+
+need(CompileResult, "_reduce", "_rebuild")
+heard_between_passes = part("planarfriction.compiler.interrupts", "heard_between_passes", contextlib.nullcontext)
 
 _SETTINGS = ("OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "USING_SVML")
 """Settings of Numba that change machine code; the processor and its features are in the key of the target."""
@@ -45,35 +45,12 @@ _SEAL = 36
 """Length [bytes] of the beginning of a file that certifies its origin and its content."""
 
 
-class Sources:
-    """Files of a package whose functions any function of it may call, as they were when they were imported."""
-
-    def __init__(self, root: Path, files: Iterable[Path]):
-        self.root, self.files = root, sorted(files)
-        self.digest = self._digest_now()
-
-    def _digest_now(self) -> str | None:
-        versions = (numba.__version__, llvmlite.__version__, np.__version__, sys.implementation.cache_tag)
-        parts = [repr(versions), *((self.name_of(file), _digest_of(file)) for file in self.files)]
-        if not all(map(all, parts[1:])):  # inside an archive, or installed without its sources
-            return None
-        return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
-
-    def name_of(self, file: Path) -> str:
-        """Return the name of one of the files within the package, which is the same wherever it is installed."""
-        return file.relative_to(self.root).as_posix() if file in self.files else str(file)
-
-    def unchanged(self) -> bool:
-        """Return True if no source file changed since import."""
-        return self.digest is not None and self.digest == self._digest_now()
-
-
 def kept(dispatcher: Any, sources: Sources) -> Any:
     """Let a function that Numba compiles keep its machine code on disk and hear Ctrl-C while it compiles."""
     if config.DISABLE_JIT:
         return dispatcher
     function = dispatcher.py_func
-    own = _digest_of(Path(function.__code__.co_filename))
+    own = digest_of(Path(function.__code__.co_filename))
     if own is not None and sources.digest is not None and function.__closure__ is None:
         dispatcher._cache = MachineCode(function, own, sources)
     compile_deaf = dispatcher.compile
@@ -103,13 +80,6 @@ def folders(sources: Sources) -> Iterator[Path]:
         user = Path(AppDirs("planarfriction", appauthor=False).user_cache_dir)
         places = [sources.root / "__pycache__", *([user] if user.is_absolute() else [])]
     return (place / f"planarfriction-{sources.digest}" for place in places)
-
-
-def _digest_of(file: Path) -> str | None:
-    try:
-        return hashlib.sha256(file.read_bytes()).hexdigest()
-    except OSError:  # typed into a prompt
-        return None
 
 
 class MachineCode(NullCache):

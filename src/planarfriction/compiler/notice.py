@@ -8,7 +8,10 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
-from numba.core import event
+from planarfriction.compiler.internals import part
+
+Listener: Any = part("numba.core.event", "Listener", object)
+listening: Any = part("numba.core.event", "install_listener", lambda kind, listener: contextlib.nullcontext())
 
 _LINE = "planarfriction compiles its solver, once after installation (planarfriction.warm_up() does all of it ahead)"
 
@@ -19,7 +22,7 @@ def watched() -> bool:
     return alone and ("ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty()))
 
 
-class _Said(event.Listener):
+class _Said(Listener):
     """Listener that says it when the first function is compiled; what is read from the cache needs no words."""
 
     done = False
@@ -44,5 +47,5 @@ def said_when_compiling(silent: bool = False) -> Iterator[None]:
     if silent or _Said.done or not watched():
         yield
     else:
-        with event.install_listener("numba:compile", _Said()):
+        with listening("numba:compile", _Said()):
             yield

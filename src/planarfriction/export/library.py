@@ -19,9 +19,10 @@ from planarfriction.export.loops import Loops
 from planarfriction.export.pieces import Pieces, pieces_of
 from planarfriction.export.slip import Slip, samples_of, slip_of
 from planarfriction.formulas import LARGEST
-from planarfriction.kernels import friction_filter, grips, tilt
+from planarfriction.kernels import tilt
 from planarfriction.kernels.surfaces import CELLS
 from planarfriction.limit_surface.loops.twists import MOST_TRIALS
+from planarfriction.online.loops import friction_filter, grips
 
 CONTROLLERS = (grips.hold,)
 """Loops of controllers that have source."""

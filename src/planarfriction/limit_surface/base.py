@@ -254,6 +254,8 @@ class LimitSurface(ByValue):
         """
         from planarfriction.limit_surface import comparison
 
+        if not isinstance(reference, LimitSurface):
+            raise InvalidValueError("reference", "be a limit surface", reference)
         return comparison.compare(self, reference, samples)
 
     # ------------------------------------------------------------------ scaled coordinates

@@ -10,7 +10,6 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.described import described
-from planarfriction.errors import InvalidValueError
 
 MOST_SAMPLES = 10_000
 """Directions at which surfaces are compared, in seconds: beyond them the figures hardly change any more."""
@@ -73,10 +72,6 @@ def directions(count: int) -> np.ndarray:
 
 def compare(surface: LimitSurface, reference: LimitSurface, samples: int) -> SurfaceComparison:
     """Implement `LimitSurface.compare`."""
-    from planarfriction.limit_surface.base import LimitSurface
-
-    if not isinstance(reference, LimitSurface):
-        raise InvalidValueError("reference", "be a limit surface", reference)
     units = directions(validation.count("samples", samples, 2, MOST_SAMPLES))
     frame = reference._frame()  # V_S = frame V, and so W = frame' W_S
     twists, wrenches = np.linalg.solve(frame, units.T).T, units @ frame

@@ -8,10 +8,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from planarfriction.kernels import surfaces
 from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers, _norm
 from planarfriction.limit_surface.cells import LimitSurfaceCells
 from planarfriction.limit_surface.loops import closed_forms as kernels
 from planarfriction.limit_surface.loops.twists import exact_twists
+from planarfriction.limit_surface.stored import stored_potential
 from planarfriction.patch import SoftFinger, Uniform
 from planarfriction.patch.outline import PolygonOutline, RoundOutline
 
@@ -129,10 +131,9 @@ class LimitSurfaceExact(LimitSurface):
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
-        """Numbers of `LimitSurfaceTable`, with the mixed derivatives at its nodes."""
-        from planarfriction.limit_surface.table import LimitSurfaceTable
-
-        return LimitSurfaceTable(self.patch, self.segments, normal_force=self.normal_force).numbers
+        """Numbers at the nodes: the potential and its derivatives along both angles and mixed; the force of a spin."""
+        data = stored_potential(lambda units: self.sums(units, STORED_RULES), self.segments)
+        return SurfaceNumbers(surfaces.POTENTIAL, self.segments, data)
 
     @functools.cached_property
     def centre_of_pressure(self) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import grips
+from planarfriction.online.loops import grips
 from planarfriction.online.observer import Estimate, FrictionObserver, estimate_of
 from planarfriction.online.sensors import GRAVITY, Measurement
 
@@ -22,7 +22,7 @@ class GripController:
     """Base of the controllers: an observer, and the load of the part that it sees.
 
     `state` `[...]`, of the shape of the observer's batch, is all that changes beside the observer's: a copy of both is
-    a checkpoint. Its fields are those of `planarfriction.kernels.grips.STATE`.
+    a checkpoint. Its fields are those of `planarfriction.online.loops.grips.STATE`.
     """
 
     def __init__(self, observer: FrictionObserver, grip: Any, *settings: float, most: float) -> None:

@@ -10,10 +10,10 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import friction_filter as kernels
 from planarfriction.laws.base import refuse_fixed_stiffness
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models import FrictionModel
+from planarfriction.online.loops import friction_filter as kernels
 from planarfriction.online.sensors import Measurement, Sensors
 
 PARAMETERS = ("mu_c", "mu_s", "radius")

@@ -390,7 +390,8 @@ class ContactPatch(Moments):
         validation.choice("patch shape", data.get("shape", "cells"), ("cells",))
         pressure, grid = data.get("pressure"), data.get("grid")
         if isinstance(pressure, Mapping):
-            pressure = Pressure.from_dict(pressure)
+            parts = {key: cls.from_dict(value) for key, value in pressure.items() if key == "patch"}
+            pressure = Pressure.from_dict({**pressure, **parts})
         if grid is not None:
             validation.keys("grid", grid, required=[entry.name for entry in dataclasses.fields(Grid)])
             grid = Grid(**grid)

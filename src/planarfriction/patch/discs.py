@@ -81,8 +81,6 @@ def _own_discs(patch: ContactPatch) -> ContactPatch:
 @functools.lru_cache(REMEMBERED)
 def _few_discs(patch: ContactPatch, n: int) -> ContactPatch:
     """Return fewer discs than the patch has cells; those of each kind of friction are chosen by themselves."""
-    from planarfriction.patch.contact_patch import ContactPatch
-
     cells = _own_discs(patch)
     places, root_scale = np.stack(cells.lever_coordinates(*cells.positions.T), -1), _ratio(cells)
     weights = mean_weights(cells)
@@ -111,7 +109,7 @@ def _few_discs(patch: ContactPatch, n: int) -> ContactPatch:
     law = shared if cells.depends_on_load else PerCell(shared.relative(cells.positions))
     positions = _from_lever_coordinates(cells, np.concatenate([part.places for part in parts]), first)
     with warnings.catch_warnings(action="ignore"):
-        return ContactPatch(positions, areas, law, None, patch.name, **fields)
+        return type(patch)(positions, areas, law, None, patch.name, **fields)
 
 
 # ---------------------------------------------------------------------- friction that depends on the direction

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -81,10 +80,6 @@ class SharedPressure(ByValue, Pressure):
     """Radii of the discs, `[n]` [m]."""
 
     def __post_init__(self) -> None:
-        if isinstance(self.patch, Mapping):
-            from planarfriction.patch.contact_patch import ContactPatch
-
-            self._set(patch=ContactPatch.from_dict(self.patch))
         members = len(np.atleast_1d(self.cells))
         for name in ("cells", "begins"):
             numbers = validation.array(name, getattr(self, name), (members if name == "cells" else None,)).astype(int)

@@ -14,7 +14,7 @@ from planarfriction.geometry import twist_at
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceCells, LimitSurfaceExact
 from planarfriction.patch import ContactPatch
 from planarfriction.scenes import Body, Contact, Scene, Signal, simulate
-from planarfriction.scenes.scene import checked_model
+from planarfriction.scenes.contact import checked_model
 
 _STEP, _STEPS = 1.25, 120
 """Factor between the loads that are tried on a patch that follows its load, and how many of them."""

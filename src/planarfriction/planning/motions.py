@@ -14,7 +14,7 @@ from planarfriction.derivatives.scene_inputs import STATES
 from planarfriction.errors import InvalidValueError
 from planarfriction.geometry import rotate
 from planarfriction.scenes import Scene, Signal, SolverOptions, simulate
-from planarfriction.scenes.scene import with_friction
+from planarfriction.scenes.contact import with_friction
 from planarfriction.scenes.start import contact_map
 
 TIGHT, LOOSE = 1e-5, 1e-4

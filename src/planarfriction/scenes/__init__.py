@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from planarfriction.families import SCENES
+from planarfriction.scenes.body import Body
+from planarfriction.scenes.contact import Contact
 from planarfriction.scenes.options import SolverOptions
 from planarfriction.scenes.ready import drift, driven, free_slide, in_hand, in_hand_load, published_velocity, pushed
-from planarfriction.scenes.scene import Body, Contact, Scene
+from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.signal import Signal
 from planarfriction.scenes.solution import Solution, Statistics
 from planarfriction.scenes.worlds import curling, foot, pivot

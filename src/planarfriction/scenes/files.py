@@ -19,8 +19,9 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import FileError, InvalidValueError, shown
 from planarfriction.reading import read_text
+from planarfriction.scenes.body import Body
+from planarfriction.scenes.contact import Contact
 from planarfriction.scenes.model_files import model_from_dict, model_to_dict
-from planarfriction.scenes.scene import Body, Contact, Scene
 from planarfriction.scenes.section import Section
 from planarfriction.scenes.signal import Signal, read_signal
 from planarfriction.writing import write_text
@@ -59,7 +60,7 @@ def part_to_dict(part: Any) -> dict[str, Any]:
     return part.to_dict() if isinstance(part, Signal) else model_to_dict(part)
 
 
-def scene_to_dict(scene: Scene, of_part: Callable[[Any], dict[str, Any]] = part_to_dict) -> dict[str, Any]:
+def scene_to_dict(scene: Any, of_part: Callable[[Any], dict[str, Any]] = part_to_dict) -> dict[str, Any]:
     """Return the scene as numbers, texts, lists and tables, without parts that it does not have.
 
     `of_part` makes the tables of signals and the entries of a contact's model.
@@ -90,21 +91,23 @@ def _plain(value: Any, of_part: Callable[[Any], dict[str, Any]]) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else list(value) if isinstance(value, tuple) else value
 
 
-def scene_from_dict(data: dict[str, Any], *, folder: str | Path | None = None, source: str = "scene") -> Scene:
-    """Make the scene of a table; `source` names it in errors, relative paths start from `folder`."""
-    table = Section(data, "", source, validation.path("folder", folder) if folder is not None else None).only(
-        SCENE_KEYS
-    )
+def parts_of_scene(
+    data: dict[str, Any], folder: str | Path | None = None, source: str = "scene"
+) -> tuple[Section, dict[str, Any]]:
+    """Read the table of a scene, which `source` names in errors: returns it with the arguments of `Scene`.
+
+    Relative paths in it start from `folder`.
+    """
+    place = None if folder is None else validation.path("folder", folder)
+    table = Section(data, "", source, place).only(SCENE_KEYS)
     contacts = _contacts(table)
-    prescribed = "velocity" in table
     options = {key: table.get(key) for key in _OPTIONS if key in table}
     signals = {key: read_signal(table, key) for key in ("force", "velocity") if key in table}
     # A body that is moved as prescribed needs no mass; whoever leaves it out does not mean to say anything about it.
     moved = {"mass": 1.0, "inertia": 1.0, "gravity": [0.0, 0.0]}
-    body = _body(table.section("body", moved) if prescribed and "body" not in table else table.section("body"))
-    t_end = table.get("t_end")
-    with table.located():
-        return Scene(body, contacts, t_end, **signals, **options)
+    prescribed = "velocity" in table and "body" not in table
+    body = _body(table.section("body", moved) if prescribed else table.section("body"))
+    return table, {"body": body, "contacts": contacts, "t_end": table.get("t_end"), **signals, **options}
 
 
 def _body(table: Section) -> Body:
@@ -141,12 +144,6 @@ def _contacts(scene: Section) -> list[Contact]:
     return contacts
 
 
-def read_scene(path: str | Path) -> Scene:
-    """Read the scene of a `.toml` or `.json` file; errors are one line with the name of the file."""
-    path = validation.path("path", path)
-    return scene_from_dict(read_table(path), folder=path.parent, source=str(path))
-
-
 def read_table(path: Path) -> dict[str, Any]:
     """Return the table of a `.toml` or `.json` file, as it is written."""
     kind = path.suffix.lower()
@@ -172,13 +169,12 @@ def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return table
 
 
-def write_scene(scene: Scene, path: str | Path) -> None:
-    """Write a scene to a `.toml` or `.json` file."""
+def write_table(data: dict[str, Any], path: str | Path) -> None:
+    """Write the table of a scene to a `.toml` or `.json` file."""
     path = validation.path("path", path)
     kind = path.suffix.lower()
     if kind not in (".toml", ".json"):
         raise InvalidValueError("path of a scene file", "end in .toml or .json", str(path))
-    data = scene.to_dict()
     text = to_toml(data) if kind == ".toml" else json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     write_text(path, text)
 

@@ -16,7 +16,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.body import Motion, System
 from planarfriction.kernels.contacts import BODY, BODY_AXES, WORLD, Contacts, calls_of
 from planarfriction.laws.base import refuse_fixed_stiffness
-from planarfriction.scenes.scene import Contact
+from planarfriction.scenes.contact import Contact
 from planarfriction.scenes.signal import SAME_TIME, Signal, breaks_between, displacement
 from planarfriction.scenes.start import first_slopes, first_states
 

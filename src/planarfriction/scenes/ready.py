@@ -10,8 +10,10 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError, shown
+from planarfriction.scenes.body import Body
+from planarfriction.scenes.contact import Contact, checked_model
 from planarfriction.scenes.files import rectangle_inertia, rectangle_outline
-from planarfriction.scenes.scene import Body, Contact, Scene, checked_model
+from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.signal import Signal, as_signal, sample_times
 
 GRAVITY = 9.81

@@ -9,9 +9,11 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.scenes.body import Body
+from planarfriction.scenes.contact import Contact
 from planarfriction.scenes.files import rectangle_inertia, rectangle_outline
 from planarfriction.scenes.ready import GRAVITY, SAMPLE_TIME, STOP_SPEED
-from planarfriction.scenes.scene import Body, Contact, Scene
+from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.signal import Signal, as_signal
 
 GRIP = ([0.0, 0.2, 0.24, 0.36, 0.4], [4.0, 4.0, 1.0, 1.0, 6.0])

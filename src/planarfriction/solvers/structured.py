@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planarfriction.compiler import threads, together
+from planarfriction.compiler import missing, threads, together
 from planarfriction.compiler.calls import address_of, signature_of
-from planarfriction.compiler.machine_code import missing
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import rosenbrock as kernels

@@ -16,7 +16,7 @@ from planarfriction import validation
 from planarfriction.errors import FrictionError, InvalidValueError, shown
 from planarfriction.families import LAWS, MODELS, SHAPES, SURFACES, Family
 from planarfriction.scenes import Scene
-from planarfriction.scenes.files import BODY_KEYS, CONTACT_KEYS, SCENE_KEYS, read_table, scene_from_dict
+from planarfriction.scenes.files import BODY_KEYS, CONTACT_KEYS, SCENE_KEYS, read_table
 
 MOST_VALUES = 1_000_000
 """Largest number of values of a setting."""
@@ -47,14 +47,14 @@ class Settable:
             path = validation.path("scene", scene)
             self._table, self._source, self._folder = read_table(path), str(path), path.parent
             if not isinstance(self._table, dict):
-                scene_from_dict(self._table, source=self._source)  # says what is wrong
+                Scene.from_dict(self._table, source=self._source)  # says what is wrong
 
     def __call__(self, **values: Any) -> Scene:
         """Make the scene with values by their paths. Raises InvalidValueError for a path that leads nowhere."""
         table: Any = self._table
         for path, value in values.items():
             table = self._changed(table, path, value)
-        return scene_from_dict(table, folder=self._folder, source=self._source)
+        return Scene.from_dict(table, self._folder, self._source)
 
     def check(self, values: Mapping[str, list[Any]]) -> None:
         """Check that the first or the last of the values make a scene; if neither does, a path is wrong."""

@@ -16,27 +16,47 @@ import numpy as np
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
-from planarfriction.kernels.square_root import ROOT, N, measure, reset, spread, variance_of
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
+from planarfriction.online.loops.square_root import ROOT, N, measure, reset, spread, variance_of
 
 TWIST, MU, RATIO, SCALE, BIAS = 3, 6, 7, 8, 9
 """Places of the unknowns after the remainder of the count [m], which is the error of a place."""
 
-SLIP, TIME, BOUND, PEAK, GAUGE, SEEN, PLACE, REST = 156, 157, 158, 159, 160, 161, 164, 167
-"""Places in the state after x and its root: probability of slip, time, logs of the largest gauge of the wrench while it
-stuck, of a recent one, and of that now, filtered wrench over load (3), recent displacement (3), time since the last
-velocity."""
-
-SUM, LOADS, COUNT, OLD, CHAIN, BACK, LEVER = 168, 171, 172, 173, 182, 183, 184
-"""Places of the sums of the wrench over load (3) and of the load since the last velocity, and their number; the same
-of the samples before it, with their velocity and time (9); velocities in a row that were those of sliding; samples in a
-row that were not later than one before; the share of the torque in the gauge of the wrench."""
+SLIP = ROOT + N * N
+"""Place of the probability of slip, the first after the root."""
+TIME = SLIP + 1
+"""Place of the time [s]."""
+BOUND = TIME + 1
+"""Place of the log of the largest gauge of the wrench while it stuck."""
+PEAK = BOUND + 1
+"""Place of the log of a recent largest gauge."""
+GAUGE = PEAK + 1
+"""Place of the log of the gauge now."""
+SEEN = GAUGE + 1
+"""Place of the filtered wrench over load (3)."""
+PLACE = SEEN + 3
+"""Place of the recent displacement (3)."""
+REST = PLACE + 3
+"""Place of the time since the last velocity [s]."""
+SUM = REST + 1
+"""Place of the sum of the wrench over load since the last velocity (3)."""
+LOADS = SUM + 3
+"""Place of the sum of the load since the last velocity."""
+COUNT = LOADS + 1
+"""Place of the number of samples since the last velocity."""
+OLD = COUNT + 1
+"""Place of sum (3), loads and count of the samples before the last velocity, with that velocity (3) and its time."""
+CHAIN = OLD + 9
+"""Place of the number of velocities in a row that were those of sliding."""
+BACK = CHAIN + 1
+"""Place of the number of samples in a row that were not later than one before."""
+LEVER = BACK + 1
+"""Place of the share of the torque in the gauge of the wrench."""
+STATE = LEVER + 1
+"""Length of the state."""
 
 RESTART = 10.0
 """Samples in a row whose time went back after which the clock counts as set anew."""
-
-STATE = 185
-"""Length of the state."""
 
 PEAK_TIME, SEEN_TIME, PLACE_TIME = 0.1, 0.004, 0.06
 """Times in which the peak of the wrench, its filter and the recent displacement fade [s]."""
@@ -134,38 +154,38 @@ def _normal(x):
 
 
 @kernel
-def _scale(own, s, load):
+def _scale(settings, s, load):
     """Return the radius at a load over that of the surface."""
-    return math.exp(s[SCALE] + own.growth * math.log(load / own.reference))
+    return math.exp(s[SCALE] + settings.growth * math.log(load / settings.reference))
 
 
 @kernel
-def _gauge(own, s, scale, best):
+def _gauge(settings, s, scale, best):
     """Return the gauge of the filtered wrench, the largest `w . dual`; the dual, a twist, goes to `best`."""
     x, y, z, most = s[SEEN], s[SEEN + 1], s[SEEN + 2] / scale, 0.0
-    for m in range(own.duals.shape[0]):
-        each = x * own.duals[m, 0] + y * own.duals[m, 1] + z * own.duals[m, 2]
+    for m in range(settings.duals.shape[0]):
+        each = x * settings.duals[m, 0] + y * settings.duals[m, 1] + z * settings.duals[m, 2]
         if abs(each) > most:
             most = abs(each)
             sign = 1.0 if each > 0.0 else -1.0
             for i in range(3):
-                best[i] = sign * own.duals[m, i]
+                best[i] = sign * settings.duals[m, i]
     s[LEVER] = z * best[2] / max(most, 1e-9)
     return most
 
 
 @kernel
-def _move(own, s, column):
+def _move(settings, s, column):
     """Set the twist to the counted velocity plus what the count left out before, less what it left out at its end."""
     span = max(s[OLD + 8], 1e-9)
     for i in range(3):
         if s[CHAIN] <= 2.0:
-            reset(s, i, 0.0, own.remainder[i], column)
+            reset(s, i, 0.0, settings.remainder[i], column)
         reset(s, TWIST + i, s[OLD + 5 + i] + s[i] / span, 0.0, column)
         for j in range(i + 1):
             s[ROOT + N * (TWIST + i) + j] = s[ROOT + N * i + j] / span
-        reset(s, i, 0.0, own.remainder[i], column)
-        s[ROOT + N * (TWIST + i) + i] -= own.remainder[i] / span
+        reset(s, i, 0.0, settings.remainder[i], column)
+        s[ROOT + N * (TWIST + i) + i] -= settings.remainder[i] / span
 
 
 @kernel
@@ -177,25 +197,25 @@ def _measure(s, h, miss, variance, column):
 
 
 @kernel
-def _learn(own, s, h, column, jacobian):
+def _learn(settings, s, h, column, jacobian):
     """Update with the mean wrench and the velocity of the samples before the last velocity, which were sliding."""
-    _move(own, s, column)
+    _move(settings, s, column)
     count = s[OLD + 4]
     if count == 0.0:
         return
     load = s[OLD + 3] / count
     before = s[SCALE]
     for row in range(3):
-        mu, ratio, scale = math.exp(s[MU]), math.exp(s[RATIO]), _scale(own, s, load)
+        mu, ratio, scale = math.exp(s[MU]), math.exp(s[RATIO]), _scale(settings, s, load)
         x, y, z = s[TWIST], s[TWIST + 1], scale * s[TWIST + 2]
         speed = math.sqrt(x * x + y * y + z * z)
-        u = sliding(own.kind, own.data, 0, own.size, x, y, z, speed)
-        sliding_jacobian(own.kind, own.data, 0, own.size, x, y, z, speed, jacobian)
-        power = math.pow(speed / own.v_s, own.gamma)
+        u = sliding(settings.kind, settings.data, 0, settings.size, x, y, z, speed)
+        sliding_jacobian(settings.kind, settings.data, 0, settings.size, x, y, z, speed, jacobian)
+        power = math.pow(speed / settings.v_s, settings.gamma)
         fade = math.exp(-power)
         steady = mu * (1.0 + (ratio - 1.0) * fade)
-        g = steady + own.sigma_2 * speed  # viscous friction along h: it is small
-        by_speed = own.sigma_2 - mu * (ratio - 1.0) * fade * own.gamma * power / speed
+        g = steady + settings.sigma_2 * speed  # viscous friction along h: it is small
+        by_speed = settings.sigma_2 - mu * (ratio - 1.0) * fade * settings.gamma * power / speed
         along = (u[0] if row == 0 else (u[1] if row == 1 else u[2])) / speed
         factor = load * (scale if row == 2 else 1.0)
         for i in range(N):
@@ -208,44 +228,44 @@ def _learn(own, s, h, column, jacobian):
         h[RATIO] = factor * along * mu * ratio * fade
         h[SCALE] = h[TWIST + 2] * s[TWIST + 2] + (factor * g * along if row == 2 else 0.0)
         h[BIAS + row] = 1.0
-        error = own.model_error * factor * g
-        variance = own.noise[row] / count + error * error
+        error = settings.model_error * factor * g
+        variance = settings.noise[row] / count + error * error
         _measure(s, h, load * s[OLD + row] / count - factor * g * along - s[BIAS + row], variance, column)
     s[BOUND] -= s[LEVER] * (s[SCALE] - before)
 
 
 @kernel
-def _see(own, s, v, h, column, jacobian):
+def _see(settings, s, v, h, column, jacobian):
     """Take a slip velocity, the mean since the last; return the log of the odds that it is a slip."""
     span = min(s[REST], PLACE_TIME)
-    odds, rest, sd2, speed2, far2 = 0.0, 0.7 * own.quantum, FRESH * FRESH, 0.0, 0.0
+    odds, rest, sd2, speed2, far2 = 0.0, 0.7 * settings.quantum, FRESH * FRESH, 0.0, 0.0
     for i in range(3):
         s[PLACE + i] = s[PLACE + i] * math.exp(-span / PLACE_TIME) + v[i] * span
         far2 += s[PLACE + i] * s[PLACE + i]
         speed2 += v[i] * v[i]
         miss = v[i] - (s[TWIST + i] if s[SLIP] > 0.5 else 0.0)
         odds += 0.5 * (v[i] * v[i] / (rest * rest) - miss * miss / sd2) - 0.5 * math.log(sd2 / (rest * rest))
-    moves = speed2 > SLOW * SLOW * own.quantum * own.quantum
+    moves = speed2 > SLOW * SLOW * settings.quantum * settings.quantum
     if moves and s[CHAIN] >= 2.0:
-        _learn(own, s, h, column, jacobian)
+        _learn(settings, s, h, column, jacobian)
     s[CHAIN] = s[CHAIN] + 1.0 if moves else 0.0
     for i in range(3):
         s[OLD + i], s[OLD + 5 + i] = s[SUM + i], v[i]
         s[SUM + i] = 0.0
-        reset(s, TWIST + i, v[i], own.quantum, column)
+        reset(s, TWIST + i, v[i], settings.quantum, column)
     s[OLD + 3], s[OLD + 4], s[OLD + 8], s[LOADS], s[COUNT], s[REST] = s[LOADS], s[COUNT], s[REST], 0.0, 0.0, 0.0
-    return min(max(odds, -8.0), 8.0) + (8.0 if far2 > 16.0 * own.place * own.place else 0.0)
+    return min(max(odds, -8.0), 8.0) + (8.0 if far2 > 16.0 * settings.place * settings.place else 0.0)
 
 
 @kernel
-def _tare(own, s, wrench, load, h, column):
+def _tare(settings, s, wrench, load, h, column):
     """Learn the bias from a wrench of an empty hand, if it may be one."""
     for i in range(3):
         w = -s[BIAS + i]
         for j in range(3):
-            w += own.conjugate[i, j] * wrench[j]
+            w += settings.conjugate[i, j] * wrench[j]
         friction = math.exp(s[MU]) * load
-        variance = own.noise[i] + friction * friction
+        variance = settings.noise[i] + friction * friction
         if w * w < EMPTY * EMPTY * (variance + variance_of(s, BIAS + i, BIAS + i)):
             for k in range(N):
                 h[k] = 1.0 if k == BIAS + i else 0.0
@@ -253,11 +273,11 @@ def _tare(own, s, wrench, load, h, column):
 
 
 @kernel
-def _judge(own, s, load, dt, best):
+def _judge(settings, s, load, dt, best):
     """Update the probability of slip with the filtered wrench over load."""
     sd_s = math.sqrt(variance_of(s, MU, RATIO) + SEEN_ERROR * SEEN_ERROR)
     sd_c = math.sqrt(variance_of(s, MU, MU) + SEEN_ERROR * SEEN_ERROR)
-    level = math.log(max(_gauge(own, s, _scale(own, s, load), best), 1e-9))
+    level = math.log(max(_gauge(settings, s, _scale(settings, s, load), best), 1e-9))
     inside = max(0.0, (s[MU] - level) / sd_c - 2.0)
     begins = CREEPS + BREAKS * _normal((level - s[MU] - s[RATIO]) / sd_s - 1.0)
     p = s[SLIP]
@@ -268,15 +288,15 @@ def _judge(own, s, load, dt, best):
 
 
 @kernel
-def _estimate(own, s, e):
+def _estimate(settings, s, e):
     """Write an estimate after a sample."""
     for i in range(3):
         e.twist[i] = 0.0
         for j in range(3):
-            e.twist[i] += own.back[i, j] * s[TWIST + j] if s[SLIP] > 0.5 else 0.0
-            e.wrench[i] += own.frame[j, i] * s[BIAS + j]
+            e.twist[i] += settings.back[i, j] * s[TWIST + j] if s[SLIP] > 0.5 else 0.0
+            e.wrench[i] += settings.frame[j, i] * s[BIAS + j]
     log_s = max(s[MU] + max(s[RATIO], 0.0), s[BOUND])
-    e.mu_c, e.mu_s, e.radius = math.exp(s[MU]), math.exp(log_s), own.radius * math.exp(s[SCALE])
+    e.mu_c, e.mu_s, e.radius = math.exp(s[MU]), math.exp(log_s), settings.radius * math.exp(s[SCALE])
     for i in range(3):
         for k in range(3):
             total = 0.0
@@ -284,9 +304,9 @@ def _estimate(own, s, e):
                 a = s[ROOT + N * (MU if i < 2 else SCALE) + j] + (s[ROOT + N * RATIO + j] if i == 1 else 0.0)
                 b = s[ROOT + N * (MU if k < 2 else SCALE) + j] + (s[ROOT + N * RATIO + j] if k == 1 else 0.0)
                 total += a * b
-            floor = own.model_error * own.model_error * (0.5 if i == 0 else 1.0) * (0.5 if k == 0 else 1.0)
+            floor = settings.model_error * settings.model_error * (0.5 if i == 0 else 1.0) * (0.5 if k == 0 else 1.0)
             e.covariance[i, k] = total + (floor if (i < 2) == (k < 2) else 0.0)
-        e.determined[i] = 1 if e.covariance[i, i] <= own.variance else 0
+        e.determined[i] = 1 if e.covariance[i, i] <= settings.variance else 0
     sd = math.sqrt(e.covariance[1, 1] + SEEN_ERROR * SEEN_ERROR)
     e.slip, e.about_to_slip = s[SLIP], (1.0 - s[SLIP]) * _normal((s[GAUGE] + NEAR - log_s) / sd)
     e.margin = 1.0 - math.exp(min(s[GAUGE] - log_s, 50.0))
@@ -294,7 +314,7 @@ def _estimate(own, s, e):
 
 
 @jit
-def update(own, states, samples, found):
+def update(settings, states, samples, found):
     """Update states `[P, STATE]` with a sample each; `found [P]` of dtype `ESTIMATE` gets what is known.
 
     Samples `[P, 8]` are time, wrench, load and slip velocity; NaN is none. `flags` is the sum of what was odd: 1 no or
@@ -314,27 +334,27 @@ def update(own, states, samples, found):
         force = math.hypot(wrench[0], wrench[1])
         good = xp.in_range(load) and xp.in_range(force) and xp.in_range(wrench[2])
         flags += 0 if good else 1
-        if good and force >= own.saturation:
+        if good and force >= settings.saturation:
             flags, good = flags + 4, False
         if dt > 0.0:
-            if own.drift > 0.0:
-                spread(s, MU, own.drift * own.drift * dt, column)
+            if settings.drift > 0.0:
+                spread(s, MU, settings.drift * settings.drift * dt, column)
             s[PEAK] -= dt / PEAK_TIME
-            s[BOUND] -= own.drift * math.sqrt(dt)
+            s[BOUND] -= settings.drift * math.sqrt(dt)
             s[REST] += dt
         before = s[SLIP]
-        if good and load <= own.least_load and dt > 0.0:
-            _tare(own, s, wrench, load, h, column)
+        if good and load <= settings.least_load and dt > 0.0:
+            _tare(settings, s, wrench, load, h, column)
         elif good and dt > 0.0:
             share = 1.0 - math.exp(-dt / SEEN_TIME)
             for i in range(3):
                 w = 0.0
                 for j in range(3):
-                    w += own.conjugate[i, j] * wrench[j]
+                    w += settings.conjugate[i, j] * wrench[j]
                 s[SEEN + i] += share * ((w - s[BIAS + i]) / load - s[SEEN + i])
                 s[SUM + i] += w / load
             s[LOADS], s[COUNT] = s[LOADS] + load, s[COUNT] + 1.0
-            _judge(own, s, load, dt, best)
+            _judge(settings, s, load, dt, best)
             s[PEAK] = max(s[PEAK], s[GAUGE])
             if s[SLIP] < 0.1:
                 s[BOUND] = max(s[BOUND], s[GAUGE])
@@ -342,8 +362,8 @@ def update(own, states, samples, found):
             for i in range(3):
                 v[i] = 0.0
                 for j in range(3):
-                    v[i] += own.frame[i, j] * velocity[j]
-            odds = math.exp(_see(own, s, v, h, column, jacobian))
+                    v[i] += settings.frame[i, j] * velocity[j]
+            odds = math.exp(_see(settings, s, v, h, column, jacobian))
             s[SLIP] = s[SLIP] * odds / (s[SLIP] * odds + 1.0 - s[SLIP])
         s[SLIP] = min(max(s[SLIP], 1e-9), 1.0 - 1e-9)
         if before <= 0.5 < s[SLIP] and s[PEAK] > -9.0:
@@ -354,4 +374,4 @@ def update(own, states, samples, found):
         e.flags, e.dt, e.normal_force = flags, dt, load
         for i in range(3):
             e.wrench[i], e.velocity[i] = wrench[i], velocity[i]
-        _estimate(own, s, e)
+        _estimate(settings, s, e)

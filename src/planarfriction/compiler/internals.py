@@ -1,0 +1,43 @@
+"""Parts that lean on internals of Numba, each with what stands in for it where the installed Numba lacks them."""
+
+from __future__ import annotations
+
+import importlib
+import warnings
+from typing import Any
+
+import llvmlite
+import numba
+
+_told = False
+
+
+def part(module: str, name: str, instead: Any) -> Any:
+    """Return a part by its name, or what replaces it if the installed Numba lacks something that it needs.
+
+    Everything then works as before, but slower: the user is told once in a process.
+    """
+    try:
+        return getattr(importlib.import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        _tell(error)
+        return instead
+
+
+def need(owner: Any, *names: str) -> None:
+    """Raise ImportError if something of Numba lacks one of the attributes that are used later."""
+    for name in names:
+        if not hasattr(owner, name):
+            raise ImportError(f"{getattr(owner, '__name__', owner)} has no {name}")
+
+
+def _tell(error: Exception) -> None:
+    global _told
+    if not _told:
+        _told = True
+        warnings.warn(
+            f"Numba {numba.__version__} with llvmlite {llvmlite.__version__} differs from the versions that were "
+            f"tested ({error}): compiling takes longer, and may take place in each process",
+            RuntimeWarning,
+            stacklevel=2,
+        )

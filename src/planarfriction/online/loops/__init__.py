@@ -1,0 +1,1 @@
+"""Compiled loops of the observer and of the controllers."""
