@@ -283,7 +283,7 @@ def test_files_hold_what_runs_have_left_and_nothing_is_lost():
         "how many/ever φ": records.History((), np.array(3), {}),
         "file": records.History(("n",), np.array(["a", "bcd"]), {}),
     }
-    other = {**variables, "file": records.History(("n",), np.array(["a"]), {})}
+    other = {**variables, "file": records.History(("n",), np.array(["a", "b"]), {})}
     runs = {name: records.Record("success", "", each, 1.5) for name, each in (("a", variables), ("b", other))}
     runs["c"] = runs["a"]._replace(status="at rest")
     content = records.pack(runs)
@@ -429,7 +429,9 @@ def test_long_sweeps_have_few_files(tmp_path, monkeypatch):
         book.add((0,), str(number), records.Record("success", "", {}), None)
         book.flush()
     book.flush(at_once=True)
-    assert 100 < len(list(tmp_path.glob("runs-*.npz"))) < 200 and len(kept(tmp_path)) == 10_000
+    files = list(tmp_path.glob("runs-*.npz"))
+    assert 100 < len(files) < 200 and len(kept(tmp_path)) == 10_000
+    assert sum(len(records.unpack(file.read_bytes())) for file in files) == 10_000
 
 
 # ---------------------------------------------------------------------- executors
