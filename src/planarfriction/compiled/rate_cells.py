@@ -16,22 +16,11 @@ from planarfriction.kernels.general_cells import MATRICES
 from planarfriction.kernels.steps import StepFunctions
 
 
-class CompiledRateCells(CompiledDistributed):
-    """Machine form of a `DistributedModel` with a `RateLaw` on a patch."""
-
-    def _functions(self) -> tuple[ModelFunctions, StepFunctions]:
-        self._lever = cells.LEVERS if self.patch.anisotropic else cells.POSITIONS
-        return self.law.functions(self._lever)[1:]
-
-    def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
-        return self.law.contact(self._lever, numbers, weights), 4 * MATRICES
-
-
 def _finite(door: Callable) -> Callable:
     """Return a door of steps or rates that raises where the law's functions leave the range of numbers."""
 
     @functools.wraps(door)
-    def checked(self: CompiledRateCells, *inputs: Any) -> Any:
+    def checked(self: CompiledDistributed, *inputs: Any) -> Any:
         found = door(self, *inputs)
         if found is not None and not all(np.isfinite(each).all() for each in found):
             rule = "give finite rates and tractions at these inputs"
@@ -41,5 +30,19 @@ def _finite(door: Callable) -> Callable:
     return checked
 
 
-for _name in ("step_one", "step_batch", "jacobians_one", "evaluate", "step", "step_jacobians"):
-    setattr(CompiledRateCells, _name, _finite(getattr(CompiledDistributed, _name)))
+class CompiledRateCells(CompiledDistributed):
+    """Machine form of a `DistributedModel` with a `RateLaw` on a patch."""
+
+    step_one = _finite(CompiledDistributed.step_one)
+    step_batch = _finite(CompiledDistributed.step_batch)
+    jacobians_one = _finite(CompiledDistributed.jacobians_one)
+    evaluate = _finite(CompiledDistributed.evaluate)
+    step = _finite(CompiledDistributed.step)
+    step_jacobians = _finite(CompiledDistributed.step_jacobians)
+
+    def _functions(self) -> tuple[ModelFunctions, StepFunctions]:
+        self._lever = cells.LEVERS if self.patch.anisotropic else cells.POSITIONS
+        return self.law.functions(self._lever)[1:]
+
+    def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
+        return self.law.contact(self._lever, numbers, weights), 4 * MATRICES
