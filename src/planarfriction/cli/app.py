@@ -169,7 +169,7 @@ def export(file: Path, **options: Any) -> None:
 @click.option("--starts", type=int, default=4, show_default=True, help="Number of starting points of the search.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Random seed of the starting points.")
 @click.option("--out", type=FILE, help="Folder for the estimates (JSON) and the residual plot (PNG).")
-def identify(logs: tuple[Path, ...], patch: str | None, cell_size: float | None, width: float, **options: Any) -> int:
+def identify(logs: tuple[Path, ...], patch: str | None, size: dict[str, Any], **options: Any) -> int:
     """Estimate friction parameters of a contact from logs of its motion and its friction wrench.
 
     Each LOG is a CSV file with a heading and the columns t, vx, vy, omega (or x, y, theta), fx, fy, tau, normal_force
