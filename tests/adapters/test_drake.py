@@ -86,7 +86,7 @@ def test_a_grip_beside_the_centre_of_mass_holds(contact, dt):
 
 
 def test_a_grip_whose_load_swings_keeps_still_with_a_fixed_stiffness():
-    """Under 3 N +- 20 % at 2 Hz: the published law lets the part swing by more."""
+    """Press with 3 N +- 20 % at 2 Hz: the published law lets the part swing by more."""
     swings = []
     for reference in (3.0, None):
         law = dataclasses.replace(LAW, sigma_0=1e4, sigma_1=20.0, reference_load=reference)

@@ -73,7 +73,7 @@ def test_mjcf_and_sdf(write):
 
 
 def test_pages():
-    """Of patches, laws, models and scenes in notebooks, and of the referee."""
+    """Pages of patches, laws and models in notebooks, and that of the referee."""
     model = pf.ReducedModel(PATCH, LAW)
     texts = [each._repr_html_() for each in (PATCH, LAW, model, pf.LimitSurfaceEllipsoid(PATCH))]
     case = hostile_case()
