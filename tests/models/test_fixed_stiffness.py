@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from planarfriction.derivatives import RolloutTangent, parameters_of, rollout_jacobian, rollout_jvp, rollout_vjp
 from planarfriction.errors import InvalidValueError
-from planarfriction.export.pieces import pieces_of
 from planarfriction.laws import CoulombStribeck, Dahl, LuGre
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
@@ -239,7 +238,5 @@ def test_what_does_not_know_a_fixed_stiffness_says_so():
         model.step(model.rest(), np.zeros(3), 1.0, 1e-3, moments=[0.0, 0.0])
     with pytest.raises(TypeError):
         CoulombStribeck(reference_load=1.0)
-    with pytest.raises(InvalidValueError, match="law must have no reference_load for compiled sources"):
-        pieces_of(model)
     assert "reference_load=2" in repr(model)
     assert law != LuGre() and LuGre(reference_load=None) == LuGre()

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from planarfriction import formulas
 from planarfriction.compiler import compiled_math, memory
 from planarfriction.kernels import published_contact, vectors
 from planarfriction.kernels.trace import CompiledMathematics, Mathematics, Number, Table, flat
@@ -138,7 +139,19 @@ _KEPT: list[Any] = []
 """Functions that have twins: their `id` stays theirs."""
 
 
+def _of_decay(own: Any) -> Any:
+    """Return the twin of a function of `k dt`, which takes one below zero as zero.
+
+    k is rounded where it vanishes; in single precision a long step makes much of that.
+    """
+    made = twin(own)
+    return lambda xp, decay_dt, *others: made(xp, Mathematics.maximum(decay_dt, 0.0), *others)
+
+
 def _global_names(code: CodeType) -> set[str]:
     """Return the names that code may look up, with those of the code inside it."""
     inner = [each for each in code.co_consts if isinstance(each, CodeType)]
     return set(code.co_names).union(*map(_global_names, inner))
+
+
+_TWINS |= {id(each): _of_decay(each) for each in (formulas.relaxation, formulas.relaxation_slope)}
