@@ -129,7 +129,7 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         Raises InvalidValueError for what is not a tensor `[..., 3]`.
         """
         v_scaled = self._number("v_scaled", v_scaled)
-        (law, shape), speed = self._contact_at(None), xp.norm(v_scaled, -1)
+        (law, shape, _), speed = self._contact_at(None), xp.norm(v_scaled, -1)
         h = shape.surface(v_scaled, speed) / torch.where(speed > 0.0, speed, 1.0)  # zero at rest
         most = formulas.stribeck(xp, published.wide(speed), law) / law.sigma_0
         return published.narrow(published.scale(xp, shape) * published.wide(h) * most)
@@ -143,7 +143,7 @@ class ReducedPlanarLuGre(ReducedModelPublished):
 
         Raises InvalidValueError for tensors whose shapes do not fit.
         """
-        law, shape = self._contact_at(None)
+        law, shape, _ = self._contact_at(None)
         z, v, load = self._inputs(z, v, f_n)
         rate, by = published.wide(self._number("z_dot", z_dot)), published.drive(xp, law, shape, v)
         pull = published.pull(law, published.wide(z), rate, by)
