@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator
-from types import FunctionType, ModuleType, SimpleNamespace
+from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math
 from planarfriction.kernels import bristle_step, rules, vectors
+from planarfriction.kernels.rewriting import Rewriting
 
 ROUNDING = 256.0
 """Excess of a deflection over its cap, in units of the rounding error, that counts as rounding: see `bristle_step`."""
@@ -45,39 +46,10 @@ def joined(xp: Any, vector: Any) -> Any:
     return vector.array if isinstance(vector, Vector) else xp.concatenate(xp.broadcast_arrays(*vector), -2)
 
 
-class _OverArrays(SimpleNamespace):
-    """A module, or the functions that a function names, over arrays."""
-
-    def __init__(self, module: ModuleType, of: Callable[[Any], Any]) -> None:
-        super().__init__(module=module, of=of)
-
-    def __getattr__(self, name: str) -> Any:
-        return self.of(getattr(self.module, name))
-
-
 @functools.cache
-def over(xp: Any) -> Callable[[Any], Any]:
+def over(xp: Any) -> Rewriting:
     """Return `of(function)`, which returns a function of numbers and tuples as one of arrays of `xp`."""
-    known = {id(value): twin for value, twin in _twins(xp)}
-
-    @functools.cache
-    def of(value: Any) -> Any:
-        if id(value) in known:
-            return known[id(value)]
-        if isinstance(value, ModuleType):
-            return _OverArrays(value, of)
-        own = getattr(value, "py_func", value)
-        if not isinstance(own, FunctionType) or own.__closure__:
-            return value
-        names = {"__builtins__": own.__globals__["__builtins__"]}
-        found = known[id(value)] = FunctionType(own.__code__, names, own.__name__, own.__defaults__)
-        for name in own.__code__.co_names:
-            if name in own.__globals__:
-                given = own.__globals__[name]
-                names[name] = of(given) if callable(given) or isinstance(given, ModuleType) else given
-        return found
-
-    return of
+    return Rewriting(_twins(xp))
 
 
 def _twins(xp: Any) -> list[tuple[Any, Any]]:
