@@ -57,6 +57,11 @@ class FrictionPytree(TensorModel):
         vars(model).update(zip(names, (*leaves, *fixed), strict=True))
         return model
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the physical parameters, in the order of their vector."""
+        return self.parameters._fields
+
     def rest(self, batch: int | Sequence[int] = ()) -> jax.Array:
         """Return the state of a contact at rest, or of a `batch`: `[*batch, *state_shape]`."""
         return jnp.zeros(validation.batched(batch, self.state_shape), jnp.result_type(self.parameters.sigma_0))
@@ -78,8 +83,13 @@ class FrictionPytree(TensorModel):
         raise NotImplementedError
 
     def _values(self, parameters: Any) -> dict[str, jax.Array]:
-        record = self.parameters if parameters is None else type(self.parameters)(*parameters)
-        return {name: jnp.asarray(value) for name, value in record._asdict().items()}
+        return {name: jnp.asarray(value) for name, value in self._record(parameters)._asdict().items()}
+
+    def _record(self, parameters: Any) -> Any:
+        """Return parameters as a record, the model's own if they are None."""
+        if parameters is None:
+            return self.parameters
+        return type(self.parameters)(*self._counted(parameters, len(parameters), (len(parameters),)))
 
 
 def record_of(kind: Any, values: dict[str, float]) -> Any:

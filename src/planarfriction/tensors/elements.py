@@ -16,7 +16,7 @@ from typing import Any
 
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math
-from planarfriction.kernels import bristle_step, rules, vectors
+from planarfriction.kernels import bristle_step, published_contact, rules, surfaces, vectors
 from planarfriction.kernels.rewriting import Rewriting
 
 ROUNDING = 256.0
@@ -44,6 +44,18 @@ def split(array: Any) -> tuple[Any, ...]:
 def joined(xp: Any, vector: Any) -> Any:
     """Return a vector as an array `[..., d, N]`."""
     return vector.array if isinstance(vector, Vector) else xp.concatenate(xp.broadcast_arrays(*vector), -2)
+
+
+class Placed(int):
+    """Size of a table, with places in it that are known: cells about which numbers were read count as the first."""
+
+    cell: tuple[Any, Any]
+    place: tuple[Any, ...]
+
+    def __new__(cls, size: int, place: tuple[Any, ...]) -> Placed:
+        made = super().__new__(cls, size)
+        made.cell, made.place = place[:2], (0, 0, *place[2:])
+        return made
 
 
 @functools.cache
@@ -81,6 +93,23 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
         """Return the deflection where it is larger by more than rounding, else 0."""
         return xp.where(deflection > (1.0 + ROUNDING * xp.epsilon(deflection)) * largest, deflection, 0.0)
 
+    def place(size: int, x: Any, y: Any, s: Any) -> tuple[Any, ...]:
+        """Return `surfaces.place`; on the spin axis the azimuth is 0."""
+        if isinstance(size, Placed):
+            return size.place
+        across = xp.root(x * x + y * y)
+        on_axis = across == 0.0
+        polar = xp.arctan2(across, s)
+        azimuth = xp.arctan2(xp.where(on_axis, 0.0, y), xp.where(on_axis, 1.0, x))
+        azimuth = xp.where(azimuth < 0.0, azimuth + 2.0 * math.pi, azimuth)
+        a, b = (size / (0.5 * math.pi) * each for each in (polar, azimuth))
+        i, j = xp.whole(a, size - 1), xp.whole(b, 4 * size - 1)
+        return i, j, a - i, b - j, polar, azimuth
+
+    def through(root: Any, x: Any, y: Any) -> tuple[Any, Any]:
+        """Return `published_contact.through`, without a metric if there is none."""
+        return (x, y) if root is None else (root.xx * x + root.xy * y, root.xy * x + root.yy * y)
+
     def disc_friction(_: Any, slide: Any, spin: Any) -> Any:
         """Return `formulas.disc_friction` in a unit of speed that keeps squares and their slopes in range."""
         rest = formulas.DISC_REST
@@ -89,12 +118,14 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
 
     return [
         (compiled_math, xp),
-        (math, SimpleNamespace(sqrt=xp.root, inf=math.inf, pi=math.pi)),
+        (math, SimpleNamespace(sqrt=xp.root, sin=xp.sin, cos=xp.cos, inf=math.inf, pi=math.pi)),
         (vectors.plus, plus),
         (vectors.times, times),
         (vectors.dot, dot),
         (vectors.square, lambda a: dot(a, a)),
         (formulas.disc_friction, disc_friction),
+        (surfaces.place, place),
+        (published_contact.through, through),
         (rules.per, per),
         (rules.ratio, ratio),
         (bristle_step.cap, lambda deflection, most: formulas.cap(xp, beyond(deflection, most), most)),

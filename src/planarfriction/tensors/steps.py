@@ -161,6 +161,18 @@ class TensorModel:
         """Return the numbers of the patch; physical values broadcast with the components of bristles."""
         raise NotImplementedError
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the physical parameters, in the order of their vector."""
+        raise NotImplementedError
+
+    def _counted(self, parameters: Any, count: int, shape: Sequence[int]) -> Any:
+        """Return `parameters`; raise InvalidValueError unless there are as many as names."""
+        if count != len(self.names):
+            rule = f"have shape [..., {len(self.names)}] ({', '.join(self.names)})"
+            raise InvalidValueError("parameters", rule, f"shape {list(shape)}")
+        return parameters
+
     def _number(self, name: str, value: Any) -> Any:
         return self.xp.real(name, value)
 

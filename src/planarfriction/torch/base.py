@@ -155,10 +155,7 @@ class FrictionModule(TensorModel, nn.Module):
     def _vector(self, parameters: Tensor | None) -> Tensor:
         if parameters is None:
             return self.physical()
-        if parameters.shape[-1:] != (len(self.names),):
-            rule = f"have shape [..., {len(self.names)}] ({', '.join(self.names)})"
-            raise InvalidValueError("parameters", rule, f"shape {list(parameters.shape)}")
-        return parameters
+        return self._counted(parameters, parameters.shape[-1] if parameters.ndim else 0, parameters.shape)
 
 
 def _like(by: Any, values: Any) -> Any:
