@@ -58,6 +58,20 @@ class Placed(int):
         return made
 
 
+def _place(xp: Any, size: int, x: Any, y: Any, s: Any) -> tuple[Any, ...]:
+    """Return `surfaces.place`; on the spin axis the azimuth is 0."""
+    if isinstance(size, Placed):
+        return size.place
+    across = xp.root(x * x + y * y)
+    on_axis = across == 0.0
+    polar = xp.arctan2(across, s)
+    azimuth = xp.arctan2(xp.where(on_axis, 0.0, y), xp.where(on_axis, 1.0, x))
+    azimuth = xp.where(azimuth < 0.0, azimuth + 2.0 * math.pi, azimuth)
+    a, b = (size / (0.5 * math.pi) * each for each in (polar, azimuth))
+    i, j = xp.whole(a, size - 1), xp.whole(b, 4 * size - 1)
+    return i, j, a - i, b - j, polar, azimuth
+
+
 @functools.cache
 def over(xp: Any) -> Rewriting:
     """Return `of(function)`, which returns a function of numbers and tuples as one of arrays of `xp`."""
@@ -93,19 +107,6 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
         """Return the deflection where it is larger by more than rounding, else 0."""
         return xp.where(deflection > (1.0 + ROUNDING * xp.epsilon(deflection)) * largest, deflection, 0.0)
 
-    def place(size: int, x: Any, y: Any, s: Any) -> tuple[Any, ...]:
-        """Return `surfaces.place`; on the spin axis the azimuth is 0."""
-        if isinstance(size, Placed):
-            return size.place
-        across = xp.root(x * x + y * y)
-        on_axis = across == 0.0
-        polar = xp.arctan2(across, s)
-        azimuth = xp.arctan2(xp.where(on_axis, 0.0, y), xp.where(on_axis, 1.0, x))
-        azimuth = xp.where(azimuth < 0.0, azimuth + 2.0 * math.pi, azimuth)
-        a, b = (size / (0.5 * math.pi) * each for each in (polar, azimuth))
-        i, j = xp.whole(a, size - 1), xp.whole(b, 4 * size - 1)
-        return i, j, a - i, b - j, polar, azimuth
-
     def through(root: Any, x: Any, y: Any) -> tuple[Any, Any]:
         """Return `published_contact.through`, without a metric if there is none."""
         return (x, y) if root is None else (root.xx * x + root.xy * y, root.xy * x + root.yy * y)
@@ -124,7 +125,7 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
         (vectors.dot, dot),
         (vectors.square, lambda a: dot(a, a)),
         (formulas.disc_friction, disc_friction),
-        (surfaces.place, place),
+        (surfaces.place, functools.partial(_place, xp)),
         (published_contact.through, through),
         (rules.per, per),
         (rules.ratio, ratio),
