@@ -12,6 +12,7 @@ import numpy as np
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.errors import InvalidValueError
+from planarfriction.export.twins import twin
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import (
     cells,
@@ -29,7 +30,6 @@ from planarfriction.kernels.rules import ratio
 from planarfriction.kernels.settle import within
 from planarfriction.kernels.surfaces import CELLS
 from planarfriction.kernels.trace import Block, Mathematics, Number, Table, Trace, traced
-from planarfriction.kernels.twins import twin
 from planarfriction.kernels.vectors import norm, times
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished

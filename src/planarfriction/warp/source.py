@@ -10,9 +10,9 @@ import numpy as np
 from planarfriction.export.c_source import Writer
 from planarfriction.export.library import PARAMETERS, PRECISIONS, tilt_of
 from planarfriction.export.pieces import Pieces, pieces_of
+from planarfriction.export.twins import twin
 from planarfriction.kernels import coupling
 from planarfriction.kernels.trace import Block, Number, Trace, traced
-from planarfriction.kernels.twins import twin
 from planarfriction.models import FrictionModel
 
 ROUNDING = {"double": (coupling.ROUNDING,) * 2, "float": (3e-7, 1e-5)}

@@ -28,6 +28,7 @@ from planarfriction.adapters.mujoco.patches import (
 from planarfriction.coupling import ITERATIONS, TOLERANCE
 from planarfriction.environments import SHAPE, check, defaults
 from planarfriction.errors import InvalidValueError
+from planarfriction.formulas import LIGHTEST
 from planarfriction.jax import DistributedModel, ReducedModelPublished
 from planarfriction.jax.base import FrictionPytree
 from planarfriction.tensors.steps import LAW
@@ -228,10 +229,7 @@ class Friction:
         answer = responses.answer(m, d, where.jacobian, where.rows, found.active)
         centre = where.centres(answer.forces(d, guess))  # that of the search, with its derivatives
         shift, pressed = self._pressed(own, where, found.centre + centre - jax.lax.stop_gradient(centre))
-
-        def unit(twist):
-            return self._evaluate(own, pressed, shift, states, twist, jnp.ones(len(where.rows)), dt)[1]
-
+        unit = self._unit(own, pressed, shift, states, dt)
         wrench = newton.fitting(unit, answer.host, found.wrench)
         twist, load = answer.host.twists(wrench), answer.host.loads(wrench)
         new, _ = self._evaluate(own, pressed, shift, states, twist, load, dt)
@@ -282,10 +280,7 @@ class Friction:
             answer = responses.answer(m, d, where.jacobian, where.rows, active)
             centre = jnp.where(last.passes == 0, where.centres(answer.forces(d, last.wrench)), last.centre)
             shift, pressed = self._pressed(own, where, centre)
-
-            def unit(twist):
-                return self._evaluate(own, pressed, shift, states, twist, jnp.ones(len(where.rows)), dt)[1]
-
+            unit = self._unit(own, pressed, shift, states, dt)
             solved = newton.solve(unit, answer.host, last.wrench, radius, TOLERANCE, ITERATIONS)
             acceleration = answer.acceleration(solved.wrench)
             slack = responses.slack(d, active, responses.active_at(d, acceleration), acceleration, dt)
@@ -317,6 +312,16 @@ class Friction:
         rest = (centre - shift - own.displaced) / own.scale[:, None]
         groups = zip(self._groups(), own.models, strict=True)
         return shift, [model.pressed(rest[np.array(at)]) if follow else None for (_, follow, at), model in groups]
+
+    def _unit(self, own: _Own, pressed, shift, states, dt) -> newton.Unit:
+        """Return the friction of steps, per unit load; that of a fixed stiffness depends on the loads."""
+        by_load = any(model.reference_load is not None for model in own.models)
+
+        def wrench(twist, load):
+            load = jnp.maximum(load, LIGHTEST) if by_load else jnp.ones_like(load)
+            return self._evaluate(own, pressed, shift, states, twist, load, dt)[1] / load[:, None]
+
+        return newton.Unit(wrench, by_load)
 
     def _evaluate(self, own: _Own, pressed, shift, states, twist, load, dt) -> tuple[list[jax.Array], jax.Array]:
         """Return the new states and wrenches of steps; patches of the same model side by side."""
