@@ -100,9 +100,7 @@ def test_a_wheel_keeps_its_easy_direction(site):
         forces.append(friction.wrenches(d)[0, :2] @ axes[:2, 0] / friction.loads(d)[0])
     assert m.nv == 2
     assert np.ptp(forces[300:]) < 1e-3
-    assert abs(forces[-1]) == pytest.approx(0.4 * 1.3, rel=1e-3) or abs(forces[-1]) == pytest.approx(
-        0.4 * 0.7, rel=1e-3
-    )
+    assert min(abs(abs(forces[-1]) - 0.4 * factor) for factor in (0.7, 1.3)) < 1e-3
 
 
 def test_an_x_axis_along_the_normal_gives_way_to_the_y_axis():
@@ -117,8 +115,8 @@ def test_an_x_axis_along_the_normal_gives_way_to_the_y_axis():
 # ---------------------------------------------------------------------- prepare
 
 
-NEAR = """<geom name="floor" type="plane" size="5 5 1" condim="1" margin="0.005" gap="0.001" solref="0.01 0.8" solmix="2"
- {floor}/><body pos="0 0 {height}"><freejoint/><geom name="box" type="box" size="0.02 0.02 0.02" mass="0.2" condim="1"
+NEAR = """<geom name="floor" type="plane" size="5 5 1" condim="1" margin="0.005" gap="0.001" solref="0.01 0.8"
+ solmix="2" {floor}/><body pos="0 0 {height}"><freejoint/><geom name="box" type="box" size="0.02 0.02 0.02" mass="0.2" condim="1"
  margin="0.002" gap="0.002" solimp="0.8 0.9 0.002 0.4 3" {own}/><site name="sole" pos="0 0 -0.02"/></body>"""
 
 

@@ -19,8 +19,8 @@ from mujoco import mjx
 
 from planarfriction.adapters.mjx.newton import HostResponse
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
-from planarfriction.adapters.mujoco.loops.geometry import ALONG
 from planarfriction.adapters.mujoco.patches import Placed
+from planarfriction.coupling import ALONG
 from planarfriction.jax.namespace import xp
 from planarfriction.tensors.pressure import centre_of
 

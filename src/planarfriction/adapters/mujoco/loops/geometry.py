@@ -8,6 +8,7 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call_c
 from planarfriction.compiler.memory import at, doubles, integers, integers32
+from planarfriction.coupling import ALONG, FLAT
 from planarfriction.kernels.vectors import dot, norm, plus, square, three, times
 
 
@@ -57,14 +58,6 @@ def _collect(own, d, s, nefc):
                 counts[p] += 1
                 owners[row] = p
                 s.depths[2 * p + 1] = xp.maximum(s.depths[2 * p + 1], -doubles(contact + own.contact.dist)[0])
-
-
-ALONG = 1e-12
-"""Square of the sine of the angle between a site's x axis and the normal below which its y axis takes its place."""
-
-
-FLAT = 0.25
-"""Square of that sine below which a patch that was in contact before keeps its x axis, carried along with its body."""
 
 
 @kernel

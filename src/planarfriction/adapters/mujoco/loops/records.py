@@ -71,7 +71,7 @@ class Remembered(NamedTuple):
     centre: Doubles
     """Origins of patches in the step, [3k]."""
     before: Doubles
-    """x axes of patches at the beginning of the step, in the frames of their sites, [3k]; 0 before the first contact."""
+    """x axes of patches at the beginning of the step, in the frames of their sites, [3k]; 0 before any."""
     axis: Doubles
     """x axes of patches in the step, [3k]."""
     warmstart: Doubles

@@ -11,8 +11,8 @@ import mujoco
 import warp as wp
 
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
-from planarfriction.adapters.mujoco.loops.geometry import ALONG
 from planarfriction.adapters.mujoco.loops.records import Memory
+from planarfriction.coupling import ALONG
 
 FRICTIONLESS = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS))
 
