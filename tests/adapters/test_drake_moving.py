@@ -91,7 +91,7 @@ def ball(turned: RotationMatrix, angle: float) -> Running:
 
 @pytest.mark.parametrize("turned", [RotationMatrix(), RotationMatrix.MakeYRotation(np.pi / 2)])
 def test_a_ball_rolls_down_at_a_constant_acceleration(turned):
-    """5/7 g sin(angle); the x axis of its frame reverses every half turn, and in the second case starts as the normal."""
+    """5/7 g sin(angle); the x axis of its frame reverses every half turn, or starts as the normal."""
     angle, speeds = math.radians(10.0), []
     made = ball(turned, angle)
     for i in range(600):

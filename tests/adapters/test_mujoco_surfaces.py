@@ -116,8 +116,8 @@ def test_an_x_axis_along_the_normal_gives_way_to_the_y_axis():
 
 
 NEAR = """<geom name="floor" type="plane" size="5 5 1" condim="1" margin="0.005" gap="0.001" solref="0.01 0.8"
- solmix="2" {floor}/><body pos="0 0 {height}"><freejoint/><geom name="box" type="box" size="0.02 0.02 0.02" mass="0.2" condim="1"
- margin="0.002" gap="0.002" solimp="0.8 0.9 0.002 0.4 3" {own}/><site name="sole" pos="0 0 -0.02"/></body>"""
+ solmix="2" {floor}/><body pos="0 0 {height}"><freejoint/><geom name="box" type="box" size="0.02 0.02 0.02" mass="0.2"
+ condim="1" margin="0.002" gap="0.002" solimp="0.8 0.9 0.002 0.4 3" {own}/><site name="sole" pos="0 0 -0.02"/></body>"""
 
 
 @pytest.mark.parametrize("priority", [0, 1])

@@ -88,7 +88,8 @@ class Asking:
         """Take a step from the state of the shadow, under generalized forces `applied` and friction.
 
         From `bristles`, the `wrench` of each patch in the last step, the generalized `force` that these were, the
-        twists that bristles are `owed` (those that they saw in the last step were off by them), its `axes` and `answers`.
+        twists that bristles are `owed` (those that they saw in the last step were off by them), its x `axes`, and its
+        `answers`.
         """
         row, passes, iterations, solved, misfit = self._row, 0, 0, False, np.inf
         bristles, wrench, owed, axes = bristles.copy(), wrench.copy(), owed.copy(), axes.copy()

@@ -77,8 +77,8 @@ class Friction(LeafSystem):
         self._declare_inputs(plant)
         k, states = len(self.patches), self.coupled.state_shape[0]
         sizes = {
-            "bristles": states, "wrenches": 3 * k, "force": self._size, "owed": 3 * k, "axes": 3 * k, "twists": 3 * k, "loads": k,
-            "answers": k * (1 + 12 * k), "velocities": self._size, "report": len(Report._fields),
+            "bristles": states, "wrenches": 3 * k, "force": self._size, "owed": 3 * k, "axes": 3 * k, "twists": 3 * k,
+            "loads": k, "answers": k * (1 + 12 * k), "velocities": self._size, "report": len(Report._fields),
         }  # fmt: skip
         bounds = np.cumsum([0, *sizes.values()])
         self._parts = {name: slice(*ends) for name, ends in zip(sizes, itertools.pairwise(bounds), strict=True)}
