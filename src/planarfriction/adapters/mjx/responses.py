@@ -216,12 +216,12 @@ def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Ar
         normal = _unit(normal, touching)
         turned, site = d.site_xmat[place.site].reshape(3, 3), d.site_xpos[place.site]
         across = turned - jnp.outer(normal, normal @ turned)
-        flat, last = across[:, 0] @ across[:, 0], across @ before
-        kept = touching & (last @ last >= ALONG)
-        last = _unit(last, kept)
-        sided = jnp.where(kept & (across[:, 0] @ last < 0.0), -1.0, 1.0) * across[:, 0]
+        flat, along = across[:, 0] @ across[:, 0], across @ before
+        kept = touching & (along @ along >= ALONG)
+        along = _unit(along, kept)
+        sided = jnp.where(kept & (across[:, 0] @ along < 0.0), -1.0, 1.0) * across[:, 0]
         x = _unit(jnp.where(flat >= ALONG, sided, across[:, 1]), touching)
-        x = jnp.where(kept & (flat < FLAT), last, x)
+        x = jnp.where(kept & (flat < FLAT), along, x)
         middle = jnp.where(chosen[:, None], contact.pos, 0.0).sum(0) / jnp.maximum(chosen.sum(), 1)
         last, new = site + turned @ held, (held == 0.0).all()
         last = jnp.where(new, middle, last + normal * (normal @ (middle - last)))
@@ -231,7 +231,7 @@ def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Ar
             for own, other in zip(mjx.jac(m, d, centre, place.owner), mjx.jac(m, d, centre, place.support), strict=True)
         )
         y = jnp.cross(normal, x)
-        carried = jnp.where(kept, jnp.stack([last @ x, -last @ y]), jnp.array([1.0, 0.0]))
+        carried = jnp.where(kept, jnp.stack([along @ x, -along @ y]), jnp.array([1.0, 0.0]))
         drift = jnp.zeros(3)
         for geom, surface, sign in zip((place.own, place.other), place.surface, (1.0, -1.0), strict=True):
             frame = d.geom_xmat[geom].reshape(3, 3)
