@@ -216,6 +216,62 @@ def touch(patches: Patches, contacts: Contacts, frames: Frames, w: int, p: int, 
     return normal, middle, count
 
 
+@wp.func
+def carry(
+    patches: Patches,
+    state: wp.array2d(dtype=float),
+    guess: wp.array3d(dtype=float),
+    w: int,
+    p: int,
+    last: wp.vec3,
+    x: wp.vec3,
+    normal: wp.vec3,
+):
+    """Write bristles and guess of a patch in its axes of this step instead of the last ones, if there are any."""
+    if wp.dot(last, last) > 0.0:
+        cosine = wp.dot(last, x)
+        sine = wp.dot(normal, wp.cross(last, x))
+        fx = guess[w, p, 0]
+        fy = guess[w, p, 1]
+        guess[w, p, 0] = cosine * fx + sine * fy
+        guess[w, p, 1] = cosine * fy - sine * fx
+        for i in range(patches.bristles[p]):
+            one = patches.first[p] + i
+            two = one + patches.bristles[p]
+            zx = state[w, one]
+            zy = state[w, two]
+            state[w, one] = cosine * zx + sine * zy
+            state[w, two] = cosine * zy - sine * zx
+
+
+@wp.func
+def write_rows(
+    patches: Patches,
+    tree: Tree,
+    frames: Frames,
+    qvel: wp.array2d(dtype=float),
+    guess: wp.array3d(dtype=float),
+    passive: wp.array2d(dtype=float),
+    w: int,
+    p: int,
+    origin: wp.vec3,
+    axes: wp.mat33,
+) -> wp.vec3:
+    """Write the Jacobian of a patch, add its guess to the passive forces, and return the spin in its axes."""
+    tilt = wp.vec3()
+    for i in range(frames.jacobian.shape[2]):
+        both = jacobian_of(tree, w, origin, patches.owner[p], i)
+        both -= jacobian_of(tree, w, origin, patches.support[p], i)
+        move = axes * wp.spatial_top(both)
+        turn = axes * wp.spatial_bottom(both)
+        frames.jacobian[w, 3 * p, i] = move[0]
+        frames.jacobian[w, 3 * p + 1, i] = move[1]
+        frames.jacobian[w, 3 * p + 2, i] = turn[2]
+        tilt += qvel[w, i] * turn
+        passive[w, i] = passive[w, i] + move[0] * guess[w, p, 0] + move[1] * guess[w, p, 1] + turn[2] * guess[w, p, 2]
+    return tilt
+
+
 @wp.kernel(enable_backward=False)
 def place(
     patches: Patches,
@@ -259,20 +315,7 @@ def place(
         axes = axes_of(turned, normal, last)
         x = wp.vec3(axes[0, 0], axes[0, 1], axes[0, 2])
         frames.axis[w, p] = wp.transpose(turned) * x
-        if wp.dot(last, last) > 0.0:
-            cosine = wp.dot(last, x)
-            sine = wp.dot(normal, wp.cross(last, x))
-            fx = guess[w, p, 0]
-            fy = guess[w, p, 1]
-            guess[w, p, 0] = cosine * fx + sine * fy
-            guess[w, p, 1] = cosine * fy - sine * fx
-            for i in range(patches.bristles[p]):
-                one = patches.first[p] + i
-                two = one + patches.bristles[p]
-                zx = state[w, one]
-                zy = state[w, two]
-                state[w, one] = cosine * zx + sine * zy
-                state[w, two] = cosine * zy - sine * zx
+        carry(patches, state, guess, w, p, last, x, normal)
         origin = site_xpos[w, site]
         held = frames.held[w, p]
         if patches.at_contact[p] != 0:
@@ -286,19 +329,7 @@ def place(
         drift = drift_of(geom_xmat[w, own], origin - geom_xpos[w, own], patches.surface[p, 0], axes)
         drift -= drift_of(geom_xmat[w, other], origin - geom_xpos[w, other], patches.surface[p, 1], axes)
         frames.drift[w, p] = drift
-        tilt = wp.vec3()
-        for i in range(nv):
-            both = jacobian_of(tree, w, origin, patches.owner[p], i)
-            both -= jacobian_of(tree, w, origin, patches.support[p], i)
-            move = axes * wp.spatial_top(both)
-            turn = axes * wp.spatial_bottom(both)
-            frames.jacobian[w, 3 * p, i] = move[0]
-            frames.jacobian[w, 3 * p + 1, i] = move[1]
-            frames.jacobian[w, 3 * p + 2, i] = turn[2]
-            tilt += qvel[w, i] * turn
-            passive[w, i] = (
-                passive[w, i] + move[0] * guess[w, p, 0] + move[1] * guess[w, p, 1] + turn[2] * guess[w, p, 2]
-            )
+        tilt = write_rows(patches, tree, frames, qvel, guess, passive, w, p, origin, axes)
         frames.rolling[w, p] = wp.sqrt(tilt[0] * tilt[0] + tilt[1] * tilt[1])
         frames.axes[w, p] = axes
         frames.origin[w, p] = origin
