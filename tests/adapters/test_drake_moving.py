@@ -1,4 +1,4 @@
-"""What comes to rest on a moving carrier, or rolls, inside Drake."""
+"""Boxes that come to rest on a moving carrier, and balls that roll, inside Drake."""
 
 from __future__ import annotations
 
