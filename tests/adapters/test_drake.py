@@ -161,7 +161,7 @@ def test_free_bodies_answer_as_the_joints_are_damped():
     before = shadow.step(np.zeros(size))
     assert not shadow.pushes(first=True).any()
     caused = np.array([shadow.step(row) - before for row in rows]).T
-    np.testing.assert_allclose(shadow.moved(rows), caused, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(shadow.moved(rows)[0], caused, rtol=1e-9, atol=1e-12)
 
 
 def test_answers_learnt_are_differences_of_steps():
@@ -177,7 +177,7 @@ def test_answers_learnt_are_differences_of_steps():
 
     def came_out(wrench):
         velocity, pushes = shadow.step(wrench @ asking._rows), shadow.pushes(first=True)
-        asking._touch(pushes)
+        asking._touch(pushes, np.zeros(asking._coupled.state_shape), *np.zeros((3, 12)))
         return asking._rows @ velocity, (asking._normals * pushes[:, :3]).sum(axis=1)
 
     came_out(np.zeros(12))
@@ -204,7 +204,7 @@ def test_what_comes_out_otherwise_than_bristles_saw_is_owed_to_them(monkeypatch)
     before = [own[parts[name]] for name in ("bristles", "wrenches", "force")]
     monkeypatch.setattr("planarfriction.adapters.drake.asking.MISFIT", 1.0)
     shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
-    asked = asking.step(np.zeros(6), *before, given, own[parts["answers"]])
+    asked = asking.step(np.zeros(6), *before, given, own[parts["axes"]], own[parts["answers"]])
     came_out = asking._rows @ shadow.step(asked.force)
     assert abs(asked.owed).max() > 1e-5
     np.testing.assert_allclose(asked.twists, came_out, atol=1e-9)
@@ -215,7 +215,8 @@ def test_what_comes_out_otherwise_than_bristles_saw_is_owed_to_them(monkeypatch)
     own = run.own.get_discrete_state_vector().value().copy()
     before = [own[run.friction._parts[name]] for name in ("bristles", "wrenches", "force")]
     run.friction._shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
-    asked = run.friction._asking.step(np.zeros(6), *before, given, own[run.friction._parts["answers"]])
+    rest = given, own[run.friction._parts["axes"]], own[run.friction._parts["answers"]]
+    asked = run.friction._asking.step(np.zeros(6), *before, *rest)
     np.testing.assert_allclose(asked.twists, -given, atol=2e-6)  # pulled back, but for what bristles give
 
 
@@ -228,7 +229,9 @@ def test_answers_that_lead_away_are_forgotten():
     answers[1:10] *= 0.02
     run.friction._shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
     before = [own[parts[name]] for name in ("bristles", "wrenches", "force")]
-    asked = run.friction._asking.step(np.array([0.0, 0.0, 0.0, 0.1, 0.0, 0.0]), *before, np.zeros(3), answers)
+    asked = run.friction._asking.step(
+        np.array([0.0, 0.0, 0.0, 0.1, 0.0, 0.0]), *before, np.zeros(3), own[parts["axes"]], answers
+    )
     passes, _, _, misfit, _ = asked.report
     assert passes < 10 and misfit <= MISFIT
 
