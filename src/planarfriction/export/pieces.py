@@ -17,8 +17,8 @@ from planarfriction.kernels import (
     cells_rollout,
     disc_cells,
     discs,
-    distributed_step,
     moment_steps,
+    points,
     published_step,
 )
 from planarfriction.kernels.derive import derive
@@ -172,7 +172,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     numbers, law, size = model.compiled.numbers(), model.law.numbers, model.compiled.size
     more = max(count - model.patch.cells, 0)
     n = model.patch.cells + more
-    kind, cell, sliding = cells, distributed_step.cell, _sliding
+    kind, cell, sliding = cells, points.step, _sliding
     if size == 3:
         kind, sliding = disc_cells, discs.sliding if precision == "double" else _sliding_of_disc
         cell = _with(discs.step, sliding=sliding)

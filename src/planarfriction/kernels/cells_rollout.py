@@ -14,7 +14,6 @@ from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.calls import pointer
 from planarfriction.compiler.memory import at
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, distributed_step
 from planarfriction.kernels.bind import bind
 from planarfriction.kernels.cell_blocks import (
     BAR,
@@ -29,12 +28,10 @@ from planarfriction.kernels.cell_blocks import (
     lever_at,
     totals,
 )
-from planarfriction.kernels.cell_passes import advance
-from planarfriction.kernels.cell_slopes import retreat
 from planarfriction.kernels.forward import forward
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rollouts import row_of
-from planarfriction.kernels.vectors import add, plus, reader_of, scatter, three, times
+from planarfriction.kernels.vectors import add, plus, scatter, three, times
 
 PARAMETERS = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
 """Numbers of the law that derivatives are taken by."""
@@ -274,7 +271,3 @@ def bound(kind: Kind, name: str) -> CellRollouts:
 
 
 TEMPLATES = rollout, gradient, tangent
-POINTS = Kind(cells.POSITIONS, 2, advance, retreat, pushed_of(distributed_step.cell), reader_of(2))
-"""Points without a metric."""
-TURNED_POINTS = POINTS._replace(lever=cells.LEVERS)
-ISOTROPIC, TURNED = bound(POINTS, "isotropic"), bound(TURNED_POINTS, "turned")

@@ -13,10 +13,9 @@ import numpy as np
 from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.calls import pointer
 from planarfriction.compiler.memory import at
-from planarfriction.kernels import distributed_step
 from planarfriction.kernels.bind import bind
 from planarfriction.kernels.cell_blocks import BLOCK, LANES, WEIGHT, Kind, Z, divided, lever_at
-from planarfriction.kernels.cells_rollout import POINTS, TURNED_POINTS, _lay, _read, _write
+from planarfriction.kernels.cells_rollout import _lay, _read, _write
 from planarfriction.kernels.forward import forwards
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rollouts import row_of
@@ -136,6 +135,3 @@ def bound(kind: Kind, step: Any, name: str) -> Any:
     pushed = forwards(step, _BY, ("z", "u")).pushed
     return bind(sensitivities, _Model(kind, pushed), f"{name}_sensitivities", jit)
 
-
-ISOTROPIC = bound(POINTS, distributed_step.cell, "isotropic")
-TURNED = bound(TURNED_POINTS, distributed_step.cell, "turned")

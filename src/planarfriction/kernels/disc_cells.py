@@ -117,7 +117,6 @@ def step_leaning(lean, z, u, dt):
 
 # ---------------------------------------------------------------------- bound to the levers
 
-BRISTLE = bristle(discs.evaluate, discs.step, 3, linear=True)
 _LEANING = {
     "lever": LEVERS._replace(law=_leaning_law),
     "bristle": bristle(evaluate_leaning, step_leaning, 3, linear=True),

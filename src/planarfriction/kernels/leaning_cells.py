@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.kernels import cells, distributed_step
+from planarfriction.kernels import cells, points
 from planarfriction.kernels.contacts import functions_of, traction
 from planarfriction.kernels.general_cells import RATES, STEPS, bristle
 from planarfriction.kernels.rules import ratio
@@ -47,7 +47,7 @@ def evaluate(lean, z, u):
 def step(lean, z, u, dt):
     """Return the new bristle and the traction of a cell that moves at u."""
     c = times(formulas.stribeck(xp, norm(u), lean.law) / lean.law.sigma_0, lean.a)
-    new, pull = distributed_step.cell(lean.law, plus(z, -1.0, c), u, dt)
+    new, pull = points.step(lean.law, plus(z, -1.0, c), u, dt)
     return plus(new, 1.0, c), plus(pull, -lean.law.sigma_0, c)
 
 
