@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from planarfriction.compiler.memory import Doubles
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import discs, points
 from planarfriction.kernels.cell_blocks import BAR, BY_LOAD, LANES, WEIGHT, Z
@@ -43,12 +44,21 @@ class Element(NamedTuple):
 
 
 POINT = Element(
-    "points", 2, points.evaluate, points.step, Division(8, 2), Division(6, 6), Division(5, 0), Division(4, 2)
+    "points", 2, points.evaluate, points.step, Division(8, 2), Division(6, 6), Division(5, 0), Division(2, 0)
 )
 DISC = Element("discs", 3, discs.evaluate, discs.step, Division(8, 2), Division(6, 6), Division(5, 0), Division(4, 2))
 
-RATES_AT, SLOPES_AT = LANES * 11, LANES * 14
-"""Fields of a block of the solver behind its weights: rates [d], and derivatives by state and velocity [2, d, d]."""
+
+class Rows(NamedTuple):
+    """Cells of the solver from one on, where they lie: row by row of n numbers."""
+
+    cells: Doubles
+    z: Doubles
+    weights: Doubles
+    out: Doubles
+    """Rates [d, n], or derivatives by state and velocity [2, d, d, n]."""
+    n: int
+
 
 _LAW = {f"law.{name}": f"law.{name}" for name in LawNumbers._fields}
 
@@ -77,6 +87,17 @@ def _sources(element: Element, numbers: int) -> dict[str, str]:
     twist = {f"v{m}": f"v[{m}]" for m in range(3)}
     cell = _fields("c", 0, numbers) | _fields("z", Z, element.size)
     return {**_LAW, **cell, **twist, "dt": "given[0]", "weight": f"block[{WEIGHT} + i]"}
+
+
+def _rows(letter: str, field: str, count: int) -> dict[str, str]:
+    """Return the sources of a vector of symbols that lies in rows of the solver."""
+    return {f"{letter}{m}": f"block.{field}[{m} * block.n + i]" for m in range(count)}
+
+
+def _solver_sources(element: Element, numbers: int) -> dict[str, str]:
+    """Return the sources of the symbols in `Rows`."""
+    rows = _rows("c", "cells", numbers) | _rows("z", "z", element.size)
+    return {**_sources(element, numbers), **rows, "weight": "block.weights[0 + i]"}
 
 
 def forward_passes(element: Element, lever: Lever, numbers: int) -> Passes:
@@ -123,9 +144,9 @@ def rate_passes(element: Element, lever: Lever, numbers: int) -> Passes:
         zdot, traction = twin(element.evaluate)(s.law, s.z, twin(lever.seen)(s.cell, s.v))
         return zdot, twin(lever.wrench)(s.cell, tuple(s.weight * each for each in traction))
 
-    stores = list(_fields("r", RATES_AT, element.size).values())
+    stores = list(_rows("r", "out", element.size).values())
     name, division = f"rates of {element.name}", element.rate._asdict()
-    return passes(name, traced(rate), _sources(element, numbers), stores, **division)
+    return passes(name, traced(rate), _solver_sources(element, numbers), stores, **division)
 
 
 def slope_passes(element: Element, lever: Lever, numbers: int) -> Passes:
@@ -139,6 +160,6 @@ def slope_passes(element: Element, lever: Lever, numbers: int) -> Passes:
         rows = [twin(written.back)(tape, (unit, (0.0,) * element.size)) for unit in units]
         return tuple(by_z for by_z, _ in rows), tuple(by_u for _, by_u in rows)
 
-    stores = list(_fields("s", SLOPES_AT, 2 * element.size**2).values())
+    stores = list(_rows("s", "out", 2 * element.size**2).values())
     name, division = f"slopes of {element.name}", element.slopes._asdict()
-    return passes(name, traced(slopes), _sources(element, numbers), stores, **division)
+    return passes(name, traced(slopes), _solver_sources(element, numbers), stores, **division)

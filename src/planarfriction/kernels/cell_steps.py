@@ -16,9 +16,8 @@ from planarfriction.kernels.cell_blocks import BLOCK, LANES, WEIGHT, Z, divided,
 from planarfriction.kernels.cell_passes import (
     DISC,
     POINT,
-    RATES_AT,
-    SLOPES_AT,
     Element,
+    Rows,
     forward_passes,
     rate_passes,
     slope_passes,
@@ -46,9 +45,6 @@ KINDS = {
     (3, True): CellKind("turned_discs", DISC, disc_cells.LEVERS, 6),
 }
 """Kinds of cells by the components of a bristle and whether there is a metric."""
-
-SOLVER_BLOCK = SLOPES_AT + LANES * 2 * DISC.size**2
-"""Numbers of a block of the solver."""
 
 
 @kernel
@@ -83,6 +79,12 @@ def empty(rows: int, field: int, block: Doubles, first: int, lanes: int, n: int,
         copy(count, at(block, field + m * LANES), at(target, m * n + first))
 
 
+@kernel
+def rows_from(contact: CellsContact, z: Doubles, first: int, out: Doubles) -> Rows:
+    """Return the rows of the cells of a contact from one on."""
+    return Rows(at(contact.cells, first), at(z, first), at(contact.weights, first), at(out, first), contact.count)
+
+
 def advance_of(written: Passes) -> Any:
     """Return `cell_blocks.Kind.advance` from the passes of a step."""
     step, numbers = written.run, LANES * written.rows
@@ -108,25 +110,22 @@ def _run(written: Passes) -> Any:
     return passed
 
 
-def evaluate(lever, bristle, rate, contact, z, v, zdot, w):
+def evaluate(rate, contact, z, v, zdot, w):
     """Write `z'`, and `W`."""
-    record, twist, total, block = cells.read(contact), three(v), (0.0, 0.0, 0.0), room(SOLVER_BLOCK)
+    record, twist, total = cells.read(contact), three(v), (0.0, 0.0, 0.0)
     n, (_, lanes) = record.count, divided(record.count)
     for first in range(0, n, lanes):
-        fill(lever, bristle.size, record, z, first, lanes, block)
-        total = plus(total, 1.0, rate(record.law, twist, block, lanes))
-        empty(bristle.size, RATES_AT, block, first, lanes, n, zdot)
+        rows = rows_from(record, z, first, zdot)
+        total = plus(total, 1.0, rate(record.law, twist, rows, min(lanes, n - first)))
     put(w, total)
 
 
-def linearise(lever, bristle, slope, contact, z, v, lin):
+def linearise(slope, contact, z, v, lin):
     """Write A and F of each cell (see `general_cells`)."""
-    record, twist, block = cells.read(contact), three(v), room(SOLVER_BLOCK)
+    record, twist = cells.read(contact), three(v)
     n, (_, lanes) = record.count, divided(record.count)
     for first in range(0, n, lanes):
-        fill(lever, bristle.size, record, z, first, lanes, block)
-        slope(record.law, twist, block, lanes)
-        empty(2 * bristle.size * bristle.size, SLOPES_AT, block, first, lanes, n, lin)
+        slope(record.law, twist, rows_from(record, z, first, lin), min(lanes, n - first))
 
 
 def step(lever, bristle, advance, contact, z, v, dt, new, out):
@@ -159,6 +158,4 @@ def functions_of_cells(size: int, turned: bool) -> CellFunctions:
     bristle = general_cells.bristle(element.evaluate, element.step, size, linear=True)
     model = {"lever": lever, "bristle": bristle, "read": cells.read}
     rates = functions_of(name, (evaluate, linearise, *general_cells.RATES[2:]), **model, rate=rate, slope=slope)
-    return CellFunctions(
-        rates, step_functions(name, (step, general_cells.slopes), **model, advance=advance), advance
-    )
+    return CellFunctions(rates, step_functions(name, (step, general_cells.slopes), **model, advance=advance), advance)
