@@ -95,7 +95,7 @@ class CompiledDistributed(CompiledModel):
         law, d, lin = self.law.numbers, self.size, self.linearisation(state, twist, load)
         if self.reference > 0.0:
             lin = lin[..., : MATRICES * d * d, :]
-        matrices = np.moveaxis(lin.reshape(*load.shape, -1, d, d, lin.shape[-1]), -4, 0)
+        matrices = np.moveaxis(lin.reshape(*load.shape, lin.shape[-2] // d**2, d, d, lin.shape[-1]), -4, 0)
         by_state, by_velocity, identity = matrices[A], matrices[F], np.eye(d)[:, :, None]
         if len(matrices) == MATRICES:
             return by_state, by_velocity, matrices[C], matrices[E]

@@ -56,7 +56,7 @@ class Rows(NamedTuple):
     z: Doubles
     weights: Doubles
     out: Doubles
-    """Rates [d, n], or derivatives by state and velocity [2, d, d, n]."""
+    """Rates [d, n], or a block of derivatives by state and velocity [2, d, d, LANES]."""
     n: int
 
 
@@ -160,6 +160,6 @@ def slope_passes(element: Element, lever: Lever, numbers: int) -> Passes:
         rows = [twin(written.back)(tape, (unit, (0.0,) * element.size)) for unit in units]
         return tuple(by_z for by_z, _ in rows), tuple(by_u for _, by_u in rows)
 
-    stores = list(_rows("s", "out", 2 * element.size**2).values())
+    stores = [f"block.out[{m * LANES} + i]" for m in range(2 * element.size**2)]  # of a block: that lies apart
     name, division = f"slopes of {element.name}", element.slopes._asdict()
     return passes(name, traced(slopes), _solver_sources(element, numbers), stores, **division)

@@ -47,6 +47,10 @@ KINDS = {
 """Kinds of cells by the components of a bristle and whether there is a metric."""
 
 
+SLOPES = LANES * 2 * DISC.size**2
+"""Numbers of a block of derivatives."""
+
+
 @kernel
 def copy(count: int, source: Doubles, target: Doubles) -> None:
     """Copy numbers."""
@@ -82,7 +86,7 @@ def empty(rows: int, field: int, block: Doubles, first: int, lanes: int, n: int,
 @kernel
 def rows_from(contact: CellsContact, z: Doubles, first: int, out: Doubles) -> Rows:
     """Return the rows of the cells of a contact from one on."""
-    return Rows(at(contact.cells, first), at(z, first), at(contact.weights, first), at(out, first), contact.count)
+    return Rows(at(contact.cells, first), at(z, first), at(contact.weights, first), out, contact.count)
 
 
 def advance_of(written: Passes) -> Any:
@@ -115,17 +119,18 @@ def evaluate(rate, contact, z, v, zdot, w):
     record, twist, total = cells.read(contact), three(v), (0.0, 0.0, 0.0)
     n, (_, lanes) = record.count, divided(record.count)
     for first in range(0, n, lanes):
-        rows = rows_from(record, z, first, zdot)
+        rows = rows_from(record, z, first, at(zdot, first))
         total = plus(total, 1.0, rate(record.law, twist, rows, min(lanes, n - first)))
     put(w, total)
 
 
-def linearise(slope, contact, z, v, lin):
+def linearise(bristle, slope, contact, z, v, lin):
     """Write A and F of each cell (see `general_cells`)."""
-    record, twist = cells.read(contact), three(v)
+    record, twist, block = cells.read(contact), three(v), room(SLOPES)
     n, (_, lanes) = record.count, divided(record.count)
     for first in range(0, n, lanes):
-        slope(record.law, twist, rows_from(record, z, first, lin), min(lanes, n - first))
+        slope(record.law, twist, rows_from(record, z, first, block), min(lanes, n - first))
+        empty(2 * bristle.size * bristle.size, 0, block, first, lanes, n, lin)
 
 
 def step(lever, bristle, advance, contact, z, v, dt, new, out):
