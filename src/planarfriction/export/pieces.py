@@ -235,7 +235,8 @@ def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
     def step(trace: Trace) -> Any:
         new, out, dt = [0.0] * 3, [0.0] * 3, Number(trace, "dt")
         z, twist = _state(trace, 3, 1), _vector(trace, *_TWIST)
-        twin(moment_steps.step)(frame, hold, taped_step, contact(trace), z, twist, dt, new, out)
+        model = {"frame": frame, "hold": hold, "taped_step": taped_step}
+        twin(moment_steps.step)(contact(trace), z, twist, dt, new, out, **model)
         return tuple(new), tuple(out)
 
     def steady(trace: Trace) -> Any:
@@ -258,7 +259,8 @@ def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
         new, out, dt = [0.0] * 3, [0.0] * 39, Number(trace, "dt")
         z, twist = _state(trace, 3, 1), _vector(trace, *_TWIST)
         given = contact(trace), z, twist, dt, new, out
-        twin(moment_steps.slopes)(frame, twin(steps.MODEL.hold_slopes), taped_step, pull_back, True, *given)
+        model = {"frame": frame, "hold_slopes": twin(steps.MODEL.hold_slopes), "taped_step": taped_step}
+        twin(moment_steps.slopes)(*given, **model, pull_back=pull_back, whole=True)
         by_law = [tuple(getattr(each, name) for name in _parameters(law)) for each in laws]
         rows = [
             (*out[at + 18 : at + 21], *out[at : at + 3], bar) for at, bar in zip(range(3, 21, 3), by_law, strict=True)

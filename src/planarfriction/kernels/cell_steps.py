@@ -114,7 +114,7 @@ def _run(written: Passes) -> Any:
     return passed
 
 
-def evaluate(rate, contact, z, v, zdot, w):
+def evaluate(contact, z, v, zdot, w, *, rate):
     """Write `z'`, and `W`."""
     record, twist, total = cells.read(contact), three(v), (0.0, 0.0, 0.0)
     n, (_, lanes) = record.count, divided(record.count)
@@ -124,7 +124,7 @@ def evaluate(rate, contact, z, v, zdot, w):
     put(w, total)
 
 
-def linearise(bristle, slope, contact, z, v, lin):
+def linearise(contact, z, v, lin, *, bristle, slope):
     """Write A and F of each cell (see `general_cells`)."""
     record, twist, block = cells.read(contact), three(v), room(SLOPES)
     n, (_, lanes) = record.count, divided(record.count)
@@ -133,7 +133,7 @@ def linearise(bristle, slope, contact, z, v, lin):
         empty(2 * bristle.size * bristle.size, 0, block, first, lanes, n, lin)
 
 
-def step(lever, bristle, advance, contact, z, v, dt, new, out):
+def step(contact, z, v, dt, new, out, *, lever, bristle, advance):
     """Advance the bristles by `dt` at a held twist, and write the wrench at the end."""
     record, twist, total, block = cells.read(contact), three(v), (0.0, 0.0, 0.0), room(BLOCK)
     n, (_, lanes) = record.count, divided(record.count)

@@ -134,7 +134,7 @@ def _rollout(kind, inputs, span, z, wrench, states, scratch):
         _read(w, Z, z[b], n, kind.size)
 
 
-def rollout(kind, inputs, span, z, wrench, states):
+def rollout(inputs, span, z, wrench, states, *, kind):
     """Step the contacts `span[0]` to `span[1]`: `z` [B, size n] in place, wrenches added to `wrench` [B, T, 3].
 
     The state before each step goes into `states` [B, T, size n], unless that is empty.
@@ -181,7 +181,7 @@ def _gradient(kind, inputs, states, wrench_bar, span, bars, scratch):
             row_bar[COLUMNS[m]] += by_law[m]
 
 
-def gradient(kind, inputs, states, wrench_bar, span, bars):
+def gradient(inputs, states, wrench_bar, span, bars, *, kind):
     """Add the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
     scratch = np.empty(divided(inputs.shapes.shape[1])[0] * BLOCK)
     _gradient(kind, inputs, states, wrench_bar, span, bars, scratch)
@@ -241,7 +241,7 @@ def _tangent(kind, inputs, span, z, changes, wrenches, slopes, scratch):
         _read(w, BAR, changes.state[b], n, kind.size)
 
 
-def tangent(kind, inputs, span, z, changes, wrenches, slopes):
+def tangent(inputs, span, z, changes, wrenches, slopes, *, kind):
     """Run roll-outs with their change along given ones of the inputs, added to `wrenches` and `slopes` [B, T, 3].
 
     `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state in place.
@@ -261,13 +261,9 @@ class CellRollouts(NamedTuple):
     tangent: Any
 
 
-class _Model(NamedTuple):
-    kind: Kind
-
-
 def bound(kind: Kind, name: str) -> CellRollouts:
     """Return the entry points of a kind of cells."""
-    return CellRollouts(*(bind(each, _Model(kind), f"{name}_{each.__name__}", jit) for each in TEMPLATES))
+    return CellRollouts(*(bind(each, f"{name}_{each.__name__}", jit, kind=kind) for each in TEMPLATES))
 
 
 TEMPLATES = rollout, gradient, tangent

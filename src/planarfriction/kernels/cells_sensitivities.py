@@ -6,7 +6,7 @@ of `sigma_1` and `sigma_2` move no bristle.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -115,7 +115,7 @@ def _sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes, scra
         _read(w, Z, z[b], n, kind.size, _SIZE)
 
 
-def sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes):
+def sensitivities(inputs, span, z, wanted, wrenches, slopes, *, kind, pushed):
     """Run roll-outs with their derivatives by the numbers `wanted` of `PARAMETERS`.
 
     They are added to `wrenches` [B, T, 3] and `slopes` [B, T, 3, len(wanted)]; `z` [B, size n] in place.
@@ -124,14 +124,7 @@ def sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes):
     _sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes, scratch)
 
 
-class _Model(NamedTuple):
-    kind: Kind
-    pushed: Any
-    """`(law, z, u, dt, changes)`: step a cell and its changes by each number of the law."""
-
-
 def bound(kind: Kind, step: Any, name: str) -> Any:
-    """Return the entry point of a kind of cells, with the step of one."""
+    """Return the entry point of a kind of cells, with the step of one and its changes by each number of the law."""
     pushed = forwards(step, _BY, ("z", "u")).pushed
-    return bind(sensitivities, _Model(kind, pushed), f"{name}_sensitivities", jit)
-
+    return bind(sensitivities, f"{name}_sensitivities", jit, kind=kind, pushed=pushed)

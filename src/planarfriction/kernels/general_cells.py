@@ -155,7 +155,7 @@ def _matrix(bristle, lin, which, i, n):
     return bristle.matrix(lin, which * bristle.size * bristle.size * n + i, n)
 
 
-def evaluate(lever, bristle, read, contact, z, v, zdot, w):
+def evaluate(contact, z, v, zdot, w, *, lever, bristle, read):
     """Write `z'`, and `W`."""
     own, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
     n = own.count
@@ -167,7 +167,7 @@ def evaluate(lever, bristle, read, contact, z, v, zdot, w):
     put(w, total)
 
 
-def linearise(lever, bristle, read, contact, z, v, lin):
+def linearise(contact, z, v, lin, *, lever, bristle, read):
     """Write A, F, C and E of each cell."""
     own, twist = read(contact), three(v)
     n = own.count
@@ -180,7 +180,7 @@ def linearise(lever, bristle, read, contact, z, v, lin):
             scatter(lin, place, n, (found.traction_z, found.traction_u))
 
 
-def factor(lever, bristle, read, contact, z, shift, lin, stiffness):
+def factor(contact, z, shift, lin, stiffness, *, lever, bristle, read):
     """Invert D, write `sum w B' (C D^-1 F + E) B`."""
     own, total = read(contact), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     n = own.count
@@ -196,7 +196,7 @@ def factor(lever, bristle, read, contact, z, shift, lin, stiffness):
     put_all(stiffness, total)
 
 
-def eliminate(lever, bristle, read, contact, z, shift, r, lin, w):
+def eliminate(contact, z, shift, r, lin, w, *, lever, bristle, read):
     """Write `sum w B' C D^-1 r`."""
     own, total = read(contact), (0.0, 0.0, 0.0)
     n = own.count
@@ -211,7 +211,7 @@ def eliminate(lever, bristle, read, contact, z, shift, r, lin, w):
     put(w, total)
 
 
-def back_substitute(lever, bristle, read, contact, z, r, dv, lin, out):
+def back_substitute(contact, z, r, dv, lin, out, *, lever, bristle, read):
     """Solve `D out = r + F B dV`."""
     own, twist = read(contact), three(dv)
     n = own.count
@@ -221,7 +221,7 @@ def back_substitute(lever, bristle, read, contact, z, r, dv, lin, out):
         scatter(out, i, n, matrix_applied(_matrix(bristle, lin, INVERSE, i, n), driven))
 
 
-def change(lever, bristle, read, contact, z, zdot, lin, dz, dzdot, rows, friction, size):
+def change(contact, z, zdot, lin, dz, dzdot, rows, friction, size, *, lever, bristle, read):
     """Write the changes of `z'` and of the wrench; bristles grow with friction, and with them what they tend to."""
     own, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
     n, twist = own.count, (rows.d_twist[0], rows.d_twist[1], rows.d_twist[2] + size * rows.twist[2])
@@ -240,14 +240,14 @@ def change(lever, bristle, read, contact, z, zdot, lin, dz, dzdot, rows, frictio
     put(rows.d_wrench, plus(total, size * rows.wrench[2], (0.0, 0.0, 1.0)))
 
 
-def solve_transposed(bristle, read, contact, z, r, lin, out):
+def solve_transposed(contact, z, r, lin, out, *, bristle, read):
     """Solve `D' out = r`."""
     n = read(contact).count
     for i in range(n):
         scatter(out, i, n, matrix_applied_back(_matrix(bristle, lin, INVERSE, i, n), bristle.vector(r, i, n)))
 
 
-def pull_back(lever, bristle, read, contact, z, lin, dzdot, rows, out):
+def pull_back(contact, z, lin, dzdot, rows, out, *, lever, bristle, read):
     """Write the transpose of `change`."""
     own, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
     n, wrench = own.count, three(rows.d_wrench)
@@ -266,7 +266,7 @@ def pull_back(lever, bristle, read, contact, z, lin, dzdot, rows, out):
     put(rows.d_twist, total)
 
 
-def step(lever, bristle, read, contact, z, v, dt, new, out):
+def step(contact, z, v, dt, new, out, *, lever, bristle, read):
     """Advance the bristles by `dt` at a held twist, and write the wrench at the end."""
     own, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
     n = own.count
@@ -290,7 +290,7 @@ def _put_cell(lever, bristle, cell, weight, found, i, n, out):
     scatter(out, 6 * d * n + i, n, found.new_z)
 
 
-def slopes(lever, bristle, read, whole, contact, z, v, dt, new, out):
+def slopes(contact, z, v, dt, new, out, *, lever, bristle, read, whole):
     """Step with the slopes of the wrench, or with all derivatives."""
     own, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
     n, by_twist = own.count, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
