@@ -133,7 +133,7 @@ def test_passes_step_as_the_function_they_come_from(count):
 
 def test_passes_hand_little_on():
     """A pass that handed on everything would leave the nearest cache: 64 lanes of 12 rows are 6 kB."""
-    written = cell_passes.forward_passes(cell_passes.DISC, disc_cells.POSITIONS, 3)
+    written = cell_passes.forward_passes(cell_passes.KINDS[3, False, False])
     assert written.rows <= 24
     assert written.source.count("def pass_") == cell_passes.DISC.forward.count
     assert LANES * written.rows * 8 <= 16384

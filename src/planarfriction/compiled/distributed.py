@@ -14,13 +14,11 @@ from planarfriction.compiled.packed import PackedModel
 from planarfriction.compiled.rates import linearised
 from planarfriction.compiled.shapes_by_load import ShapesByLoad, cells_by_load
 from planarfriction.compiler.memory import places_of, rows_of, size_of
-from planarfriction.kernels import disc_cells
 from planarfriction.kernels.cell_steps import functions_of_cells
 from planarfriction.kernels.cells import CellsContact
 from planarfriction.kernels.contacts import ModelFunctions
 from planarfriction.kernels.discs import KAPPA
 from planarfriction.kernels.general_cells import LINEAR, MATRICES, A, C, E, F
-from planarfriction.kernels.leaning_cells import RATES_OF_LEANING, STEPS_OF_LEANING
 from planarfriction.kernels.steps import StepFunctions
 from planarfriction.patch.tilt import tilted
 
@@ -46,11 +44,7 @@ class CompiledDistributed(CompiledModel):
         super().__init__(functions, (self.size, cells), (self.size, self.size, cells))
 
     def _functions(self) -> tuple[ModelFunctions, StepFunctions]:
-        if not self.patch.asymmetric:
-            return functions_of_cells(self.size, self.patch.anisotropic)[:2]
-        if self.size == 3:
-            return disc_cells.RATES_OF_LEANING_DISCS, disc_cells.STEPS_OF_LEANING_DISCS
-        return RATES_OF_LEANING, STEPS_OF_LEANING
+        return functions_of_cells(self.size, self.patch.anisotropic, self.patch.asymmetric)
 
     def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         """Return the record of a contact, and how many numbers of a linearisation each cell has."""

@@ -64,8 +64,8 @@ class Kind(NamedTuple):
     advance: Any
     """`(lever, law, w, blocks, lanes, twist, dt)`: step the cells, and return their wrench."""
     retreat: Any
-    """`(lever, law, block, lanes, held, pull, load)`: carry the cotangent of the state over the step of `held` twist
-    and dt; return `StepBars`."""
+    """`(lever, law, block, lanes, interval, pull, load)`: carry the cotangent of the state over the step of
+    an interval, its twist and dt; return `StepBars`."""
     pushed: Any
     """`(law, z, u, dt, dz, du, changes of the law)`: step a cell and its change."""
     vector: Any

@@ -6,15 +6,18 @@ An `Element` is the bristle of a kind of cells (see `points`, `discs`). See `pas
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import discs, points
+from planarfriction.kernels import cells, disc_cells, discs, leaning_cells, points
 from planarfriction.kernels.cell_blocks import BAR, BY_LOAD, LANES, WEIGHT, Z
-from planarfriction.kernels.cells import Lever
+from planarfriction.kernels.cells import CellsContact, Lever
 from planarfriction.kernels.cells_rollout import BY
 from planarfriction.kernels.derive import derive
+from planarfriction.kernels.leaning_cells import Leaning
 from planarfriction.kernels.passes import Passes, passes
 from planarfriction.kernels.trace import Number, Trace, traced
 from planarfriction.kernels.twins import twin
@@ -37,26 +40,61 @@ class Element(NamedTuple):
     """`(law, z, u)`: return z' and the traction."""
     step: Any
     """`(law, z, u, dt)`: return the bristle after dt and its traction."""
-    forward: Division
-    backward: Division
-    rate: Division
-    slopes: Division
+    forward: Division = Division(8, 2)
+    backward: Division = Division(6, 6)
+    rate: Division = Division(5, 0)
+    slopes: Division = Division(4, 2)
 
 
-POINT = Element(
-    "points", 2, points.evaluate, points.step, Division(8, 2), Division(6, 6), Division(5, 0), Division(2, 0)
-)
-DISC = Element("discs", 3, discs.evaluate, discs.step, Division(8, 2), Division(6, 6), Division(5, 0), Division(4, 2))
+POINT = Element("points", 2, points.evaluate, points.step, slopes=Division(2, 0))
+DISC = Element("discs", 3, discs.evaluate, discs.step)
+LEANING_POINT = Element("leaning points", 2, leaning_cells.evaluate, leaning_cells.step)
+LEANING_DISC = Element("leaning discs", 3, leaning_cells.evaluate_disc, leaning_cells.step_disc)
+"""Their law is a `Leaning`, whose asymmetry stands behind the numbers of the lever."""
+
+
+class CellKind(NamedTuple):
+    """Element of a kind of cells and their lever, which has so many numbers."""
+
+    name: str
+    element: Element
+    lever: Lever
+    numbers: int
+    leans: bool = False
+    """True for elements whose law is a `Leaning`."""
+
+
+@kernel
+def _leaning_point(contact: CellsContact, i: int) -> Leaning:
+    c, n = contact.cells, contact.count
+    return Leaning(contact.law, (c[5 * n + i], c[6 * n + i]))
+
+
+@kernel
+def _leaning_disc(contact: CellsContact, i: int) -> Leaning:
+    c, n = contact.cells, contact.count
+    return Leaning(contact.law, (c[6 * n + i], c[7 * n + i]))
+
+
+KINDS = {
+    (2, False, False): CellKind("isotropic", POINT, cells.POSITIONS, 2),
+    (2, True, False): CellKind("turned", POINT, cells.LEVERS, 5),
+    (3, False, False): CellKind("discs", DISC, disc_cells.POSITIONS, 3),
+    (3, True, False): CellKind("turned_discs", DISC, disc_cells.LEVERS, 6),
+    (2, True, True): CellKind("leaning", LEANING_POINT, cells.LEVERS._replace(law=_leaning_point), 5, True),
+    (3, True, True): CellKind("leaning_discs", LEANING_DISC, disc_cells.LEVERS._replace(law=_leaning_disc), 6, True),
+}
+"""Kinds of cells by the components of a bristle, and whether there are a metric and an asymmetry."""
 
 
 class Rows(NamedTuple):
-    """Cells of the solver from one on, where they lie: row by row of n numbers."""
+    """Cells of a contact from one on, row by row of n numbers."""
 
     cells: Doubles
     z: Doubles
     weights: Doubles
     out: Doubles
-    """Rates [d, n], or a block of derivatives by state and velocity [2, d, d, LANES]."""
+    """Rates or new bristles [d, n], or a block of derivatives by state and velocity [2, d, d, LANES]."""
     n: int
 
 
@@ -64,13 +102,16 @@ _LAW = {f"law.{name}": f"law.{name}" for name in LawNumbers._fields}
 
 
 class _Symbols:
-    """Arguments of the functions of a cell in a trace, whose levers have so many numbers."""
+    """Arguments of the functions of a cell in a trace."""
 
-    def __init__(self, trace: Trace, element: Element, numbers: int) -> None:
+    def __init__(self, trace: Trace, kind: CellKind) -> None:
         self.trace = trace
-        self.law = LawNumbers(*(Number(trace, name) for name in _LAW))
-        self.cell, self.z, self.v = self.several("c", numbers), self.several("z", element.size), self.several("v", 3)
+        numbers = self.several("c", kind.numbers + 2 * kind.leans)
+        law = LawNumbers(*(Number(trace, name) for name in _LAW))
+        self.law = Leaning(law, numbers[-2:]) if kind.leans else law
+        self.cell, self.z, self.v = numbers[: kind.numbers], self.several("z", kind.element.size), self.several("v", 3)
         self.dt, self.weight = Number(trace, "dt"), Number(trace, "weight")
+        self.u = twin(kind.lever.seen)(self.cell, self.v)
 
     def several(self, letter: str, count: int) -> tuple:
         """Return a vector of symbols."""
@@ -82,84 +123,101 @@ def _fields(letter: str, first: int, count: int) -> dict[str, str]:
     return {f"{letter}{m}": f"block[{first + m * LANES} + i]" for m in range(count)}
 
 
-def _sources(element: Element, numbers: int) -> dict[str, str]:
-    """Return the sources of the symbols: numbers of a cell lie in its block."""
-    twist = {f"v{m}": f"v[{m}]" for m in range(3)}
-    cell = _fields("c", 0, numbers) | _fields("z", Z, element.size)
-    return {**_LAW, **cell, **twist, "dt": "given[0]", "weight": f"block[{WEIGHT} + i]"}
-
-
 def _rows(letter: str, field: str, count: int) -> dict[str, str]:
-    """Return the sources of a vector of symbols that lies in rows of the solver."""
+    """Return the sources of a vector of symbols that lies in `Rows`."""
     return {f"{letter}{m}": f"block.{field}[{m} * block.n + i]" for m in range(count)}
 
 
-def _solver_sources(element: Element, numbers: int) -> dict[str, str]:
-    """Return the sources of the symbols in `Rows`."""
-    rows = _rows("c", "cells", numbers) | _rows("z", "z", element.size)
-    return {**_sources(element, numbers), **rows, "weight": "block.weights[0 + i]"}
+_SHARED = {**_LAW, **{f"v{m}": f"v[{m}]" for m in range(3)}, "dt": "shared[0]"}
+"""Sources of the symbols that all cells share."""
 
 
-def forward_passes(element: Element, lever: Lever, numbers: int) -> Passes:
-    """Write the step of cells, whose levers have so many numbers."""
+def _in_block(kind: CellKind) -> dict[str, str]:
+    """Return the sources of the symbols of cells in a block."""
+    vectors = _fields("c", 0, kind.numbers) | _fields("z", Z, kind.element.size)
+    return {**_SHARED, **vectors, "weight": f"block[{WEIGHT} + i]"}
+
+
+def _in_rows(kind: CellKind) -> dict[str, str]:
+    """Return the sources of the symbols of cells in `Rows`."""
+    vectors = _rows("c", "cells", kind.numbers + 2 * kind.leans) | _rows("z", "z", kind.element.size)
+    return {**_SHARED, **vectors, "weight": "block.weights[0 + i]"}
+
+
+def _step_of(kind: CellKind) -> Callable[[Trace], Any]:
+    """Return the step of a cell in a trace: its bristle, and its wrench."""
 
     def step(trace: Trace) -> Any:
-        s = _Symbols(trace, element, numbers)
-        new, traction = twin(element.step)(s.law, s.z, twin(lever.seen)(s.cell, s.v), s.dt)
-        return new, twin(lever.wrench)(s.cell, tuple(s.weight * each for each in traction))
+        s = _Symbols(trace, kind)
+        new, traction = twin(kind.element.step)(s.law, s.z, s.u, s.dt)
+        return new, twin(kind.lever.wrench)(s.cell, tuple(s.weight * each for each in traction))
 
-    stores = list(_fields("z", Z, element.size).values())
-    return passes(element.name, traced(step), _sources(element, numbers), stores, **element.forward._asdict())
+    return step
 
 
-def backward_passes(element: Element, lever: Lever, numbers: int) -> Passes:
-    """Write the adjoint of a step of cells: the cotangent of the state in place, and sums over the cells.
+def forward_passes(kind: CellKind) -> Passes:
+    """Write the step of the cells of a block, in place."""
+    stores = list(_fields("z", Z, kind.element.size).values())
+    return passes(kind.element.name, traced(_step_of(kind)), _in_block(kind), stores, **kind.element.forward._asdict())
+
+
+def step_passes(kind: CellKind) -> Passes:
+    """Write the step of cells in `Rows`; the new bristles may go where the old ones are, so they are written last."""
+    stores = _rows("new", "out", kind.element.size)
+    sources, division = _in_rows(kind) | stores, kind.element.forward._asdict()
+    return passes(f"steps of {kind.element.name}", traced(_step_of(kind)), sources, list(stores.values()), **division)
+
+
+def backward_passes(kind: CellKind) -> Passes:
+    """Write the adjoint of a step of the cells of a block: the cotangent of the state in place, and sums over cells.
 
     These are the cotangents of the twist [3], of the load, and of the law in the order of `cells_rollout.PARAMETERS`.
     """
+    element, lever = kind.element, kind.lever
     written = derive(element.step, BY, ("z", "u"))
 
     def adjoint(trace: Trace) -> Any:
-        s = _Symbols(trace, element, numbers)
+        s = _Symbols(trace, kind)
         load, keeps, by_load = (Number(trace, name) for name in ("load", "keeps", "by_load"))
         pulled = twin(lever.seen)(s.cell, s.several("p", 3))
-        (_, traction), tape = twin(written.forth)(s.law, s.z, twin(lever.seen)(s.cell, s.v), s.dt)
+        (_, traction), tape = twin(written.forth)(s.law, s.z, s.u, s.dt)
         state_bar = tuple(keeps * each for each in s.several("b", element.size))
         z_bar, u_bar, *law_bar = twin(written.back)(tape, (state_bar, tuple(load * s.weight * each for each in pulled)))
         along = sum(a * b for a, b in zip(pulled, traction, strict=True))
         return z_bar, twin(lever.wrench)(s.cell, u_bar), (s.weight + load * by_load) * along, tuple(law_bar)
 
-    pull = {f"p{m}": f"given[{m + 3}]" for m in range(3)} | {"load": "given[1]", "keeps": "given[2]"}
+    pull = {f"p{m}": f"shared[{m + 3}]" for m in range(3)} | {"load": "shared[1]", "keeps": "shared[2]"}
     bar = _fields("b", BAR, element.size)
-    sources = _sources(element, numbers) | pull | bar | {"by_load": f"block[{BY_LOAD} + i]"}
+    sources = _in_block(kind) | pull | bar | {"by_load": f"block[{BY_LOAD} + i]"}
     name, division = f"{element.name}_back", element.backward._asdict()
     return passes(name, traced(adjoint), sources, list(bar.values()), **division)
 
 
-def rate_passes(element: Element, lever: Lever, numbers: int) -> Passes:
-    """Write the rates of cells, and their wrench."""
+def rate_passes(kind: CellKind) -> Passes:
+    """Write the rates of cells in `Rows`, and their wrench."""
+    element = kind.element
 
     def rate(trace: Trace) -> Any:
-        s = _Symbols(trace, element, numbers)
-        zdot, traction = twin(element.evaluate)(s.law, s.z, twin(lever.seen)(s.cell, s.v))
-        return zdot, twin(lever.wrench)(s.cell, tuple(s.weight * each for each in traction))
+        s = _Symbols(trace, kind)
+        zdot, traction = twin(element.evaluate)(s.law, s.z, s.u)
+        return zdot, twin(kind.lever.wrench)(s.cell, tuple(s.weight * each for each in traction))
 
-    stores = list(_rows("r", "out", element.size).values())
-    name, division = f"rates of {element.name}", element.rate._asdict()
-    return passes(name, traced(rate), _solver_sources(element, numbers), stores, **division)
+    stores, division = list(_rows("rate", "out", element.size).values()), element.rate._asdict()
+    return passes(f"rates of {element.name}", traced(rate), _in_rows(kind), stores, **division)
 
 
-def slope_passes(element: Element, lever: Lever, numbers: int) -> Passes:
-    """Write the derivatives of the rates of cells, by state and velocity."""
+def slope_passes(kind: CellKind) -> Passes:
+    """Write the derivatives of the rates of cells in `Rows`, by state and velocity."""
+    element = kind.element
     written = derive(element.evaluate, ("z", "u"), ("z", "u"))
     units = [tuple(float(m == j) for m in range(element.size)) for j in range(element.size)]
 
     def slopes(trace: Trace) -> Any:
-        s = _Symbols(trace, element, numbers)
-        _, tape = twin(written.forth)(s.law, s.z, twin(lever.seen)(s.cell, s.v))
+        s = _Symbols(trace, kind)
+        _, tape = twin(written.forth)(s.law, s.z, s.u)
         rows = [twin(written.back)(tape, (unit, (0.0,) * element.size)) for unit in units]
         return tuple(by_z for by_z, _ in rows), tuple(by_u for _, by_u in rows)
 
     stores = [f"block.out[{m * LANES} + i]" for m in range(2 * element.size**2)]  # of a block: that lies apart
     name, division = f"slopes of {element.name}", element.slopes._asdict()
-    return passes(name, traced(slopes), _solver_sources(element, numbers), stores, **division)
+    return passes(name, traced(slopes), _in_rows(kind), stores, **division)

@@ -1,13 +1,7 @@
-"""A contact of n cells as the solver sees it, isotropic or not (see `contacts.ModelFunctions`).
+"""Record of a contact of n cells, and the levers of points, isotropic or not (discs: `disc_cells`).
 
-The state is `z = [z_x (n), z_y (n)]`. A cell sees `u = B V` of the twist and adds `w B' t` to the wrench, with the
-traction `t = -(sigma_0 z + sigma_1 z' + sigma_2 u)`; `B` is its lever (see `Lever`). With `k = bristle_decay`
-(docs/physics.md, docs/solver.md),
-
-    z' = u - k z,      dz'/dz = -k I - z (x) k_z,      dz'/du = I - z (x) k_u.
-
-So `D = shift I - dz'/dz` is a multiple of the identity plus a rank-one term and has a closed inverse, and every
-function is linear in the number of cells. Cells whose bristles do something else: `general_cells`.
+The state is `z = [z_x (n), z_y (n)]`, of discs with a third row. A cell sees `u = B V` of the twist and adds `w B' t`
+to the wrench, t being its traction; `B` is its lever.
 """
 
 from __future__ import annotations
@@ -17,7 +11,7 @@ from typing import Any, NamedTuple
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, reader
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels.vectors import dot
+from planarfriction.kernels.vectors import Vector, dot
 
 
 class CellsContact(NamedTuple):
@@ -36,7 +30,7 @@ read = reader(CellsContact)
 
 
 class Lever(NamedTuple):
-    """Functions of the map B of a cell; `cell` are the numbers of the cell that `of(own, i)` reads."""
+    """Functions of the map B of a cell; `cell` are the numbers of the cell that `of(contact, i)` reads."""
 
     of: Any
     seen: Any
@@ -44,59 +38,59 @@ class Lever(NamedTuple):
     wrench: Any
     """`(cell, t)`: return `B' t`."""
     around: Any
-    """`(cell, P)`: return `B' P B` of a matrix [2, 2], nine numbers."""
+    """`(cell, P)`: return `B' P B` of a matrix [d, d], nine numbers."""
     law: Any
-    """`(own, i)`: return the law of the cell."""
+    """`(contact, i)`: return the law of the cell."""
 
 
 # ---------------------------------------------------------------------- the levers
 
 
 @kernel
-def _place(own, i):
-    return own.cells[i], own.cells[own.count + i]
+def _place(contact: CellsContact, i: int) -> Vector:
+    return contact.cells[i], contact.cells[contact.count + i]
 
 
 @kernel
-def _seen(cell, v):
+def _seen(cell: Vector, v: Vector) -> Vector:
     x, y = cell
     return v[0] - v[2] * y, v[1] + v[2] * x
 
 
 @kernel
-def _wrench(cell, t):
+def _wrench(cell: Vector, t: Vector) -> Vector:
     x, y = cell
     return t[0], t[1], x * t[1] - y * t[0]
 
 
 @kernel
-def _around(cell, p):
+def _around(cell: Vector, p: Vector) -> Vector:
     (x, y), (xx, xy, yx, yy) = cell, p
     xt, yt = xy * x - xx * y, yy * x - yx * y
     return xx, xy, xt, yx, yy, yt, x * yx - y * xx, x * yy - y * xy, x * yt - y * xt
 
 
 @kernel
-def _map(own, i):
+def _map(contact: CellsContact, i: int) -> Vector:
     """Return xx, xy, yy, x, y of `B = [(xx, xy, x), (xy, yy, y)]`."""
-    c, n = own.cells, own.count
+    c, n = contact.cells, contact.count
     return c[i], c[n + i], c[2 * n + i], c[3 * n + i], c[4 * n + i]
 
 
 @kernel
-def _seen_by_map(cell, v):
+def _seen_by_map(cell: Vector, v: Vector) -> Vector:
     xx, xy, yy, x, y = cell
     return xx * v[0] + xy * v[1] + x * v[2], xy * v[0] + yy * v[1] + y * v[2]
 
 
 @kernel
-def _wrench_by_map(cell, t):
+def _wrench_by_map(cell: Vector, t: Vector) -> Vector:
     xx, xy, yy, x, y = cell
     return xx * t[0] + xy * t[1], xy * t[0] + yy * t[1], x * t[0] + y * t[1]
 
 
 @kernel
-def _around_by_map(cell, p):
+def _around_by_map(cell: Vector, p: Vector) -> Vector:
     (xx, xy, yy, x, y), (pxx, pxy, pyx, pyy) = cell, p
     a, b, c = (xx, xy), (xy, yy), (x, y)
     pa, pb = (pxx * xx + pxy * xy, pyx * xx + pyy * xy), (pxx * xy + pxy * yy, pyx * xy + pyy * yy)
@@ -105,9 +99,10 @@ def _around_by_map(cell, p):
 
 
 @kernel
-def _same(own, i):
-    return own.law
+def law_of_all(contact: CellsContact, i: int) -> LawNumbers:
+    """Return the law that all cells share."""
+    return contact.law
 
 
-POSITIONS = Lever(_place, _seen, _wrench, _around, _same)
-LEVERS = Lever(_map, _seen_by_map, _wrench_by_map, _around_by_map, _same)
+POSITIONS = Lever(_place, _seen, _wrench, _around, law_of_all)
+LEVERS = Lever(_map, _seen_by_map, _wrench_by_map, _around_by_map, law_of_all)

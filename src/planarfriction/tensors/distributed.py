@@ -31,7 +31,7 @@ KINDS = {
     5: Kind(2, cells.LEVERS, points.evaluate, points.step),
     6: Kind(3, disc_cells.LEVERS, discs.evaluate, discs.step),
     7: Kind(2, cells.LEVERS, leaning_cells.evaluate, leaning_cells.step),
-    8: Kind(3, disc_cells.LEVERS, disc_cells.evaluate_leaning, disc_cells.step_leaning),
+    8: Kind(3, disc_cells.LEVERS, leaning_cells.evaluate_disc, leaning_cells.step_disc),
 }
 """Kinds of cells by how many numbers each has: points, discs, both with a friction metric, and with asymmetry too.
 
