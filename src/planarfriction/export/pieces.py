@@ -19,8 +19,8 @@ from planarfriction.kernels import (
     cells_rollout,
     disc_cells,
     discs,
-    distributed_step,
     moment_steps,
+    points,
     published_step,
 )
 from planarfriction.kernels.derive import derive
@@ -192,7 +192,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     numbers, law, size = model.compiled.numbers(), model.law.numbers, model.compiled.size
     more = max(count - model.patch.cells, 0)
     n = model.patch.cells + more
-    kind, cell, sliding = cells, distributed_step.cell, _sliding
+    kind, cell, sliding = cells, points.step, _sliding
     if size == 3:
         kind, sliding = disc_cells, discs.sliding if precision == "double" else _sliding_of_disc
         cell = _with(discs.step, sliding=sliding)
@@ -259,7 +259,8 @@ def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
     def step(trace: Trace) -> Any:
         new, out, dt = [0.0] * 3, [0.0] * 3, Number(trace, "dt")
         z, twist = _state(trace, 3, 1), _vector(trace, *_TWIST)
-        twin(moment_steps.step)(frame, hold, taped_step, contact(trace), z, twist, dt, new, out)
+        model = {"frame": frame, "hold": hold, "taped_step": taped_step}
+        twin(moment_steps.step)(contact(trace), z, twist, dt, new, out, **model)
         return tuple(new), tuple(out)
 
     def steady(trace: Trace) -> Any:
@@ -282,7 +283,8 @@ def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
         new, out, dt = [0.0] * 3, [0.0] * 39, Number(trace, "dt")
         z, twist = _state(trace, 3, 1), _vector(trace, *_TWIST)
         given = contact(trace), z, twist, dt, new, out
-        twin(moment_steps.slopes)(frame, twin(steps.MODEL.hold_slopes), taped_step, pull_back, True, *given)
+        model = {"frame": frame, "hold_slopes": twin(steps.MODEL.hold_slopes), "taped_step": taped_step}
+        twin(moment_steps.slopes)(*given, **model, pull_back=pull_back, whole=True)
         by_law = [tuple(getattr(each, name) for name in _parameters(law)) for each in laws]
         rows = [
             (*out[at + 18 : at + 21], *out[at : at + 3], bar) for at, bar in zip(range(3, 21, 3), by_law, strict=True)

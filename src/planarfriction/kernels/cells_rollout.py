@@ -14,7 +14,6 @@ from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.calls import pointer
 from planarfriction.compiler.memory import at
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, distributed_step
 from planarfriction.kernels.bind import bind
 from planarfriction.kernels.cell_blocks import (
     BAR,
@@ -29,14 +28,12 @@ from planarfriction.kernels.cell_blocks import (
     lever_at,
     totals,
 )
-from planarfriction.kernels.cell_passes import advance
-from planarfriction.kernels.cell_slopes import retreat
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.forward import forward
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rollouts import row_of
 from planarfriction.kernels.settle import factor_at, softening, stiffened, within
-from planarfriction.kernels.vectors import add, plus, reader_of, scatter, three, times
+from planarfriction.kernels.vectors import add, plus, scatter, three, times
 
 PARAMETERS = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
 """Numbers of the law that derivatives are taken by."""
@@ -182,7 +179,7 @@ def _rollout(kind, inputs, span, z, wrench, states, scratch):
         _read(w, Z, z[b], n, kind.size)
 
 
-def rollout(kind, inputs, span, z, wrench, states):
+def rollout(inputs, span, z, wrench, states, *, kind):
     """Step the contacts `span[0]` to `span[1]`: `z` [B, size n] in place, wrenches added to `wrench` [B, T, 3].
 
     The state before each step goes into `states` [B, T, size n], unless that is empty.
@@ -238,7 +235,7 @@ def _gradient(kind, inputs, states, wrench_bar, span, bars, scratch):
             row_bar[COLUMNS[m]] += by_law[m]
 
 
-def gradient(kind, inputs, states, wrench_bar, span, bars):
+def gradient(inputs, states, wrench_bar, span, bars, *, kind):
     """Add the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
     scratch = np.empty(divided(inputs.shapes.shape[1])[0] * BLOCK)
     _gradient(kind, inputs, states, wrench_bar, span, bars, scratch)
@@ -302,7 +299,7 @@ def _tangent(kind, inputs, span, z, changes, wrenches, slopes, scratch):
         _read(w, BAR, changes.state[b], n, kind.size)
 
 
-def tangent(kind, inputs, span, z, changes, wrenches, slopes):
+def tangent(inputs, span, z, changes, wrenches, slopes, *, kind):
     """Run roll-outs with their change along given ones of the inputs, added to `wrenches` and `slopes` [B, T, 3].
 
     `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state in place.
@@ -322,17 +319,9 @@ class CellRollouts(NamedTuple):
     tangent: Any
 
 
-class _Model(NamedTuple):
-    kind: Kind
-
-
 def bound(kind: Kind, name: str) -> CellRollouts:
     """Return the entry points of a kind of cells."""
-    return CellRollouts(*(bind(each, _Model(kind), f"{name}_{each.__name__}", jit) for each in TEMPLATES))
+    return CellRollouts(*(bind(each, f"{name}_{each.__name__}", jit, kind=kind) for each in TEMPLATES))
 
 
 TEMPLATES = rollout, gradient, tangent
-POINTS = Kind(cells.POSITIONS, 2, advance, retreat, pushed_of(distributed_step.cell), reader_of(2))
-"""Points without a metric."""
-TURNED_POINTS = POINTS._replace(lever=cells.LEVERS)
-ISOTROPIC, TURNED = bound(POINTS, "isotropic"), bound(TURNED_POINTS, "turned")

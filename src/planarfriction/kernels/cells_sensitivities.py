@@ -6,17 +6,16 @@ of `sigma_1` and `sigma_2` move no bristle.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.calls import pointer
 from planarfriction.compiler.memory import at
-from planarfriction.kernels import distributed_step
 from planarfriction.kernels.bind import bind
 from planarfriction.kernels.cell_blocks import BLOCK, LANES, WEIGHT, Kind, Z, divided, lever_at
-from planarfriction.kernels.cells_rollout import POINTS, TURNED_POINTS, _lay, _read, _write
+from planarfriction.kernels.cells_rollout import _lay, _read, _write
 from planarfriction.kernels.forward import forwards
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rollouts import row_of
@@ -137,7 +136,7 @@ def _sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes, scra
         _read(w, Z, z[b], n, kind.size, _SIZE)
 
 
-def sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes):
+def sensitivities(inputs, span, z, wanted, wrenches, slopes, *, kind, pushed):
     """Run roll-outs with their derivatives by the numbers `wanted` of `PARAMETERS`.
 
     They are added to `wrenches` [B, T, 3] and `slopes` [B, T, 3, len(wanted)]; `z` [B, size n] in place.
@@ -146,17 +145,7 @@ def sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes):
     _sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes, scratch)
 
 
-class _Model(NamedTuple):
-    kind: Kind
-    pushed: Any
-    """`(law, z, u, dt, changes)`: step a cell and its changes by each number of the law."""
-
-
 def bound(kind: Kind, step: Any, name: str) -> Any:
-    """Return the entry point of a kind of cells, with the step of one."""
+    """Return the entry point of a kind of cells, with the step of one and its changes by each number of the law."""
     pushed = forwards(step, _BY, ("z", "u")).pushed
-    return bind(sensitivities, _Model(kind, pushed), f"{name}_sensitivities", jit)
-
-
-ISOTROPIC = bound(POINTS, distributed_step.cell, "isotropic")
-TURNED = bound(TURNED_POINTS, distributed_step.cell, "turned")
+    return bind(sensitivities, f"{name}_sensitivities", jit, kind=kind, pushed=pushed)

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import functools
 import threading
-from collections import namedtuple
 from typing import Any, NamedTuple
 
 from numba import types
@@ -58,12 +57,10 @@ def step_functions(name: str, templates: tuple, **model: Any) -> StepFunctions:
     Those of slopes and of the Jacobian are one template, whose argument `whole` tells them apart.
     """
     step, slopes = templates
-    record = namedtuple("Own", [*model, "whole"])
-    one, whole = (record(**model, whole=each) for each in (False, True))
     return StepFunctions(
-        bind(step, one, f"{name}_step", entry),
-        bind(slopes, one, f"{name}_slopes", entry),
-        bind(slopes, whole, f"{name}_jacobian", entry),
+        bind(step, f"{name}_step", entry, **model),
+        bind(slopes, f"{name}_slopes", entry, **model, whole=False),
+        bind(slopes, f"{name}_jacobian", entry, **model, whole=True),
     )
 
 

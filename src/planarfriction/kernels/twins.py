@@ -65,9 +65,10 @@ def finished(function: FunctionType) -> Callable[..., Any]:
 def joined(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function that joins the ways through it where it asks its symbols (see `Trace.call`)."""
 
-    def call(*arguments: Any) -> Any:
+    def call(*arguments: Any, **constants: Any) -> Any:
         symbol = next((each for each in flat(arguments) if isinstance(each, (Number, Table))), None)
-        return function(*arguments) if symbol is None else symbol.trace.call(function, arguments)
+        called = functools.partial(function, **constants) if constants else function
+        return called(*arguments) if symbol is None else symbol.trace.call(called, arguments)
 
     return call
 
