@@ -28,7 +28,8 @@ MEAN = 1e-3
 """Largest error of an angle that is summed from means, as a share of that of the trapezoidal rule."""
 
 LEVER = 1e-9
-"""Torque over force [m] up to which the torque is rounding: no contact and no offset is as small as a nanometre."""
+"""Torque over force [m] up to which the torque is rounding, force over torque [1/m] or the largest force up to which a
+force is: no contact and no offset is as small as a nanometre."""
 
 TWIST = ("vx", "vy", "omega")
 MOTION = ("x", "y", "theta")
@@ -117,9 +118,9 @@ class Log(ByValue):
 
     @property
     def channels(self) -> np.ndarray:
-        """Mask `[3]` of the measured ones of fx, fy, tau; a tau that is always 0, up to rounding, was not measured."""
+        """Mask `[3]` of the measured ones of fx, fy, tau: a channel that is always 0, up to rounding, was not."""
         largest = np.abs(self.wrench).max(axis=0)
-        return np.array([True, True, bool(largest[2] > LEVER * largest[:2].max())])
+        return largest > LEVER * largest.max()
 
     @property
     def interval(self) -> float:
@@ -233,6 +234,13 @@ def as_logs(name: str, log: Log | Sequence[Log]) -> tuple[Log, ...]:
     if not logs or not all(isinstance(each, Log) for each in logs):
         raise InvalidValueError(name, "be a Log or a list of them", log)
     return logs
+
+
+def one_coordinate(logs: Sequence[Log]) -> bool:
+    """Return True if all logs have one wrench channel only, and move only along it."""
+    measured = np.any([log.channels for log in logs], axis=0)
+    moving = np.any([log.twist.any(axis=0) for log in logs], axis=0)
+    return bool(measured.sum() == 1 and not (moving & ~measured).any())
 
 
 def differentiated(time: ArrayLike, motion: ArrayLike, *, window: int = 7) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -18,7 +19,7 @@ from planarfriction.identify.parameters import RADIUS, Coordinates, VectorMap
 from planarfriction.identify.rig import Rig, as_measured, smoothed, wrench_noise
 from planarfriction.identify.simulators import SIMULATORS, PartsPrediction, Prediction
 from planarfriction.identify.uncertainty import covariance
-from planarfriction.laws import LuGre
+from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface.base import scaling
 from planarfriction.patch import ContactPatch, SoftFinger
 
@@ -34,6 +35,9 @@ FINEST = 32
 NEARBY = 0.03
 """Change of the values, as a share, up to which derivatives are kept: it moves no estimate by more than this share of
 its standard error, as they decide on the way to the minimum, and meet residuals of noise there."""
+
+SOFT, SPOILED = 3.0, 6.0
+"""Residual over the noise at which "soft_l1" passes from its square to its size, and above which it is no noise."""
 
 CONSTANT = 0.1
 """Share by which the load of a log may stray from its mean if the patch changes with the load."""
@@ -138,6 +142,9 @@ class LogProblem(Problem):
         _check(logs, loads, patch, [name for name in names if name in known.SOFT_FINGER])
         self.reference_load = float(np.median(loads))
         self.fixed_patch = patch
+        if law.reference_load is not None and not steady_loads(logs):
+            rule = "be None, or the load of a log steady within 10 % (make one log for each load)"
+            raise InvalidValueError("reference_load", rule, law.reference_load)
         if patch.depends_on_load:
             density = patch.weights(self.reference_load) / patch.areas
             self.fixed_patch = dataclasses.replace(patch, pressure=density)
@@ -146,18 +153,34 @@ class LogProblem(Problem):
         self.twists = [smoothed(log) if "twist" in options.nuisance else as_measured(log) for log in logs]
         # A log at rest has no sample before its first step; its first wrench shows bristles that nobody knows.
         self.used = [log.inner[1 if options.begins == "rest" else 0 :] for log in logs]
-        self.simulator = SIMULATORS[model](self.fixed_patch, law, options.surface)
+        self.simulator = SIMULATORS[model](self.fixed_patch, self._per_load, options.surface)
         self.steps = options.refine or 1
         self.predictions = self._predictions(self.steps)
         self._shown: tuple[np.ndarray, list[np.ndarray]] | None = None
         self._slopes: tuple[np.ndarray, list[np.ndarray]] | None = None
 
+    @property
+    def _per_load(self) -> LuGre:
+        """The law with a stiffness per load; at the constant load of a log it is one, whatever it does else."""
+        return dataclasses.replace(self.law, reference_load=None)
+
+    @property
+    def bristles(self) -> str:
+        """Kind of bristles in words."""
+        bristles = self.law.elasto_plastic
+        kind = "plain bristles"
+        if isinstance(bristles, ElastoPlastic):
+            given = "" if "breakaway_ratio" in self.names else f" ({bristles.breakaway_ratio:g})"
+            kind = f"elasto-plastic bristles{given}"
+        return kind if self.law.reference_load is None else f"{kind} of a stiffness that does not grow with the load"
+
     def _maps(self, loads: Sequence[float]) -> list[VectorMap]:
         """Make the map from values to the vector of the model at the load of each log."""
         patch = self.patch
-        base = parameters_of(SIMULATORS["reduced-published"].model(self.fixed_patch, self.law, self.options.surface))
+        surface = self.options.surface
+        base = parameters_of(SIMULATORS["reduced-published"].model(self.fixed_patch, self._per_load, surface))
         self.base = dict(zip(PARAMETERS, base.tolist(), strict=True))
-        maps = [VectorMap(self.names, base, patch, load) for load in loads]
+        maps = [VectorMap(self.names, base, patch, load, self.law.reference_load) for load in loads]
         for each, load in zip(maps, loads, strict=True):
             if patch.depends_on_load and not any(name in known.SOFT_FINGER for name in self.names):
                 x, y = patch.centre_of_pressure(load)
@@ -203,7 +226,7 @@ class LogProblem(Problem):
         """
         if self.options.refine is not None or self.steps >= FINEST:
             return False
-        residual, jacobian = self.linearised(values, sigma)
+        jacobian, residual = self.linearised(values, sigma)[1], self.distances(values, sigma)
         twice = self._scaled(self.shown(values, self._predictions(2 * self.steps)), sigma)
         count = len(self.names)
         pull = np.diag(1.0 / self.rig.widths)
@@ -256,7 +279,22 @@ class LogProblem(Problem):
         both = zip(self._slopes[1], self.logs, self.used, sigma, strict=True)
         rows = [(slope * (log.channels / each)[..., None])[used] for slope, log, used, each in both]
         jacobian = np.concatenate([each.reshape(-1, each.shape[-1]) for each in rows])
-        return self._scaled(self.shown(values), sigma), jacobian
+        residual = self.distances(values, sigma)
+        if self.options.loss == "linear":
+            return residual, jacobian
+        residual, slopes = softened(residual)
+        return residual, slopes[:, None] * jacobian
+
+    def slopes_of(
+        self, names: Sequence[str], held: np.ndarray, values: np.ndarray, sigma: Sequence[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Compute the residuals `[M]` at `values`, and derivatives `[M, H]` by `names` of the law, `held` at these."""
+        wide = copy.copy(self)
+        wide.names, wide._slopes, wide._shown = (*self.names, *names), None, None
+        wide.maps = wide._maps([each.load for each in self.maps])
+        count = len(self.names)
+        residual, slopes = wide.linearised(np.concatenate([values[:count], held, values[count:]]), sigma)
+        return residual, slopes[:, count : count + len(names)]
 
     def _near(self, values: np.ndarray, others: np.ndarray) -> bool:
         """Return True if no value differs by more than `NEARBY` from another one, as a share of its size."""
@@ -283,7 +321,12 @@ class LogProblem(Problem):
         self._shown, self._slopes = (values.copy(), [*shown]), (values.copy(), [*slopes])
 
     def residual(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> np.ndarray:
-        """Compute the residuals over `sigma`, `[M]`."""
+        """Compute the residuals over `sigma`, `[M]`, as the loss counts them."""
+        residual = self.distances(values, sigma)
+        return residual if self.options.loss == "linear" else softened(residual)[0]
+
+    def distances(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> np.ndarray:
+        """Compute the residuals over `sigma`, `[M]`, whatever the loss."""
         return self._scaled(self.shown(values), sigma)
 
     def _scaled(self, wrenches: Sequence[np.ndarray], sigma: Sequence[np.ndarray]) -> np.ndarray:
@@ -361,6 +404,18 @@ class LogProblem(Problem):
             scaled = twist.values @ scaling(centre, vector["contact_radius"]).T
             result.append((np.linalg.norm(scaled, axis=1), np.abs(scaled[:, 2])))
         return result
+
+
+def softened(residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return residuals whose squares are the loss "soft_l1" at a scale of `SOFT`, `[M]`, and their derivatives."""
+    root = np.sqrt(1.0 + (residual / SOFT) ** 2)
+    factor = np.sqrt(2.0 / (1.0 + root))  # no difference of like numbers at small residuals
+    return residual * factor, 1.0 / (root * factor)
+
+
+def steady_loads(logs: Sequence[Log]) -> bool:
+    """Return True if the load of each log stays within `CONSTANT` of its mean."""
+    return all(np.abs(log.normal_force / mean_load(log) - 1.0).max() <= CONSTANT for log in logs)
 
 
 def mean_load(log: Log) -> float:
