@@ -68,6 +68,7 @@ class FitOptions(Checked):
     ones or a breakaway ratio of 0.9; and for logs at clearly different loads, a stiffness that grows with the load or
     one that does not (`LuGre.reference_load`)."""
     loss: str = checked(validation.choice, ("linear", "soft_l1"), default="linear")
-    """Loss of a residual: its square, or "soft_l1" as SciPy has it, under which spoiled samples count little."""
+    """Loss of a residual: its square, or "soft_l1" as SciPy has it. A fit with the latter ends without samples off by
+    more than six times the noise, if these are fewer than a tenth."""
     surface: type[LimitSurface] = checked(_surface, default=LimitSurfaceTablePublished)
     """Class of the limit surface of the model "reduced-published"."""

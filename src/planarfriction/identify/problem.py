@@ -36,8 +36,9 @@ NEARBY = 0.03
 """Change of the values, as a share, up to which derivatives are kept: it moves no estimate by more than this share of
 its standard error, as they decide on the way to the minimum, and meet residuals of noise there."""
 
-SOFT, SPOILED = 3.0, 6.0
-"""Residual over the noise at which "soft_l1" passes from its square to its size, and above which it is no noise."""
+SOFT, SPOILED, FEW = 3.0, 6.0, 0.1
+"""Residuals over the noise at which "soft_l1" passes from their squares to their sizes, and above which they are no
+noise, and share of such ones up to which a robust fit ends without them."""
 
 CONSTANT = 0.1
 """Share by which the load of a log may stray from its mean if the patch changes with the load."""
@@ -331,10 +332,8 @@ class LogProblem(Problem):
 
     def _scaled(self, wrenches: Sequence[np.ndarray], sigma: Sequence[np.ndarray]) -> np.ndarray:
         """Subtract the measured wrenches and divide by `sigma`; returns all used samples flat."""
-        both = zip(wrenches, self.logs, self.used, sigma, strict=True)
-        return np.concatenate(
-            [((wrench - log.wrench) * (log.channels / each))[used].ravel() for wrench, log, used, each in both]
-        )
+        rows = zip(self._apart(wrenches, sigma), self.used, strict=True)
+        return np.concatenate([each[used].ravel() for each, used in rows])
 
     def even_sigma(self, noise: np.ndarray) -> list[np.ndarray]:
         return [np.broadcast_to(noise, log.wrench.shape) for log in self.logs]
@@ -344,7 +343,17 @@ class LogProblem(Problem):
         if self.options.noise is None:
             both = zip(self.shown(values), self.logs, strict=True)
             noise = wrench_noise(self.logs, [shown - log.wrench for shown, log in both])
-        return noise, self.sigma(values, noise)
+        sigma = self.sigma(values, noise)
+        if self.options.loss != "linear":
+            spoiled = [np.abs(each) > SPOILED for each in self._apart(self.shown(values), sigma)]
+            if sum(each.sum() for each in spoiled) < FEW * self.numbers:
+                sigma = [np.where(out, np.inf, each) for out, each in zip(spoiled, sigma, strict=True)]
+        return noise, sigma
+
+    def _apart(self, wrenches: Sequence[np.ndarray], sigma: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Subtract the measured wrenches and divide by `sigma`, `[T, 3]` of each log."""
+        both = zip(wrenches, self.logs, sigma, strict=True)
+        return [(wrench - log.wrench) * (log.channels / each) for wrench, log, each in both]
 
     def sigma(self, values: np.ndarray, noise: np.ndarray) -> list[np.ndarray]:
         """Compute the standard deviation `[T, 3]` of each log's residuals from the noise `[3]` and that of the twist.

@@ -282,11 +282,12 @@ def _on_data(evidence: Evidence, u: Uncertainty) -> list[Verdict]:
         found.append(Verdict("fit", True, text))
     if not evidence.measured.all():
         missing = [name for (name, _), seen in zip(CHANNELS, evidence.measured, strict=True) if not seen]
-        text = f"{' and '.join(missing)} 0 throughout, so not measured: the estimates use the other channels alone"
+        text = f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} 0 throughout"
+        text += ", as without a sensor: the estimates use the other channels alone"
         found.append(Verdict("fit", True, text))
     if evidence.spoiled:
         text = f"{evidence.spoiled} values are off by more than {SPOILED:g} times the noise"
-        end = "so count little" if evidence.robust else 'the loss "soft_l1" would make them count little'
+        end = "they were left out" if evidence.robust else 'the loss "soft_l1" would leave them out'
         found.append(Verdict("fit", True, f"{text}: {end}"))
     if "sigma_0" in evidence.names and evidence.loads.max() < ONE_LOAD * evidence.loads.min():
         stiffness = evidence.value("sigma_0", 0.0) * float(np.median(evidence.loads))

@@ -238,6 +238,9 @@ def _evidence(best: Candidate, errors: np.ndarray, histories: Sequence[Mapping[s
     still[:count] *= np.where(np.isin(problem.names, ("mu_c", "mu_s")), NO_SLIP, 1.0)
     costs = [0.5 * float((problem.residual(each, fit.sigma) ** 2).sum()) for each in (fit.values, still)]
     sliding = problem.sliding(values)
+    left_out = sum(
+        int(np.isinf(sigma[:, log.channels]).sum()) for sigma, log in zip(fit.sigma, problem.logs, strict=True)
+    )
     return Evidence(
         names=problem.names,
         values=values,
@@ -249,7 +252,7 @@ def _evidence(best: Candidate, errors: np.ndarray, histories: Sequence[Mapping[s
         spins=np.concatenate([each[1] for each in sliding]),
         loads=np.array([mean_load(log) for log in problem.logs]),
         measured=np.any([log.channels for log in problem.logs], axis=0),
-        spoiled=int((np.abs(problem.distances(fit.values, fit.sigma)) > SPOILED).sum()),
+        spoiled=int((np.abs(problem.distances(fit.values, fit.sigma)) > SPOILED).sum()) + left_out,
         robust=problem.options.loss != "linear",
         without_slip=costs[1] - costs[0],
         largest_coefficient=max(float(np.nanquantile(each["coefficient"], 0.99)) for each in histories),
@@ -266,7 +269,8 @@ def _histories(best: Candidate) -> list[dict[str, Any]]:
     histories = []
     for i, (log, used, sigma, rows) in enumerate(zip(problem.logs, problem.used, fit.sigma, unseen, strict=True)):
         held_out = np.full_like(log.wrench, np.nan)
-        held_out[used] = log.wrench[used] + rows[:, :, 0] * np.where(log.channels, sigma[used], np.nan)
+        known_noise = np.where(log.channels & np.isfinite(sigma), sigma, np.nan)
+        held_out[used] = log.wrench[used] + rows[:, :, 0] * known_noise[used]
         measured, more = np.where(log.channels, log.wrench, np.nan), {"speed": sliding[i][0], "held_out": held_out}
         each = {"name": log.name, "time": log.time, "measured": measured, "predicted": shown[i], "twist": log.twist}
         histories.append({**each, **more, "coefficient": coefficients[i]})
