@@ -143,17 +143,6 @@ class Identification(ByValue):
         lines += [f"{_sentence(each.reason)}" for each in self.verdicts if each.parameter == "fit"]
         return "\n".join(textwrap.fill(line, WIDTH) for line in lines)
 
-    def rows(self) -> list[list[str]]:
-        """Return a row of text for each parameter: name, estimate, standard error, 95 % interval, unit, verdict."""
-        rows, intervals = [], self.intervals()
-        for name, value, error in zip(self.names, self.values, self.standard_errors, strict=True):
-            low, high = intervals[name]
-            known = np.isfinite(error) and error < 1e3 * max(abs(value), 1e-12)
-            shown, remark = f"{low:.4g} .. {high:.4g}", self._remark(name)
-            shown, remark = (shown, remark) if self.identifiable(name) else ("", f"not identifiable, {remark}")
-            rows.append([name, f"{value:.5g}", f"{error:.2g}" if known else "unknown", shown, ALL[name].unit, remark])
-        return rows
-
     def _remark(self, name: str) -> str:
         return "; ".join(each.reason for each in self.verdicts if each.parameter == name)
 

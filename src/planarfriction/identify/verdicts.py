@@ -118,8 +118,6 @@ class ModelScore:
     """Its kind of bristles, in words."""
     held_out: float
     """Root mean square of the residuals of held-out parts over the noise [-]; 1 is noise alone."""
-    held_out_error: float
-    """Standard error of `held_out`, from part to part [-]."""
     reduced_chi2: float
     """Mean square of the residuals over that of the noise [-]."""
     rejected: bool
@@ -141,10 +139,8 @@ class Candidate:
     @property
     def score(self) -> ModelScore:
         """Measures of how well the model explains the data."""
-        problem = self.fit.problem
-        u = self.uncertainty
-        error = float(np.std(u.held_out) / np.sqrt(max(len(u.held_out) - 1, 1)))
-        scores = u.score, error, u.reduced_chi2, u.rejected
+        problem, u = self.fit.problem, self.uncertainty
+        scores = u.score, u.reduced_chi2, u.rejected
         return ModelScore(problem.model, problem.bristles, *scores, problem.by_name(self.fit.values))
 
     def cost(self, sigma: list[np.ndarray]) -> float:
@@ -303,6 +299,11 @@ def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
     if name in ("mu_c", "mu_s", "v_s", "gamma") and evidence.without_slip < SLIPPED:
         text = f"the contact never slips, friction reaches {evidence.largest_coefficient:.2g} of the load"
         return Verdict(name, False, text)
+    if name == "mu_s" and "mu_c" in evidence.names:
+        c = evidence.names.index("mu_c")
+        if not evidence.errors[c] < VAGUE * evidence.values[c] and not evidence.at_bound[c]:
+            text = "mu_c is unknown, as no sample is much faster than v_s, so that this may be mu_c"
+            return Verdict(name, False, text)
     rests_on_zero = kind.low == 0.0 and value <= 1e-6 and not kind.logarithmic
     if evidence.at_bound[i] and not rests_on_zero:
         return _on_bound(evidence, i)
