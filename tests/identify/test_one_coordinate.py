@@ -10,7 +10,7 @@ import pytest
 import planarfriction as pf
 from planarfriction.errors import FileError
 from planarfriction.identify import Log, verdicts
-from planarfriction.identify.problem import SOFT, softened
+from planarfriction.identify.loss import SOFT, softened
 from planarfriction.identify.rig import Rig
 from tests.support.identification_logs import LOAD, PATCH, clean_log, fitted
 

@@ -176,6 +176,15 @@ def fitted_law(law: LuGre, given: Mapping[str, float]) -> LuGre:
     return dataclasses.replace(law, **fields)
 
 
+def bristles_of(law: LuGre, names: Sequence[str]) -> str:
+    """Return the kind of bristles of a law in words, of which `names` are estimated."""
+    kind = "plain bristles"
+    if isinstance(law.elasto_plastic, ElastoPlastic):
+        given = "" if "breakaway_ratio" in names else f" ({law.elasto_plastic.breakaway_ratio:g})"
+        kind = f"elasto-plastic bristles{given}"
+    return kind if law.reference_load is None else f"{kind} of a stiffness that does not grow with the load"
+
+
 def scaled_patch(patch: ContactPatch, scale: float, centre: Any = None) -> ContactPatch:
     """Return the patch times `scale` about its centre of pressure, its grid too, with that centre moved to `centre`.
 

@@ -10,18 +10,19 @@ from typing import Any
 import numpy as np
 
 from planarfriction.derivatives import PARAMETERS, parameters_of
-from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
 from planarfriction.identify.decimation import redrawn
+from planarfriction.identify.loads import check_loads, mean_load
 from planarfriction.identify.logs import Log
+from planarfriction.identify.loss import FEW, SPOILED, softened
 from planarfriction.identify.options import FitOptions
 from planarfriction.identify.parameters import RADIUS, Coordinates, VectorMap
 from planarfriction.identify.rig import Rig, as_measured, smoothed, wrench_noise
 from planarfriction.identify.simulators import SIMULATORS, PartsPrediction, Prediction
 from planarfriction.identify.uncertainty import covariance
-from planarfriction.laws import ElastoPlastic, LuGre
+from planarfriction.laws import LuGre
 from planarfriction.limit_surface.base import scaling
-from planarfriction.patch import ContactPatch, SoftFinger
+from planarfriction.patch import ContactPatch
 
 COARSE = 0.2
 """Largest error of an estimate from the size of the steps, as a share of its standard error."""
@@ -35,13 +36,6 @@ FINEST = 32
 NEARBY = 0.03
 """Change of the values, as a share, up to which derivatives are kept: it moves no estimate by more than this share of
 its standard error, as they decide on the way to the minimum, and meet residuals of noise there."""
-
-SOFT, SPOILED, FEW = 3.0, 6.0, 0.1
-"""Residuals over the noise at which "soft_l1" passes from their squares to their sizes, and above which they are no
-noise, and share of such ones up to which a robust fit ends without them."""
-
-CONSTANT = 0.1
-"""Share by which the load of a log may stray from its mean if the patch changes with the load."""
 
 
 class Problem:
@@ -140,12 +134,9 @@ class LogProblem(Problem):
         self.logs, self.patch, self.names, self.law = logs, patch, names, law
         self.options, self.model, self.progress = options, model, progress
         loads = [mean_load(log) for log in logs]
-        _check(logs, loads, patch, [name for name in names if name in known.SOFT_FINGER])
+        check_loads(logs, loads, patch, law, [name for name in names if name in known.SOFT_FINGER])
         self.reference_load = float(np.median(loads))
         self.fixed_patch = patch
-        if law.reference_load is not None and not steady_loads(logs):
-            rule = "be None, or the load of a log steady within 10 % (make one log for each load)"
-            raise InvalidValueError("reference_load", rule, law.reference_load)
         if patch.depends_on_load:
             density = patch.weights(self.reference_load) / patch.areas
             self.fixed_patch = dataclasses.replace(patch, pressure=density)
@@ -164,16 +155,6 @@ class LogProblem(Problem):
     def _per_load(self) -> LuGre:
         """The law with a stiffness per load; at the constant load of a log it is one, whatever it does else."""
         return dataclasses.replace(self.law, reference_load=None)
-
-    @property
-    def bristles(self) -> str:
-        """Kind of bristles in words."""
-        bristles = self.law.elasto_plastic
-        kind = "plain bristles"
-        if isinstance(bristles, ElastoPlastic):
-            given = "" if "breakaway_ratio" in self.names else f" ({bristles.breakaway_ratio:g})"
-            kind = f"elasto-plastic bristles{given}"
-        return kind if self.law.reference_load is None else f"{kind} of a stiffness that does not grow with the load"
 
     def _maps(self, loads: Sequence[float]) -> list[VectorMap]:
         """Make the map from values to the vector of the model at the load of each log."""
@@ -413,40 +394,3 @@ class LogProblem(Problem):
             scaled = twist.values @ scaling(centre, vector["contact_radius"]).T
             result.append((np.linalg.norm(scaled, axis=1), np.abs(scaled[:, 2])))
         return result
-
-
-def softened(residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return residuals whose squares are the loss "soft_l1" at a scale of `SOFT`, `[M]`, and their derivatives."""
-    root = np.sqrt(1.0 + (residual / SOFT) ** 2)
-    factor = np.sqrt(2.0 / (1.0 + root))  # no difference of like numbers at small residuals
-    return residual * factor, 1.0 / (root * factor)
-
-
-def steady_loads(logs: Sequence[Log]) -> bool:
-    """Return True if the load of each log stays within `CONSTANT` of its mean."""
-    return all(np.abs(log.normal_force / mean_load(log) - 1.0).max() <= CONSTANT for log in logs)
-
-
-def mean_load(log: Log) -> float:
-    """Return the mean of the loads > 0 of a log [N], or raise InvalidValueError."""
-    loaded = log.normal_force[log.normal_force > 0.0]
-    if not len(loaded):
-        raise InvalidValueError(f"normal_force of {log.name}", "be > 0 somewhere", "0 everywhere")
-    return float(loaded.mean())
-
-
-def _check(logs: Sequence[Log], loads: Sequence[float], patch: ContactPatch, names: Sequence[str]) -> None:
-    """Check that a fit can take the logs and their mean loads on a patch, and estimate `names` of a soft finger."""
-    if names and not isinstance(patch.pressure, SoftFinger):
-        raise InvalidValueError("patch", f"have a SoftFinger pressure to estimate {', '.join(names)}", patch.name)
-    for name in ("k", "k_per_newton"):
-        if name in names and getattr(patch.pressure, name) is None:
-            raise InvalidValueError("parameters", f"contain {name} only if the SoftFinger has it", name)
-    for log in logs:
-        if not log.wrench.any():
-            raise InvalidValueError(f"wrench of {log.name}", "not be 0 throughout", "0 in every sample")
-    for log, load in zip(logs, loads, strict=True):
-        if patch.depends_on_load and np.abs(log.normal_force / load - 1.0).max() > CONSTANT:
-            rule = "stay within 10 % of its mean if the patch changes with the load (make one log for each load)"
-            found = f"{log.normal_force.min():g} .. {log.normal_force.max():g} N"
-            raise InvalidValueError(f"normal_force of {log.name}", rule, found)

@@ -15,8 +15,8 @@ from planarfriction.described import described
 from planarfriction.identify.decimation import samples_of
 from planarfriction.identify.held import Pull
 from planarfriction.identify.logs import Log
-from planarfriction.identify.parameters import ALL, SOFT_FINGER
-from planarfriction.identify.problem import SPOILED
+from planarfriction.identify.loss import SPOILED
+from planarfriction.identify.parameters import ALL, SOFT_FINGER, bristles_of
 from planarfriction.identify.rig import CHANNELS
 from planarfriction.identify.search import Fit
 from planarfriction.identify.uncertainty import HELD_OUT, STRAIN, Uncertainty
@@ -141,7 +141,9 @@ class Candidate:
         """Measures of how well the model explains the data."""
         problem, u = self.fit.problem, self.uncertainty
         scores = u.score, u.reduced_chi2, u.rejected
-        return ModelScore(problem.model, problem.bristles, *scores, problem.by_name(self.fit.values))
+        return ModelScore(
+            problem.model, bristles_of(problem.law, problem.names), *scores, problem.by_name(self.fit.values)
+        )
 
     def cost(self, sigma: list[np.ndarray]) -> float:
         """Compute half the sum of the squared residuals over `sigma` `[T, 3]` of each log, and of the pulls."""

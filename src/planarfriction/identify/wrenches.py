@@ -15,10 +15,12 @@ from planarfriction.identify import parameters as known
 from planarfriction.identify.checks import check_logs, size_of, with_findings
 from planarfriction.identify.decimation import decimated, samples_of
 from planarfriction.identify.held import pulls_of_held
+from planarfriction.identify.loads import mean_load, steady_loads
 from planarfriction.identify.logs import Log, as_logs, one_coordinate
+from planarfriction.identify.loss import SPOILED
 from planarfriction.identify.options import FitOptions
 from planarfriction.identify.parameters import fitted_law, scaled_patch
-from planarfriction.identify.problem import SPOILED, LogProblem, mean_load, steady_loads
+from planarfriction.identify.problem import LogProblem
 from planarfriction.identify.result import Identification
 from planarfriction.identify.rig import CHANNELS, Nuisance, first_noise
 from planarfriction.identify.search import guess_starts, interruptible, multistart, refine, warm_start
