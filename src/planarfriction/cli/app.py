@@ -162,7 +162,7 @@ def export(file: Path, **options: Any) -> None:
 @click.option("--normal-force", type=float, help="Normal force in N, if the logs have no such column.")
 @click.option("--contact", metavar="NAME", help="Contact whose columns (NAME.vx) are read, if there are several.")
 @click.option("--noise", metavar="FX,FY,TAU", help="Noise of the measured wrench in N and N m. Default: estimated.")
-@click.option("--plain", is_flag=True, help="Use plain LuGre bristles instead of elasto-plastic ones.")
+@click.option("--plain", is_flag=True, help="Use plain LuGre bristles. Default: what fits better.")
 @click.option("--steady", is_flag=True, help="The logs begin in steady sliding, not at rest.")
 @click.option("--model", default="auto", show_default=True, help="reduced-published, reduced, distributed, or auto.")
 @click.option("--nuisance", metavar="NAMES", help="Rig disturbances: delay,bias,load,twist or none. Default: all.")
