@@ -260,6 +260,10 @@ def test_bootstrap_draws_whole_groups():
     assert interval(totals) == (0.0, 1.0)
 
 
+def test_an_interval_leaves_out_a_fortieth_on_either_side():
+    assert interval(np.arange(1001.0)) == (25.0, 975.0)
+
+
 class Mine:
     """A model that remembers what it was given."""
 
