@@ -19,8 +19,8 @@ SHORT = {
 }
 """Numbers of benchmarks that make them long, by module."""
 
-LONG = ("identify.", "mjx.", "mujoco_warp.", "sensitivities.", "warp.")
-"""Those that compile for long beside what other tests compile."""
+LONG = ("export.step.reduced", "identify.", "mjx.", "mujoco_warp.", "sensitivities.", "warp.")
+"""Those that compile for long; of exported steps those of one model show what both share."""
 
 
 def named(name: str):
