@@ -253,3 +253,17 @@ def test_damaged_arrays_get_one_line(tmp_path):
             assert read_pressure_map(tmp_path / "map.npy").shape
         except FrictionError as error:
             assert str(error).isprintable() and len(str(error)) <= 300
+
+
+@pytest.mark.parametrize(
+    ("cell", "number"), [("2,5", 2.5), ("-0,25", -0.25), ("+,5", 0.5), ("1,5e-3", 1.5e-3), ("12,5E+2", 1250.0)]
+)
+def test_numbers_with_a_comma_are_read_as_spreadsheets_write_them(tmp_path, cell, number):
+    (tmp_path / "load.csv").write_text(f"time;value\n0,0;{cell}\n1,0;{cell}\n")
+    assert Signal.from_csv(tmp_path / "load.csv").values.tolist() == [number, number]
+
+
+@pytest.mark.parametrize("cell", ["1,000,000", "1,", "1,5e", "1.000,5"])
+def test_other_commas_are_not_taken_for_points(tmp_path, cell):
+    (tmp_path / "load.csv").write_text(f"time;value\n0,0;{cell}\n1,0;{cell}\n")
+    assert cell in one_line(Signal.from_csv, tmp_path / "load.csv")

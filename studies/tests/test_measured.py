@@ -260,6 +260,10 @@ def test_bootstrap_draws_whole_groups():
     assert interval(totals) == (0.0, 1.0)
 
 
+def test_an_interval_leaves_out_a_fortieth_on_either_side():
+    assert interval(np.arange(1001.0)) == (25.0, 975.0)
+
+
 class Mine:
     """A model that remembers what it was given."""
 
@@ -528,3 +532,11 @@ def test_pushes_leave_errors_of_the_integral_behind():
     found = contactnets.pushed(time, 0.0, 0.5, 0.0)
     assert np.diag(found) == pytest.approx(0.25 * (time[-1] - time) ** 3 / 3.0, rel=2e-2, abs=1e-9)
     assert found[-1].max() == 0.0
+
+
+def test_a_radius_is_the_error_of_rank_level_times_n_and_one():
+    """Of four unseen errors, half and one makes the third: 0.5 (4 + 1) = 2.5; the largest where there is none."""
+    regions = EndRegions(sizes=np.array([[1.0, 10.0], [2.0, 20.0], [3.0, 30.0], [4.0, 40.0]]))
+    assert [regions.radii(np.zeros((1, 2)), level).tolist() for level in (0.2, 0.5, 0.95)] == [
+        [[1.0, 10.0]], [[3.0, 30.0]], [[4.0, 40.0]],
+    ]  # fmt: skip

@@ -524,6 +524,14 @@ def test_the_view_of_simulators(monkeypatch, capsys, tmp_path):
     assert row == ["stribeck", "23 mm", "1.3 mm", "< 0.001 nm"]  # 9, 0.5 and 0 times the 2.6 mm that are allowed
 
 
+SOURCES = {
+    "pybullet": "the extra [pybullet], which `make test` leaves out",
+    "newton": "pip install newton, which no extra names",
+    "mujoco_warp": "the extra [mujoco-warp]",
+}
+"""Where engines come from that no extra of their name brings."""
+
+
 @pytest.mark.parametrize(
     "name",
     [
@@ -535,7 +543,8 @@ def test_the_view_of_simulators(monkeypatch, capsys, tmp_path):
     ],
 )
 def test_other_engines_stop(name):
-    pytest.importorskip(engines.MODULES[name])
+    package = engines.MODULES[name]
+    pytest.importorskip(package, reason=f"needs {package}: {SOURCES.get(name, f'the extra [{name}]')}")
     module = __import__(f"planarfriction_studies.referee.engines.{name}", fromlist=["ENGINES"])
     assert [judge(CASES[case], module.ENGINES[0]).mark for case in ("stop", "stribeck")] == ["ok", "-"]
 

@@ -166,6 +166,15 @@ def test_what_hardly_moves_rubs_as_what_moves_slowly():
     assert State(twist=(0.01, 0.0, 1e-310)).centre_of_rotation is None
 
 
+def test_the_page_says_the_power_in_milliwatts_and_torques_in_newton_millimetres():
+    """0.3 N at 20 mm/s are 6 mW."""
+    state = State(law=pf.Dahl(mu_c=0.3), normal_force=1.0, twist=(0.02, 0.0, 0.0))
+    page = pictures.numbers_table(state, answer(state), 0.0123)
+    assert "Dissipated power: 6 mW" in page and "Answered in 12.3 ms" in page and "<td>-0.3000</td>" in page
+    turning = state.changed(twist=(0.0, 0.0, 2.0))
+    assert f"<td>{1e3 * answer(turning).friction[2]:.4f}</td>" in pictures.numbers_table(turning, answer(turning), 0.0)
+
+
 def test_what_does_not_press_has_no_answer():
     with pytest.raises(InvalidValueError, match="have a total > 0"):
         answer(State(drawing=State().drawing.cleared()))

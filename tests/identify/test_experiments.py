@@ -14,7 +14,9 @@ from planarfriction.cli.app import app
 from planarfriction.cli.output import write_csv
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import Log, candidate_motions, current_estimate, design_experiment
+from planarfriction.identify.experiments import _Information
 from planarfriction.identify.logs import columns_of
+from planarfriction.identify.parameters import Coordinates
 from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, fitted, noisy
 
 NOISE = (0.01, 0.01, 6e-5)
@@ -225,3 +227,12 @@ def test_plan_is_a_word_of_identify_and_not_a_log(tmp_path, monkeypatch, capsys)
 def test_completion_knows_the_plan(before, incomplete, found):
     shell = ShellComplete(app, {}, "planarfriction", "_PLANARFRICTION_COMPLETE")
     assert {item.value for item in shell.get_completions(before, incomplete)} == found
+
+
+def test_a_plan_knows_beforehand_what_a_fit_does():
+    """A factor of 20 either way, of the Stribeck exponent and of mu_s/mu_c - 1 less: one width of their own."""
+    names = ("mu_c", "mu_s", "gamma", "sigma_0")
+    information = _Information(PATCH, LAW, names, (), np.array(NOISE))
+    coordinates = Coordinates(names, information.values, LAW.mu_c)
+    assert np.diag(information.prior()) == pytest.approx([1.0 / 9.0, 1.0, 1.0, 1.0 / 9.0])
+    np.testing.assert_allclose(information.prior(), coordinates.prior(coordinates.of(information.values))[1] ** 2)

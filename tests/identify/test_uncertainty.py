@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from planarfriction.identify.uncertainty import LONGEST, Uncertainty, _over_time
+from planarfriction.identify.uncertainty import LONGEST, Uncertainty, _over_time, uncertainty_over_slides
 
 
 def test_votes_at_lags_count_with_weights_that_fall_linearly():
@@ -31,3 +31,22 @@ def test_what_rejects_a_fit(chi2, strain, held_out, rejected):
     empty, strains = np.zeros((0, 0)), [(strain, "load_drift 0.2")]
     tests = Uncertainty(empty, empty, empty, chi2, 1.5, strains, 0.0, np.full(5, held_out), np.zeros(0))
     assert tests.rejected == rejected
+
+
+def test_slides_vote_as_one_observation_each():
+    """`H^-1 (sum g g') H^-1 n/(n - 1)` of four slides with two samples each; from one alone H^-1."""
+    random = np.random.default_rng(0)
+    slopes, residual = random.normal(size=(24, 2)), random.normal(size=24)
+    votes, bread = (slopes * residual[:, None]).reshape(4, 6, 2).sum(axis=1), np.linalg.inv(slopes.T @ slopes)
+    fit = SimpleNamespace(
+        problem=SimpleNamespace(
+            linearised=lambda values, sigma: (residual, slopes), by_log=lambda rows: rows.reshape(4, 2, 3, 2)
+        ),
+        coordinates=SimpleNamespace(slopes=lambda x: np.eye(2)), x=np.zeros(2), values=np.zeros(2),
+        at_bound=np.zeros(2, dtype=bool), sigma=[np.ones((2, 3))] * 4,
+    )  # fmt: skip
+    found, moved, _ = uncertainty_over_slides(fit)
+    np.testing.assert_allclose(found, bread @ (votes.T @ votes) @ bread * 4.0 / 3.0, rtol=1e-9)
+    np.testing.assert_allclose(moved, votes @ bread, rtol=1e-9)
+    fit.sigma = [np.ones((2, 3))] + [np.full((2, 3), np.inf)] * 3
+    np.testing.assert_allclose(uncertainty_over_slides(fit)[0], bread, rtol=1e-9)

@@ -156,11 +156,15 @@ def test_the_grip_of_a_slip_is_what_balances_less_what_accelerates(observer, spe
     assert np.log(slide.state["balance"][0] / 4.0) == pytest.approx(follows)
 
 
-@pytest.mark.parametrize("place, caught", [(0.0195, True), (0.018, False)])
-def test_a_part_that_sticks_near_its_goal_is_left_there(observer, place, caught):
-    slide = SlideBy(observer, -0.02)
-    gripped(slide, {"slip": 0.0}, balance=4.0, began=0.5, since=0.2, slid=(0.0, -place, 0.0))
-    assert slide.state["caught"].tolist() == [caught]
+@pytest.mark.parametrize(
+    "kind, goal, near, caught",
+    [(SlideBy, 0.02, 5e-4, True), (SlideBy, 0.02, 2e-3, False), (TurnBy, 0.8, 0.02, True), (TurnBy, 0.8, 0.05, False)],
+)
+def test_a_part_that_sticks_near_its_goal_is_left_there(observer, kind, goal, near, caught):
+    slips, slid = kind(observer, -goal), np.zeros(3)
+    slid[kind.axis] = near - goal
+    gripped(slips, {"slip": 0.0}, balance=4.0, began=0.5, since=0.2, slid=tuple(slid))
+    assert slips.state["caught"].tolist() == [caught]
 
 
 @pytest.mark.parametrize("torque, falls", [(0.02, True), (2e-4, False)])

@@ -10,7 +10,7 @@ import pytest
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import PUBLISHED_PATCHES
-from planarfriction.planning import dynamic_holding_load, holding_load, plan_grip
+from planarfriction.planning import dynamic_holding_load, holding, holding_load, plan_grip
 
 LAW = pf.LuGre(mu_c=1.0, mu_s=1.2, v_s=1e-3, sigma_0=1e6, sigma_1=8e2, sigma_2=0.2, elasto_plastic=0.9)
 PADS = PUBLISHED_PATCHES["NonConvex1"]()
@@ -92,3 +92,14 @@ def test_a_ramp_shorter_than_times_tell_apart_is_a_step():
     model = pf.ReducedModel(pf.ContactPatch.disc(0.01, 9), pf.LuGre(mu_s=1.2))
     step, ramp = (dynamic_holding_load((1.0, 0.0, 0.001), model, ramp=ramp) for ramp in (0.0, 5e-324))
     assert ramp == step
+
+
+def test_a_load_alone_weighs_what_it_pulls_at_its_contact_radius(monkeypatch):
+    made = []
+    monkeypatch.setattr(holding, "_slips", lambda model, body, *_: made.append(body) or len(made) % 2 == 0)
+    radius = DISC.contact_radius()
+    mass = np.linalg.norm([LOAD[0], LOAD[1], LOAD[2] / radius]) / 9.81
+    dynamic_holding_load(LOAD, pf.DistributedModel(DISC, LAW))
+    dynamic_holding_load(LOAD, pf.DistributedModel(DISC, LAW), mass=3.0)
+    assert (made[0].mass, made[0].inertia) == pytest.approx((mass, mass * radius**2), rel=1e-12)
+    assert (made[-1].mass, made[-1].inertia) == pytest.approx((3.0, 3.0 * radius**2), rel=1e-12)

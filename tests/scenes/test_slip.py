@@ -9,6 +9,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.scenes.slip import _stretches
 
 PATCH = pf.ContactPatch.disc(0.01, cells=7)
 LAW = pf.LuGre(mu_c=0.5, sigma_0=1e5, sigma_1=300.0, sigma_2=0.0, elasto_plastic=0.9)
@@ -77,3 +78,9 @@ def test_what_slip_events_need_is_said_in_one_line(tmp_path):
         solution.slip_events()
     with pytest.raises(FileError, match="no scene"):
         dataclasses.replace(solution, scene=None).slip_events()
+
+
+def test_a_slip_begins_where_the_line_between_two_samples_crosses_zero():
+    time, above = np.array([0.0, 1.0, 3.0, 4.0, 5.0]), np.array([-1.0, 3.0, -1.0, -1.0, 1.0])
+    assert _stretches(time, above) == [(0.25, 2.5), (4.5, 5.0)]
+    assert _stretches(time, -above) == [(0.0, 0.25), (2.5, 4.5)]

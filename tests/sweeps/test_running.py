@@ -604,3 +604,10 @@ def test_models_are_built_once_for_equal_scenes():
 
     pf.sweep(make, {"grip": GRIPS}, measure=look)
     assert len(seen) == 1
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"), [(89.0, "89 s"), (90.0, "2 min"), (5300.0, "88 min"), (5400.0, "1.5 h"), (9000.0, "2.5 h")]
+)
+def test_what_is_left_is_said_in_the_unit_that_one_would_use(seconds, words):
+    assert str(sweeps.Progress(10, 4, 1, 0, 0, seconds)) == f"4 of 10 runs (1 found), {words} left"

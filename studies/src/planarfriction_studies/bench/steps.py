@@ -28,7 +28,7 @@ FEET = ((0.05, 0.03), (0.05, -0.03), (-0.05, 0.03), (-0.05, -0.03))
 """Positions of the feet of a box [m]."""
 
 
-def _compiled_loop(model: ReducedModel | ReducedModelPublished, twists: np.ndarray) -> float:
+def _compiled_loop(model: Any, twists: np.ndarray) -> float:
     """Measure the time of a model's steps through `twists`, compiled [s]."""
     return median(lambda: rollout(model, None, twists, 1.0, 1e-4), 9)
 
@@ -43,14 +43,8 @@ def published_loop(full: bool) -> Measurement:
 
 def distributed_loop(full: bool) -> Measurement:
     """Measure a step of the distributed model, in a compiled loop."""
-    from planarfriction.kernels.steps import step_sequence
-
     model, twists = DistributedModel(disc(), law()), mixed_twists(1000)
-    fixed: Any = model.compiled.fixed
-    z, table = model.rest().reshape(-1), model.compiled.step_table(fixed)
-    arguments = np.ones(len(twists)), 1e-4, np.empty_like(twists), np.empty(z.size + 3)
-    loop = median(lambda: step_sequence(table, z, twists, *arguments), 9)
-    call = _python_step(model, 100)
+    loop, call = _compiled_loop(model, twists), _python_step(model, 100)
     return line(loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6)
 
 
