@@ -7,7 +7,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import planarfriction as pf
-from planarfriction.errors import FileError, InvalidValueError
 
 LAW = pf.LuGre(mu_c=0.3, mu_s=0.4, v_s=0.01, sigma_0=1e4, sigma_1=20.0, sigma_2=0.1)
 MODEL = pf.DistributedModel(pf.ContactPatch.points([[0.01, 0.0], [-0.01, 0.01], [0.0, -0.02]]), LAW)
@@ -66,7 +65,9 @@ def test_a_mass_on_a_spring_swings_as_a_cosine():
 def test_stiff_springs_do_not_shorten_the_steps():
     """The solver takes springs implicitly: a thousand times the rate of its steps, it follows the anchor."""
     body = pf.Body(0.5, 2e-3, gravity=(0.0, 0.0))
-    tied = pf.Spring(1e8, 1e4, pf.Signal([0.0, 1.0], [[0.0, 0.0], [0.1, 0.0]], "linear"), torsion=1e5, torsion_damping=20.0)
+    tied = pf.Spring(
+        1e8, 1e4, pf.Signal([0.0, 1.0], [[0.0, 0.0], [0.1, 0.0]], "linear"), torsion=1e5, torsion_damping=20.0
+    )
     solution = pf.simulate(scene(2.0, body=body, springs=tied, rtol=1e-5, atol=2e-4))
     assert solution.statistics.steps < 400  # decay of the spring: 1e-4 s and 5e-5 s
     np.testing.assert_allclose(solution.histories["x"].values, 0.1 * solution.histories["time"].values, atol=2e-6)
