@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from planarfriction.scenes import classics as scenes
 from planarfriction_studies.experiments import runs
 from planarfriction_studies.experiments.classics import run as classics
+from planarfriction_studies.experiments.classics import scenes
 from planarfriction_studies.experiments.experiment import Work
 
 

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import planarfriction as pf
+from planarfriction.errors import FileError, InvalidValueError
 
 LAW = pf.LuGre(mu_c=0.3, mu_s=0.4, v_s=0.01, sigma_0=1e4, sigma_1=20.0, sigma_2=0.1)
 MODEL = pf.DistributedModel(pf.ContactPatch.points([[0.01, 0.0], [-0.01, 0.01], [0.0, -0.02]]), LAW)
@@ -116,3 +117,74 @@ def changed(whole, name, by):
         place = np.array(body.position) + by * np.array([name == "x", name == "y"])
         body = dataclasses.replace(body, position=place)
     return dataclasses.replace(whole, body=body)
+
+
+# ------------------------------------------------------------------ records and files
+
+
+def test_springs_in_files_come_back_to_the_last_bit(tmp_path):
+    for end in ("toml", "json"):
+        scene(1.0).to_file(tmp_path / f"a.{end}")
+        again = pf.Scene.from_file(tmp_path / f"a.{end}")
+        assert again == scene(1.0) and again.digest() == scene(1.0).digest()
+    assert scene(1.0, springs=()).digest() != scene(1.0).digest()
+    assert "spring" not in scene(1.0, springs=()).to_dict()  # digests of scenes without springs stay
+
+
+def test_a_spring_is_one_table_in_a_file():
+    data = scene(1.0).to_dict() | {"spring": {"stiffness": 3, "anchor": [0.1, 0.2]}}
+    (spring,) = pf.Scene.from_dict(data).springs
+    assert spring == pf.Spring(3.0, anchor=(0.1, 0.2, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("spring", "words"),
+    [
+        ({"damping": 1.0}, r"\[spring\]: missing key 'stiffness'"),
+        ({"stiffness": -1.0}, r"\[spring\]: stiffness must be >= 0"),
+        ({"stiffness": 1.0, "dampin": 2.0}, r"\[spring\]: unknown key 'dampin' \(did you mean 'damping'\?\)"),
+        ({"stiffness": 1.0, "anchor": 2.0}, r"\[spring\]: anchor must have 3 columns"),
+        ([], r"spring must be one or more tables \[\[spring\]\]"),
+    ],
+)
+def test_mistakes_in_files_are_named_in_one_line(spring, words):
+    with pytest.raises(FileError, match=words):
+        pf.Scene.from_dict(scene(1.0).to_dict() | {"spring": spring})
+
+
+def test_what_springs_refuse():
+    with pytest.raises(InvalidValueError, match="springs must be a list of Spring"):
+        scene(springs=[3.0])
+    with pytest.raises(InvalidValueError, match="springs must be none if the velocity is prescribed"):
+        scene(velocity=(0.1, 0.0, 0.0))
+
+
+def test_a_scene_tells_its_springs_and_stops_at_their_anchors():
+    assert "body of 0.5 kg, 0.002 kg m^2, on 2 springs;" in repr(scene())
+    assert "on a spring;" in repr(scene(springs=SPRINGS[:1])) and "spring" not in repr(scene(springs=()))
+    np.testing.assert_array_equal(scene().breaks(), [0.0, 0.4, 1.0])
+
+
+# ------------------------------------------------------------------ rest
+
+
+def test_a_body_in_equilibrium_with_its_springs_stays_in_place():
+    body = dataclasses.replace(BODY, velocity=(0.0, 0.0, 0.0), gravity=(0.0, 0.0))
+    law = dataclasses.replace(LAW, elasto_plastic=0.9)
+    contact = pf.Contact(pf.DistributedModel(MODEL.patch, law), 40.0, mounted_on="body")
+    springs = (pf.Spring(40.0, at=(0.03, 0.01), torsion=0.05), SPRINGS[1])
+    found = pf.simulate(scene(body=body, contacts=contact, springs=springs, start="equilibrium")).histories
+    assert np.ptp(found["x"].values) < 1e-9 and np.ptp(found["theta"].values) < 1e-8
+    pull = sum(spring.pull(0.0, [0.01, 0.02, 0.2]) for spring in springs)
+    cos, sin = np.cos(0.2), np.sin(0.2)
+    friction = np.array([found[name].values[-1, 0] for name in ("fx", "fy", "tau")])
+    turned = cos * friction[0] - sin * friction[1], sin * friction[0] + cos * friction[1], friction[2]
+    np.testing.assert_allclose(turned, -pull, rtol=1e-6)  # contact frame at the centre of mass, turned with the body
+
+
+def test_a_body_does_not_rest_while_an_anchor_still_moves():
+    body = pf.Body(0.5, 2e-3, gravity=(0.0, 0.0))
+    late = pf.Signal([0.5, 0.6], [[0.0, 0.0], [0.2, 0.0]], "linear")
+    solution = pf.simulate(scene(5.0, body=body, springs=pf.Spring(40.0, 1.0, late), t_end=3.0, stop_speed=1e-4))
+    time = solution.histories["time"].values
+    assert solution.status == "at rest" and 0.6 < time[-1] < 3.0 and solution.histories["x"].values[-1] > 0.05

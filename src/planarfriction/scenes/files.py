@@ -28,7 +28,8 @@ from planarfriction.scenes.spring import Spring
 from planarfriction.writing import write_text
 
 SCENE_KEYS = (
-    "name", "t_end", "save_every", "stop_speed", "rtol", "atol", "start", "body", "force", "velocity", "spring", "contact"
+    "name", "t_end", "save_every", "stop_speed", "rtol", "atol", "start",
+    "body", "force", "velocity", "spring", "contact",
 )  # fmt: skip
 _MOST_NAMES = 100
 """Names of a dotted key that are read: the time of the reader grows with their square."""

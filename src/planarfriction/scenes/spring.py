@@ -25,13 +25,13 @@ def _pose(name: str, value: Any) -> Signal:
 
 @dataclass(frozen=True, eq=False)
 class Spring(ByValue):
-    """A linear spring and damper between a point p of the body and an anchor; without a stretch it has no length.
+    """A linear spring and damper between a point p of the body and an anchor; its length at rest is zero.
 
     `F = stiffness (a - p) + damping (a' - p')` acts on the body at p, and about its centre of mass the torque
     `torsion (angle - theta) + torsion_damping (angle' - omega)` besides, with the anchor's pose `(a, angle)`. An anchor
     that moves in steps (`hold="previous"`) has no velocity.
 
-    Raises InvalidValueError for a constant that is not >= 0, and for an anchor that is no point, pose or signal of them.
+    Raises InvalidValueError for a constant that is not >= 0, and for an anchor that is no point, pose or signal.
     """
 
     stiffness: float = checked(validation.non_negative)

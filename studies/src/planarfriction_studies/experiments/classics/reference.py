@@ -6,6 +6,7 @@ sigma_2 v,   g(v) = F_C + (F_S - F_C) exp(-(v/v_s)^2)
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -63,7 +64,7 @@ def driven(t_end: float, speed: Callable[[Any], Any], dt: float) -> Arrays:
 def _integrated(rates: Any, knots: Sequence[float], y: Any, dt: float) -> tuple[np.ndarray, np.ndarray]:
     """Return times and states `[n, T]`, piece after piece."""
     parts = []
-    for begin, end in zip(knots[:-1], knots[1:], strict=True):
+    for begin, end in itertools.pairwise(knots):
         time = np.linspace(begin, end, round((end - begin) / dt) + 1)
         found = solve_ivp(rates, (begin, end), y, "DOP853", time, rtol=RTOL, atol=ATOL)
         y = found.y[:, -1]

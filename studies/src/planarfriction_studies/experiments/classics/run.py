@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from planarfriction.plots.style import FEW, PlotFigure
-from planarfriction.scenes import classics
 from planarfriction_studies.experiments import experiment, looks, runs
-from planarfriction_studies.experiments.classics import reference
+from planarfriction_studies.experiments.classics import reference, scenes
 from planarfriction_studies.experiments.experiment import Arrays, Comparison, Result, Work, compare, entry
 from planarfriction_studies.experiments.wording import report
 
@@ -26,22 +25,20 @@ PULL, LONG, SHORT = 0.1, 30.0, 10.0
 PUSH = ((0.0, 10.0, 15.0, 35.0, 40.0), (0.0, 1.425, 1.425, -1.425, -1.425))
 """Corners [s], [N] of the force of presliding."""
 
-_SAME = (
-    "The same equations, solved by two methods: what is left is the error of ours, and of the samples around a maximum."
-)
+_SAME = "The same equations, solved by two methods: what is left is our error, and that of samples around a maximum."
 
 
 def run(work: Work) -> Result:
     """Carry out the experiment."""
     t_end = SHORT if work.quick else LONG
-    scenes: dict[str, Any] = {
-        "stick-slip": dataclasses.replace(classics.stick_slip(t_end=t_end), save_every=1e-3),
-        "presliding": classics.presliding(),
-        **{f"break-away, {rate:g} N/s": classics.break_away(rate=rate) for rate in RATES},
-        **{f"lag, {frequency:g} rad/s": classics.friction_lag(frequency=frequency) for frequency in FREQUENCIES},
+    every: dict[str, Any] = {
+        "stick-slip": dataclasses.replace(scenes.stick_slip(t_end=t_end), save_every=1e-3),
+        "presliding": scenes.presliding(),
+        **{f"break-away, {rate:g} N/s": scenes.break_away(rate=rate) for rate in RATES},
+        **{f"lag, {frequency:g} rad/s": scenes.friction_lag(frequency=frequency) for frequency in FREQUENCIES},
     }
-    found = {name: runs.simulated(scene, rtol=RTOL, atol=ATOL) for name, scene in scenes.items()}
-    converged = work.pieces({name: lambda name=name: _converged(name, t_end) for name in scenes}, str)
+    found = {name: runs.simulated(scene, rtol=RTOL, atol=ATOL) for name, scene in every.items()}
+    converged = work.pieces({name: lambda name=name: _converged(name, t_end) for name in every}, str)
     ours, theirs = _numbers(found, -1.0, "fx"), _numbers(converged, 1.0, "friction")
     columns = {"ours": entry(0, digits=6), "integrated without the library": entry(1, digits=6)}
     rows = {name: (value, theirs[name]) for name, value in ours.items()}

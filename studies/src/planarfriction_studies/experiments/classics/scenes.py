@@ -13,12 +13,11 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.scenes.body import Body
-from planarfriction.scenes.contact import Contact
+from planarfriction.laws import LuGre
+from planarfriction.models import DistributedModel
+from planarfriction.patch import ContactPatch
+from planarfriction.scenes import Body, Contact, Scene, Signal, Spring
 from planarfriction.scenes.ready import FINE
-from planarfriction.scenes.scene import Scene
-from planarfriction.scenes.signal import Signal
-from planarfriction.scenes.spring import Spring
 
 BODY = Body(1.0, 1.0, gravity=(0.0, 0.0))
 """The mass of 1 kg of every experiment; it does not turn."""
@@ -29,10 +28,6 @@ PER_PERIOD = 2000
 
 def point() -> Any:
     """Make the model of the paper: a single point with `sigma_0 = 1e5`, `sigma_1 = sqrt(1e5)`, `sigma_2 = 0.4`."""
-    from planarfriction.laws import LuGre
-    from planarfriction.models import DistributedModel
-    from planarfriction.patch import ContactPatch
-
     law = LuGre(mu_c=1.0, mu_s=1.5, v_s=1e-3, sigma_0=1e5, sigma_1=np.sqrt(1e5), sigma_2=0.4)
     return DistributedModel(ContactPatch.points([[0.0, 0.0]]), law)
 
