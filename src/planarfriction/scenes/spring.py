@@ -62,7 +62,9 @@ class Spring(ByValue):
     def pull(self, time: ArrayLike, pose: ArrayLike) -> np.ndarray:
         """Return the wrench `(fx, fy, tau)` `[..., 3]` of the stretch, without damping, on bodies at `pose` `[..., 3]`.
 
-        It acts at the centre of mass, world axes [N, N, N m]; `time` `[...]` is that of the anchor [s].
+        It acts at the centre of mass, world axes [N, N, N m]; `time` `[...]` [s] tells the pose of the anchor.
+
+        Raises InvalidValueError for times or poses that are not finite.
         """
         pose = validation.finite_numbers("pose", pose)
         arm = rotate(self.at, pose[..., 2])
