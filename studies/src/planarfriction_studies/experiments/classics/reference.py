@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from planarfriction_studies.experiments.experiment import Arrays
 
@@ -63,6 +62,8 @@ def driven(t_end: float, speed: Callable[[Any], Any], dt: float) -> Arrays:
 
 def _integrated(rates: Any, knots: Sequence[float], y: Any, dt: float) -> tuple[np.ndarray, np.ndarray]:
     """Return times and states `[n, T]`, piece after piece."""
+    from scipy.integrate import solve_ivp
+
     parts = []
     for begin, end in itertools.pairwise(knots):
         time = np.linspace(begin, end, round((end - begin) / dt) + 1)
