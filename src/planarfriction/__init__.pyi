@@ -52,6 +52,7 @@ from .scenes import Contact as Contact
 from .scenes import Scene as Scene
 from .scenes import Signal as Signal
 from .scenes import Solution as Solution
+from .scenes import Spring as Spring
 from .scenes import simulate as simulate
 from .sweeps import sweep as sweep
 from .warm import warm_up as warm_up

@@ -32,6 +32,7 @@ from planarfriction.kernels.contacts import (
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.settle import bring_back, factor_at
 from planarfriction.kernels.small_matrices import applied, inverse
+from planarfriction.kernels.springs import add_spring_slopes, spring_wrench
 from planarfriction.kernels.vectors import applied_back, plus, put, put_all, three
 
 NO_LOAD = 1e-6
@@ -60,6 +61,10 @@ class Motion(NamedTuple):
     mover: Doubles
     """Displacement, velocity and acceleration `(x, y, angle)` of the world's side of each contact at the start of each
     piece, world axes, [S, C, 9]; empty [0, C, 9] where all stand still."""
+    spring: Doubles
+    """Constants of each spring (see `kernels.springs`), [K, 6]."""
+    anchor: Doubles
+    """Pose of the anchor of each spring at the start of each piece, and its velocity, [S, K, 6]."""
     stop_speed: float
     """Speed [m/s] of a body at rest: the run ends when its speed is below and stays so (see `rest`); 0: never."""
     stop_radius: float
@@ -116,6 +121,8 @@ class SystemRecord(NamedTuple):
     """Number of these, at their end, that are the place of a pressure."""
     pieces: int
     """Number S of pieces."""
+    springs: int
+    """Number K of springs."""
     rates: int
     """Address of `rates`, and of the functions below."""
     linearise: int
@@ -141,7 +148,7 @@ class System(Packed):
             stiffness=square, matrix=square, inverse=square, to_pose=square, body=3, rows=(4, 3), moved=(n, 8),
         )  # fmt: skip
         self._block, addresses = np.zeros(work.size), [address_of(*each) for each in BODY_FUNCTIONS]
-        sizes = n, int(contacts.state[n]), pressures, len(motion.breaks) - 1
+        sizes = n, int(contacts.state[n]), pressures, len(motion.breaks) - 1, len(motion.spring)
         super().__init__(SystemRecord(contacts, motion, work.placed(self._block), *sizes, *addresses))
         self.contacts, self.motion, self.keepalive = contacts, motion, keepalive
         self.wrench = self._block[work.slices["wrench"]].reshape(n, 3)
@@ -246,6 +253,7 @@ def rates(system, piece, since, y, dy):
     work, body, out, a = own.work, at(y, own.bristles), at(dy, own.bristles), own.work.stiffness
     force = at(own.motion.force, 6 * piece)
     total = plus(three(force), since, three(at(force, 3)))
+    total = plus(total, 1.0, spring_wrench(own.motion, own.springs, piece, since, body))
     for c in range(own.size):
         first, w = own.contacts.state[c], at(work.wrench, 3 * c)
         place, seen = place_at(own, piece, since, c, body)
@@ -315,6 +323,7 @@ def factor(system, piece, since, y, shift):
                 weight, per_pose = own.motion.inverse_mass[i] * load, (h[3 * i + j] + bpy[i]) / shift
                 to_pose[3 * i + j] += weight * per_pose
                 m[3 * i + j] += weight * (by_u[i] + per_pose)
+    add_spring_slopes(own.motion, own.springs, piece, since, at(y, own.bristles), 1.0 / shift, to_pose, m)
     put_all(own.work.inverse, inverse(shift, m))
 
 

@@ -15,6 +15,7 @@ from planarfriction.kernels.contacts import contact_map
 from planarfriction.kernels.integration import Method, Output, Progress, RunRecord, Stages, combine, read_run
 from planarfriction.kernels.rest import at_rest, speed_of
 from planarfriction.kernels.small_matrices import applied
+from planarfriction.kernels.springs import spring_drift
 from planarfriction.kernels.step_control import MOTION, fitted, growth
 from planarfriction.kernels.vectors import applied_back, norm, plus, put, three, times
 
@@ -95,9 +96,10 @@ def _record(run, own, piece, since, state):
 
 
 @kernel
-def _time_slope(own, piece, slope):
-    """Write `df/dt` of the body's accelerations [3]: forces and loads are linear in time."""
+def _time_slope(own, piece, y, slope):
+    """Write `df/dt` of the body's accelerations [3]: forces, loads and anchors of springs are linear in time."""
     motion, total = own.motion, three(at(own.motion.force, 6 * piece + 3))
+    total = plus(total, 1.0, spring_drift(motion, own.springs, piece, y[own.bristles + 5]))
     for c in range(own.size):
         load = own.contacts.count[c] * motion.load[(2 * piece + 1) * own.size + c]
         total = plus(total, load, applied_back(maps_of(own, c)[0], at(own.work.wrench, 3 * c)))
@@ -231,7 +233,7 @@ def attempt(run, piece, since, step, fresh):
     if fresh:
         call(own.rates, (run.system, piece, since, y, run.stages.start_rate))
         call(own.linearise, (run.system, piece, y))
-        _time_slope(own, piece, run.stages.time_slope)
+        _time_slope(own, piece, y, run.stages.time_slope)
         if _drifts(own, piece):
             _drift(run, own, piece, since, step)
         statistics[JACOBIANS] += 1

@@ -15,6 +15,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.geometry import rotate
 from planarfriction.scenes import Scene, Signal, SolverOptions, simulate
 from planarfriction.scenes.contact import with_friction
+from planarfriction.scenes.spring import pull_on
 from planarfriction.scenes.start import contact_map
 
 TIGHT, LOOSE = 1e-5, 1e-4
@@ -137,7 +138,7 @@ def slide_of(scene: Scene, contact: int, pose: np.ndarray) -> np.ndarray:
 
 
 def load_on(scene: Scene, contact: int, angle: float, slide: Any, time: float) -> np.ndarray:
-    """Return the load of gravity and applied force on one contact `[3]` [N, N, N m] once the body has moved.
+    """Return the load of gravity, applied force and springs on one contact `[3]` [N, N, N m] once the body has moved.
 
     By `angle` [rad] about the grip and by `slide` `[2]` [m]; about the origin of the contact frame, in its axes, of one
     of the identical contacts.
@@ -145,7 +146,5 @@ def load_on(scene: Scene, contact: int, angle: float, slide: Any, time: float) -
     body, chosen, grip = scene.body, scene.contacts[contact], grip_position(scene, contact)
     at = grip + slide + rotate(body.position - grip, angle)
     moved = dataclasses.replace(body, position=at, angle=body.angle + angle, velocity=(0.0, 0.0, 0.0))
-    applied = np.zeros(3) if scene.force is None else scene.force(time)
-    pull = applied + body.mass * np.array([*body.gravity, 0.0])
     there = dataclasses.replace(scene, body=moved, start="rest")
-    return np.linalg.solve(contact_map(there, chosen).T, pull) / chosen.count
+    return np.linalg.solve(contact_map(there, chosen).T, pull_on(scene, moved, time)) / chosen.count

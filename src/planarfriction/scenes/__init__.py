@@ -12,6 +12,7 @@ from planarfriction.scenes.ready import drift, driven, free_slide, in_hand, in_h
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.signal import Signal
 from planarfriction.scenes.solution import Solution, Statistics
+from planarfriction.scenes.spring import Spring
 from planarfriction.scenes.worlds import curling, foot, pivot
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ __all__ = [
     "Signal",
     "Solution",
     "SolverOptions",
+    "Spring",
     "Statistics",
     "curling",
     "drift",

@@ -24,10 +24,12 @@ from planarfriction.scenes.contact import Contact
 from planarfriction.scenes.model_files import model_from_dict, model_to_dict
 from planarfriction.scenes.section import Section
 from planarfriction.scenes.signal import Signal, read_signal
+from planarfriction.scenes.spring import Spring
 from planarfriction.writing import write_text
 
 SCENE_KEYS = (
-    "name", "t_end", "save_every", "stop_speed", "rtol", "atol", "start", "body", "force", "velocity", "contact"
+    "name", "t_end", "save_every", "stop_speed", "rtol", "atol", "start",
+    "body", "force", "velocity", "spring", "contact",
 )  # fmt: skip
 _MOST_NAMES = 100
 """Names of a dotted key that are read: the time of the reader grows with their square."""
@@ -41,6 +43,7 @@ CONTACT_KEYS = (
     *("name", "mounted_on", "position", "angle", "count", "pressure", "height", "normal_force", "support_velocity"),
     *("model", "patch", "law"),
 )
+SPRING_KEYS = ("stiffness", "damping", "at", "torsion", "torsion_damping", "anchor")
 
 
 def rectangle_outline(size: Sequence[float]) -> np.ndarray:
@@ -75,6 +78,7 @@ def scene_to_dict(scene: Any, of_part: Callable[[Any], dict[str, Any]] = part_to
     data = table(scene, "name", "t_end", "save_every", "rtol", "atol", "stop_speed", *start)
     data["body"] = table(scene.body, *BODY_KEYS[:-1])
     data |= table(scene, "force", "velocity")
+    data |= {"spring": [table(each, *SPRING_KEYS) for each in scene.springs]} if scene.springs else {}
     data["contact"] = [{**table(each, *_keys_of(each)), **of_part(each.model)} for each in scene.contacts]
     return data
 
@@ -103,6 +107,8 @@ def parts_of_scene(
     contacts = _contacts(table)
     options = {key: table.get(key) for key in _OPTIONS if key in table}
     signals = {key: read_signal(table, key) for key in ("force", "velocity") if key in table}
+    if "spring" in table:
+        options["springs"] = [_spring(each) for each in _tables(table, "spring")]
     prescribed = "velocity" in table and "body" not in table
     body = None if prescribed else _body(table.section("body"))
     return table, {"body": body, "contacts": contacts, "t_end": table.get("t_end"), **signals, **options}
@@ -121,16 +127,29 @@ def _body(table: Section) -> Body:
         return Body(**given)
 
 
-def _contacts(scene: Section) -> list[Contact]:
-    tables = scene.get("contact")
+def _tables(scene: Section, name: str) -> list[Section]:
+    """Return the one or more tables of contacts or springs."""
+    tables = scene.get(name)
     if isinstance(tables, dict):
         tables = [tables]
     if not isinstance(tables, list) or not tables:
-        scene.fail("contact must be one or more tables [[contact]]")
+        scene.fail(f"{name} must be one or more tables [[{name}]]")
+    names = [name] if len(tables) == 1 else [f"{name}.{number}" for number in range(1, len(tables) + 1)]
+    return [Section(data, each, scene.source, scene.folder) for data, each in zip(tables, names, strict=True)]
+
+
+def _spring(table: Section) -> Spring:
+    """Return the spring of a table."""
+    given = {key: table.only(SPRING_KEYS).get(key) for key in SPRING_KEYS if key == "stiffness" or key in table}
+    with table.located():
+        return Spring(**given | ({"anchor": read_signal(table, "anchor")} if "anchor" in table else {}))
+
+
+def _contacts(scene: Section) -> list[Contact]:
     contacts: list[Contact] = []
-    for number, data in enumerate(tables, 1):
-        where = "contact" if len(tables) == 1 else f"contact.{number}"
-        table = Section(data, where, scene.source, scene.folder).only(CONTACT_KEYS)
+    tables = _tables(scene, "contact")
+    for number, table in enumerate(tables, 1):
+        table.only(CONTACT_KEYS)
         options = {key: table.get(key) for key in CONTACT_KEYS[:7] if key in table}
         if "name" not in table and len(tables) > 1:
             options["name"] = f"contact {number}"

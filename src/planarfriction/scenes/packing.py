@@ -89,6 +89,7 @@ class Segments:
         moves = any(contact.support_velocity is not None for contact in scene.contacts)
         movers = [_mover(contact.support_velocity, self._breaks) for contact in scene.contacts if moves]
         self._mover = np.stack(movers, axis=1) if moves else np.empty((0, len(scene.contacts), 9))
+        self._anchors = [spring.anchor.pieces(self._breaks) for spring in scene.springs]
         lengths, parts = np.diff(self._breaks), np.ones(len(self._breaks) - 1)
         for contact, (_, slope) in zip(scene.contacts, self._load, strict=True):
             if contact.model.patch.depends_on_load:
@@ -104,6 +105,7 @@ class Segments:
         """Number of pieces."""
         moving = self._force is not None and (self._force[1][-1] != 0.0).any()
         moving |= moves and (self._mover[-1, :, 3:] != 0.0).any()
+        moving |= any(velocity[-1].any() for _, velocity in self._anchors)
         changing = moving or any(slope[-1] != 0.0 for _, slope in self._load)
         self.settled = float(own[-1 if changing else -2])
         """Time of the last change of an input [s]."""
@@ -158,6 +160,11 @@ class Segments:
         by, velocity, slope = found[..., :3], found[..., 3:6], found[..., 6:]
         by = by + since * (velocity + 0.5 * since * slope)
         return np.concatenate([by, velocity + since * slope, slope], axis=-1)
+
+    def anchors(self, pieces: np.ndarray) -> np.ndarray:
+        """Return pose and velocity of the anchor of each spring as pieces begin, [S, K, 6]."""
+        each = [np.concatenate(self._linear(anchor, pieces), axis=1) for anchor in self._anchors]
+        return np.stack(each, axis=1) if each else np.empty((len(pieces), 0, 6))
 
     def _behind(self, pieces: np.ndarray) -> np.ndarray:
         """Return the break of the signals that pieces lie behind."""
@@ -315,6 +322,8 @@ class SegmentBatches:
             acceleration=driven[1],
             row=row,
             mover=inputs.mover(pieces),
+            spring=np.array([spring.numbers for spring in scene.springs]).reshape(-1, 6),
+            anchor=inputs.anchors(pieces),
             stop_speed=float(scene.stop_speed or 0.0),
             stop_radius=self._radius,
             stop_time=max(b * law.sigma_1 / law.sigma_0 for b, law in zip(self._bends, self._laws, strict=True)),

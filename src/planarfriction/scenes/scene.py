@@ -19,6 +19,7 @@ from planarfriction.pictures import picture
 from planarfriction.scenes.body import Body
 from planarfriction.scenes.contact import Contact
 from planarfriction.scenes.signal import Signal, as_signal, breaks_between, sample_count
+from planarfriction.scenes.spring import Spring
 
 STARTS = ("rest", "equilibrium", "sliding")
 """Ways in which bristles may start."""
@@ -45,6 +46,14 @@ def _contacts(name: str, value: Any) -> tuple[Contact, ...]:
         if names.count(each) > 1:
             raise InvalidValueError(name, "have different names", f"{each!r} {names.count(each)} times")
     return tuple(contacts)
+
+
+def _springs(name: str, value: Any) -> tuple[Spring, ...]:
+    """Return one spring or a list of springs as a tuple, or raise."""
+    springs = (value,) if isinstance(value, Spring) else value
+    if not isinstance(springs, (list, tuple)) or not all(isinstance(spring, Spring) for spring in springs):
+        raise InvalidValueError(name, "be a list of Spring", value)
+    return tuple(springs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +91,8 @@ class Scene(ByValue):
     """State of the bristles at the start: "rest", relaxed; "equilibrium", carrying the load of a body at rest (with the
     least elastic energy, which determines how contacts share it); "sliding", in the steady state of the initial
     velocity."""
+    springs: Sequence[Spring] = checked(_springs, default=())
+    """Springs that tie the body to anchors; one, several or none."""
 
     if TYPE_CHECKING:  # what is given may be more than what is kept
 
@@ -98,6 +109,7 @@ class Scene(ByValue):
             atol: float = ATOL,
             name: str = "scene",
             start: Literal["rest", "equilibrium", "sliding"] = "rest",
+            springs: Spring | Sequence[Spring] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -105,6 +117,8 @@ class Scene(ByValue):
             self._set(body=Body(1.0, 1.0, gravity=(0.0, 0.0)))
         super().__post_init__()
         if self.velocity is not None:
+            if self.springs:
+                raise InvalidValueError("springs", "be none if the velocity is prescribed", f"{len(self.springs)}")
             for name in ("force", "stop_speed"):
                 if getattr(self, name) is not None:
                     raise InvalidValueError(name, "be None if the velocity is prescribed", getattr(self, name))
@@ -143,8 +157,9 @@ class Scene(ByValue):
         contacts = "; ".join(repr(contact) for contact in self.contacts[:2])
         more = f"; {len(self.contacts) - 2} more" if len(self.contacts) > 2 else ""
         driven = ", force given" if self.force is not None else ", velocity given" if self.velocity is not None else ""
+        tied = {0: "", 1: ", on a spring"}.get(len(self.springs), f", on {len(self.springs)} springs")
         body = f"{self.body.mass:g} kg, {self.body.inertia:.3g} kg m^2"
-        return f"Scene({self.name!r}: {self.t_end:g} s, body of {body}{driven}; {contacts}{more})"
+        return f"Scene({self.name!r}: {self.t_end:g} s, body of {body}{driven}{tied}; {contacts}{more})"
 
     def _repr_html_(self) -> str:
         return picture("scene in a notebook", self)
@@ -159,6 +174,7 @@ class Scene(ByValue):
         t_end = self.t_end if t_end is None else validation.positive("t_end", t_end)
         signals = [contact.normal_force for contact in self.contacts]
         signals += [contact.support_velocity for contact in self.contacts if contact.support_velocity is not None]
+        signals += [spring.anchor for spring in self.springs]
         signals += [signal for signal in (self.force, self.velocity) if signal is not None]
         return breaks_between(np.concatenate([signal.breaks for signal in signals]), t_end)
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction.errors import InvalidValueError
+from planarfriction.scenes.spring import pull_on
 
 _LONG = 1e6
 """Step [s] in which bristles reach the steady state of a held twist: all that move by more than 1e-12 m/s."""
@@ -157,8 +158,7 @@ def _held_by(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> tuple[_Bristl
     for contact in scene.contacts:
         if not contact.model.law.holds_at_rest:
             raise InvalidValueError("start", "be 'rest' or 'sliding' with a law that creeps", scene.start)
-    applied = np.zeros(3) if scene.force is None else scene.force(0.0)
-    pull = applied + scene.body.mass * np.array([*scene.body.gravity, 0.0])
+    pull = pull_on(scene, scene.body, 0.0)
     each = [_cells_of(scene, *each) for each in zip(scene.contacts, loads, shaped, strict=True)]
     whole = _BristleField(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
     return whole, [len(one.stiffness) for one in each], pull

@@ -1,6 +1,6 @@
 """The experiments of the source paper, each with its data, its figures and its numbers beside the published ones.
 
-One more, `beyond`, goes beyond it and has our own converged references.
+Two more go beyond it and have our own converged references: `classics`, the experiments of the LuGre paper, and `beyond`.
 
 `EXPERIMENTS` lists them by name; each lives in a folder of its own, whose module `run` has a function
 `run(work) -> Result`, and whose `findings.md.j2` holds what is said about it.
@@ -43,6 +43,7 @@ EXPERIMENTS = {
         ("load-dependent", "A contact pressure that follows the load"),
         ("convergence", "Convergence in the number of cells and of table segments"),
         ("timing", "Time, and work against precision"),
+        ("classics", "Classics: stick-slip, presliding, break-away and friction lag"),
         ("beyond", "Beyond the paper: exact surfaces, few discs, loads and grooves"),
     )
 }

@@ -1,0 +1,1 @@
+"""Classics: the experiments of the LuGre paper, each beside an integration without this library."""

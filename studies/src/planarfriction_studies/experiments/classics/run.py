@@ -1,0 +1,108 @@
+"""Classics: stick-slip, presliding, break-away force over rate and friction lag, as in the LuGre paper."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from planarfriction.plots.style import FEW, PlotFigure
+from planarfriction_studies.experiments import experiment, looks, runs
+from planarfriction_studies.experiments.classics import reference, scenes
+from planarfriction_studies.experiments.experiment import Arrays, Comparison, Result, Work, compare, entry
+from planarfriction_studies.experiments.wording import report
+
+RTOL, ATOL = 1e-8, 1e-7
+"""Tolerances of the runs."""
+
+RATES, FREQUENCIES = (1.0, 5.0, 10.0, 50.0), (1.0, 10.0, 25.0)
+"""Rates of the force [N/s], and frequencies of the speed [rad/s]."""
+
+PULL, LONG, SHORT = 0.1, 30.0, 10.0
+"""Speed of the spring's end [m/s], and duration of stick-slip, whole and quick [s]."""
+
+PUSH = ((0.0, 10.0, 15.0, 35.0, 40.0), (0.0, 1.425, 1.425, -1.425, -1.425))
+"""Corners [s], [N] of the force of presliding."""
+
+_SAME = "The same equations, solved by two methods: what is left is our error, and that of samples around a maximum."
+
+
+def run(work: Work) -> Result:
+    """Carry out the experiment."""
+    t_end = SHORT if work.quick else LONG
+    every: dict[str, Any] = {
+        "stick-slip": dataclasses.replace(scenes.stick_slip(t_end=t_end), save_every=1e-3),
+        "presliding": scenes.presliding(),
+        **{f"break-away, {rate:g} N/s": scenes.break_away(rate=rate) for rate in RATES},
+        **{f"lag, {frequency:g} rad/s": scenes.friction_lag(frequency=frequency) for frequency in FREQUENCIES},
+    }
+    found = {name: runs.simulated(scene, rtol=RTOL, atol=ATOL) for name, scene in every.items()}
+    converged = work.pieces({name: lambda name=name: _converged(name, t_end) for name in every}, str)
+    ours, theirs = _numbers(found, -1.0, "fx"), _numbers(converged, 1.0, "friction")
+    columns = {"ours": entry(0, digits=6), "integrated without the library": entry(1, digits=6)}
+    rows = {name: (value, theirs[name]) for name, value in ours.items()}
+    return report(
+        "classics",
+        {"classics": _figure(found)},
+        {"found": ours, "converged": theirs, "end": t_end},
+        comparisons=_comparisons(ours, theirs),
+        tables=(experiment.table("Numbers of the experiments, SI units", rows, columns, "number"),),
+    )
+
+
+def _converged(name: str, t_end: float) -> Arrays:
+    """Integrate one of the experiments without the library."""
+    kind, _, value = name.partition(", ")
+    if kind == "stick-slip":
+        return reference.moved((0.0, t_end), pulled=lambda t: PULL * t, k=2.0, dt=1e-3)
+    if kind == "presliding":
+        return reference.moved(PUSH[0], lambda t: float(np.interp(t, *PUSH)), dt=0.01)
+    number = float(value.split()[0])
+    if kind == "break-away":
+        return reference.moved((0.0, 1.8 / number), lambda t: number * t, dt=5e-4 / number)
+    return reference.driven(4.0 * np.pi / number, lambda t: 1.5e-3 + 1e-3 * np.sin(number * t), 1e-3 / number)
+
+
+def _numbers(found: dict[str, Arrays], sign: float, friction: str) -> dict[str, float]:
+    """Return each number by its name, with its unit; friction is `sign` times the column `friction`."""
+    slip, loop = found["stick-slip"], found["presliding"]
+    numbers = {"stick-slip, x at the end [m]": slip["x"][-1], "stick-slip, largest speed [m/s]": slip["vx"].max()}
+    for time in (15.0, 40.0):
+        numbers[f"presliding, x at {time:g} s [m]"] = np.interp(time, loop["time"], loop["x"])
+    for name, each in found.items():
+        if name.startswith(("break-away", "lag")):
+            numbers[f"{name}, largest friction [N]"] = (sign * each[friction]).max()
+    return {name: float(value) for name, value in numbers.items()}
+
+
+def _comparisons(ours: dict[str, float], theirs: dict[str, float]) -> list[Comparison]:
+    """Compare every number with that of the integration without the library."""
+    rows = []
+    for name, value in theirs.items():
+        words, unit = name.removesuffix("]").split(" [")
+        rows.append(compare(words, ours[name], value, "converged", 2e-6 * abs(value), unit, _SAME))
+    return rows
+
+
+def _figure(found: dict[str, Arrays]) -> PlotFigure:
+    """Draw stick-slip, the presliding loop, break-away and lag."""
+    figure, ((slip, loop), (away, lag)) = looks.panels(9.6, 6.4, 2, 2)
+    run, colour = found["stick-slip"], looks.DISTRIBUTED
+    slip.plot(run["time"], run["x"], color=colour, label="mass")
+    slip.plot(run["time"], PULL * run["time"], ":", color="0.4", label="end of the spring")
+    slip.set(title="stick-slip", xlabel="time [s]", ylabel="$x$ [m]")
+    run = found["presliding"]
+    loop.plot(1e6 * run["x"], -run["fx"], color=colour)
+    loop.set(title="presliding", xlabel="$x$ [µm]", ylabel="friction [N]")
+    peaks = [-found[f"break-away, {rate:g} N/s"]["fx"].min() for rate in RATES]
+    away.plot(RATES, peaks, "o-", color=colour)
+    away.set(title="break-away force", xlabel="rate of the force [N/s]", ylabel="largest friction [N]", xscale="log")
+    for frequency, shade in zip(FREQUENCIES, (colour, looks.REDUCED, FEW), strict=True):
+        run = found[f"lag, {frequency:g} rad/s"]
+        last = run["time"] >= 0.5 * run["time"][-1]
+        lag.plot(1e3 * run["vx"][last], -run["fx"][last], color=shade, label=f"{frequency:g} rad/s")
+    lag.set(title="friction lag", xlabel="speed [mm/s]", ylabel="friction [N]")
+    for axes in (slip, lag):
+        axes.legend(frameon=False)
+    return figure
