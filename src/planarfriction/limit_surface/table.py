@@ -55,7 +55,7 @@ class LimitSurfaceTable(CompiledLimitSurface):
         if self._one_metric:
             data = stored_potential(lambda units: self._exact.sums(units, STORED_RULES), self.segments)
         else:
-            data = stored_potential(lambda units: (cell_sums(*self._scaled_levers, units), None), self.segments)
+            data = stored_potential(lambda units: (cell_sums(self._cell_rows, units)[0], None), self.segments)
         return SurfaceNumbers(self.kind, self.segments, data)
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:

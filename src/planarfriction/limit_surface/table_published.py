@@ -70,7 +70,7 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
             polar, azimuth = angles[: self.segments + 1, None], angles
             sides = np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar) + 0.0 * azimuth
             units = np.stack(sides, -1).reshape(-1, 3)
-            nodes[..., :3] = cell_sums(*self._scaled_levers, units).reshape(*nodes.shape[:2], 3)
+            nodes[..., :3] = cell_sums(self._cell_rows, units)[0].reshape(*nodes.shape[:2], 3)
             return SurfaceNumbers(self.kind, self.segments, nodes.reshape(-1))
         place, corners = self._grid()
         spin_sums.smoothed_nodes(corners, place, *self._loaded_cells(), self.contact_radius, self.segments, nodes)
