@@ -84,6 +84,7 @@ class LimitSurface(ByValue):
     """Segments per quadrant of the table in which models store it [-]."""
 
     def __post_init__(self) -> None:
+        self._set(segments=validation.count("segments", self.segments, 2, MOST_SEGMENTS))
         validation.instance("patch", self.patch, ContactPatch, "a ContactPatch")
         if self.anisotropy != "any":
             refuse = refuse_anisotropy if self.anisotropy == "none" else refuse_cell_metrics

@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from planarfriction.limit_surface.base import LimitSurface
 
 
+ROUNDING = 1e-15
+"""Relative length of a step of the search for a twist that counts as none [-]."""
+
+
 def cell_sums(rows: tuple[np.ndarray, np.ndarray, np.ndarray], units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return `h` `[M, 3]` and `dh/dV_S` `[M, 3, 3]` of cells (`LimitSurface._cell_rows`) at unit scaled twists."""
     h, slopes = np.empty((len(units), 3)), np.empty((len(units), 3, 3))
@@ -60,16 +64,6 @@ def stored_potential(sums: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray |
     return np.append(nodes, (ax, ay))
 
 
-_BALANCED = 1e-12
-"""Angle [rad] between the wrench of a twist and the given one at which it is found."""
-
-_GOOD = 1e-10
-"""Angle [rad] below which a step that does not help ends the search: rounding has the rest."""
-
-_MOST_STEPS = 60
-"""Newton steps; a few are usual from the table's answer."""
-
-
 def table_of(surface: LimitSurface) -> StoredPotential:
     """Return the stored potential of a surface, and its directions over their dissipation."""
     _, size, data = surface.numbers
@@ -88,58 +82,34 @@ def table_of(surface: LimitSurface) -> StoredPotential:
 
 
 def descend(surface: LimitSurface, wrenches: np.ndarray, twists: np.ndarray) -> float:
-    """Improve twists `[M, 3]` of wrenches `[M, 3]`; return the largest angle left in scaled coordinates [rad]."""
+    """Improve twists `[M, 3]` of wrenches `[M, 3]`; return the largest angle left in scaled coordinates [rad].
+
+    As `limit_surface.loops.twists`: `Phi` is stationary in the plane `target . V = 1`.
+    """
+    from scipy.optimize import root
+
     scaling, worst = surface._scaling, 0.0
     back = scaling[9:18].reshape(3, 3)
     for wrench, twist in zip(wrenches, twists, strict=True):
         target = scaling[:9].reshape(3, 3) @ (wrench / np.abs(wrench).max())
+        target /= np.linalg.norm(target)
+        basis, guess = across(target), np.linalg.solve(back, twist)
+
+        def slope(place: np.ndarray, plane: np.ndarray, target: np.ndarray) -> np.ndarray:
+            return plane @ surface._direction((target + place @ plane)[None])[0]
+
+        def bend(place: np.ndarray, plane: np.ndarray, target: np.ndarray) -> np.ndarray:
+            return plane @ surface._direction_slope((target + place @ plane)[None])[0] @ plane.T
+
         with np.errstate(over="ignore", invalid="ignore"):  # a search that runs away: the angle says so
-            found, angle = _least(surface, target / np.linalg.norm(target), np.linalg.solve(back, twist))
-        twist[:] = back @ found
+            start, options = basis @ guess / (target @ guess), {"xtol": ROUNDING}
+            place = root(slope, start, (basis, target), jac=bend, options=options).x
+            found = target + place @ basis
+            h = surface._direction(found[None])[0]
+            angle = float(np.arctan2(np.linalg.norm(basis @ h), h @ target))
+            twist[:] = back @ found / (h @ found)
         worst = float(np.fmax(worst, angle)) if angle == angle else angle
     return worst
-
-
-def _least(surface: LimitSurface, target: np.ndarray, guess: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the scaled twist of unit dissipation with `h` along the unit vector `target`, and the angle left [rad].
-
-    As `limit_surface.loops.twists`: minimises the convex `Phi` over the plane `target . V = 1` by damped Newton steps.
-    """
-    basis = across(target)
-    place = basis @ guess / (target @ guess)
-    value, slope, angle = _dissipation_over(surface, target, basis, place)
-    for _ in range(_MOST_STEPS):
-        if not angle > _BALANCED:
-            break
-        point = target + place @ basis
-        hessian = basis @ surface._direction_slope(point[None])[0] @ basis.T
-        # where a surface curves downwards, the same step along that direction, but downhill
-        curvature, axes = np.linalg.eigh(hessian)
-        curvature = np.maximum(np.abs(curvature), 1e-12 * np.abs(curvature).max())
-        if not curvature.max() > 0.0:
-            break
-        move = -axes @ ((axes.T @ slope) / curvature)
-        length = 1.0
-        while length > 1e-14:
-            trial, trial_slope, trial_angle = _dissipation_over(surface, target, basis, place + length * move)
-            gain = value - trial
-            # near the minimum the gain drowns in rounding; there a better balance shows progress
-            level = abs(gain) < 1e-9 * value and np.linalg.norm(trial_slope) < 0.5 * np.linalg.norm(slope)
-            if level or gain > 1e-4 * length * abs(move @ slope):
-                break
-            length *= 0.5 if angle > _GOOD else 0.0
-        else:
-            break
-        place, value, slope, angle = place + length * move, trial, trial_slope, trial_angle
-    return (target + place @ basis) / value, angle
-
-
-def _dissipation_over(surface: LimitSurface, target, basis, place) -> tuple[float, np.ndarray, float]:
-    """Return `Phi`, its slope `[2]` and the angle between h and the target at a place in the plane `target . V = 1`."""
-    point = target + place @ basis
-    h = surface._direction(point[None])[0]
-    slope = basis @ h
-    return float(h @ point), slope, float(np.arctan2(np.linalg.norm(slope), h @ target))
 
 
 def across(normal: np.ndarray) -> np.ndarray:

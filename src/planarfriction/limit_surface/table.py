@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planarfriction import validation
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.limit_surface.base import MOST_SEGMENTS, SurfaceNumbers
+from planarfriction.limit_surface.base import SurfaceNumbers
 from planarfriction.limit_surface.compiled import CompiledLimitSurface
 from planarfriction.limit_surface.exact import STORED_RULES, LimitSurfaceExact
 from planarfriction.limit_surface.loops.twists import table_twists
@@ -32,10 +31,6 @@ class LimitSurfaceTable(CompiledLimitSurface):
 
     kind = kernels.POTENTIAL
     anisotropy = "any"
-
-    def __post_init__(self) -> None:
-        self._set(segments=validation.count("segments", self.segments, 2, MOST_SEGMENTS))
-        super().__post_init__()
 
     @functools.cached_property
     def _exact(self) -> LimitSurfaceExact:

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planarfriction import validation
 from planarfriction.kernels import spin_sums
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.limit_surface.base import MOST_SEGMENTS, SurfaceNumbers
+from planarfriction.limit_surface.base import SurfaceNumbers
 from planarfriction.limit_surface.compiled import CompiledLimitSurface
 from planarfriction.limit_surface.loops.published_twists import published_twists
 from planarfriction.limit_surface.stored import cell_sums
@@ -33,10 +32,6 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
     """Segments per quadrant [-]."""
 
     kind = kernels.BILINEAR
-
-    def __post_init__(self) -> None:
-        self._set(segments=validation.count("segments", self.segments, 2, MOST_SEGMENTS))
-        super().__post_init__()
 
     def _grid(self) -> tuple[tuple[float, float, float, float], np.ndarray]:
         """Return the patch's grid about the centre of pressure, and new memory for the sums at its corners.

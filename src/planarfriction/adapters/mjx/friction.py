@@ -10,7 +10,6 @@ from typing import Any, NamedTuple, Self
 
 import jax
 import jax.numpy as jnp
-import mujoco
 import numpy as np
 from mujoco import mjx
 
@@ -21,6 +20,7 @@ from planarfriction.adapters.mujoco.patches import (
     PatchContact,
     Placed,
     check_once,
+    check_options,
     memory,
     parameters_in,
     place_of_parameters,
@@ -32,11 +32,6 @@ from planarfriction.formulas import LIGHTEST
 from planarfriction.jax import DistributedModel, ReducedModelPublished
 from planarfriction.jax.base import FrictionPytree
 from planarfriction.tensors.steps import LAW
-
-INTEGRATORS = {
-    int(mujoco.mjtIntegrator.mjINT_EULER): "Euler",
-    int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST): "implicitfast",
-}
 
 PASSES = 4
 """Number of new solutions of a step because it has activated other constraints."""
@@ -109,7 +104,10 @@ class Friction:
     def __init__(self, m: Any, patches: Sequence[PatchContact]) -> None:
         check_once(patches)
         placed = [Placed(m, patch) for patch in patches]
-        _check(m, placed)
+        cone = ": MJX supports contacts without friction only with these"
+        check_options(m, "Euler", "implicitfast", cone=cone, sleeps=True)
+        for each in placed:
+            each.check(m)
         known = list({id(patch.model): patch.model for patch in patches}.values())
         self.models: tuple[FrictionPytree, ...] = tuple(map(_in_jax, known))
         at = memory(patches, m.nv, m.nuserdata)
@@ -363,21 +361,6 @@ def _moved(m: Any, d: Any) -> Any:
     d = mjx.sensor_pos(m, mjx.fwd_position(m, d))
     d = mjx.sensor_vel(m, mjx.fwd_velocity(m, d))
     return mjx.fwd_acceleration(m, mjx.fwd_actuation(m, d))
-
-
-def _check(m: Any, placed: Sequence[Placed]) -> None:
-    if m.opt.integrator not in INTEGRATORS:
-        rule = f"be {', '.join(INTEGRATORS.values())}"
-        name = mujoco.mjtIntegrator(m.opt.integrator).name.removeprefix("mjINT_")
-        raise InvalidValueError("integrator", rule, name)
-    if m.opt.cone != mujoco.mjtCone.mjCONE_PYRAMIDAL:
-        rule = "be pyramidal: MJX supports contacts without friction only with these"
-        raise InvalidValueError("cone", rule, mujoco.mjtCone(m.opt.cone).name.removeprefix("mjCONE_").lower())
-    if m.opt.noslip_iterations > 0:
-        rule = "be 0: they would change the solution"
-        raise InvalidValueError("noslip_iterations", rule, m.opt.noslip_iterations)
-    for each in placed:
-        each.check(m)
 
 
 def _in_jax(model: models.FrictionModel) -> FrictionPytree:

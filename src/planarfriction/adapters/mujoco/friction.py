@@ -25,6 +25,7 @@ from planarfriction.adapters.mujoco.patches import (
     PatchContact,
     Placed,
     check_once,
+    check_options,
     memory,
     parameters_in,
     place_of_parameters,
@@ -37,12 +38,6 @@ from planarfriction.environments import check
 from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.kernels import coupling as kernels
 from planarfriction.laws.base import is_rate_law
-
-INTEGRATORS = {
-    int(mujoco.mjtIntegrator.mjINT_EULER): "Euler",
-    int(mujoco.mjtIntegrator.mjINT_IMPLICIT): "implicit",
-    int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST): "implicitfast",
-}
 
 
 class Report(NamedTuple):
@@ -86,16 +81,7 @@ class Friction:
 
     def _check(self, m: Any) -> None:
         """Refuse options and parameters of a model that do not fit."""
-        options = m.opt
-        if options.integrator not in INTEGRATORS:
-            rule = f"be {', '.join(INTEGRATORS.values())}"
-            raise InvalidValueError("integrator", rule, mujoco.mjtIntegrator(options.integrator).name[6:])
-        if options.noslip_iterations > 0:
-            rule = "be 0: they would change the solution"
-            raise InvalidValueError("noslip_iterations", rule, options.noslip_iterations)
-        sleep = getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0)
-        if options.enableflags & int(sleep):
-            raise InvalidValueError("sleep", "be disabled: sleeping bodies do not react to wrenches", "enabled")
+        check_options(m, "Euler", "implicit", "implicitfast")
         for placed in self.placed:
             placed.check(m)
         check(self.parameters(m))

@@ -215,6 +215,21 @@ def check_once(patches: Sequence[PatchContact]) -> None:
             raise InvalidValueError("patches", "have each pair of geoms once", ", ".join(sorted(pair)))
 
 
+def check_options(m: Any, *integrators: str, cone: str = "", sleeps: bool = False) -> None:
+    """Refuse options of a model that do not fit; `cone` is the reason why contacts have to have pyramidal ones."""
+    options = m.opt
+    integrator = mujoco.mjtIntegrator(options.integrator).name.removeprefix("mjINT_")
+    if integrator.lower() not in map(str.lower, integrators):
+        raise InvalidValueError("integrator", f"be {', '.join(integrators)}", integrator)
+    if cone and options.cone != mujoco.mjtCone.mjCONE_PYRAMIDAL:
+        name = mujoco.mjtCone(options.cone).name.removeprefix("mjCONE_").lower()
+        raise InvalidValueError("cone", f"be pyramidal{cone}", name)
+    if options.noslip_iterations > 0:
+        raise InvalidValueError("noslip_iterations", "be 0: they would change the solution", options.noslip_iterations)
+    if not sleeps and options.enableflags & int(getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0)):
+        raise InvalidValueError("sleep", "be disabled: sleeping bodies do not react to wrenches", "enabled")
+
+
 class Placed:
     """A patch found in a compiled model.
 

@@ -19,6 +19,7 @@ from planarfriction.adapters.mujoco.patches import (
     PatchContact,
     Placed,
     check_once,
+    check_options,
     memory,
     parameters_in,
     place_of_parameters,
@@ -28,11 +29,6 @@ from planarfriction.adapters.mujoco_warp.loops import geometry, responses
 from planarfriction.coupling import HostStep, lever_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.warp import CoupledPatches
-
-INTEGRATORS = {
-    int(mujoco.mjtIntegrator.mjINT_EULER): "Euler",
-    int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST): "implicitfast",
-}
 
 DISPLACEMENT = "centre_x", "centre_y"
 """Parameters of a displacement (see `pf.randomise`)."""
@@ -323,16 +319,7 @@ def _filled(struct: Any, values: Mapping[str, Any]) -> Any:
 
 def _check(m: Any, placed: Sequence[Placed]) -> None:
     """Refuse options of a model that do not fit."""
-    if m.opt.integrator not in INTEGRATORS:
-        name = mujoco.mjtIntegrator(m.opt.integrator).name.removeprefix("mjINT_")
-        raise InvalidValueError("integrator", f"be {', '.join(INTEGRATORS.values())}", name)
-    if m.opt.cone != mujoco.mjtCone.mjCONE_PYRAMIDAL:
-        name = mujoco.mjtCone(m.opt.cone).name.removeprefix("mjCONE_").lower()
-        raise InvalidValueError("cone", "be pyramidal, where constraints are linear in their ranges", name)
-    if m.opt.noslip_iterations > 0:
-        raise InvalidValueError("noslip_iterations", "be 0: they would change the solution", m.opt.noslip_iterations)
-    if m.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP):
-        raise InvalidValueError("sleep", "be disabled: sleeping bodies do not react to wrenches", "enabled")
+    check_options(m, "Euler", "implicitfast", cone=", where constraints are linear in their ranges")
     if m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_ACTUATION):
         raise InvalidValueError(
             "actuation", "be enabled: MuJoCo Warp calls control callbacks with it alone", "disabled"
