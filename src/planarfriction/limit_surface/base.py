@@ -317,6 +317,25 @@ class LimitSurface(ByValue):
         return angle if angle < 0.0 else descend(self, wrenches, found)
 
 
+class CompiledLimitSurface(LimitSurface):
+    """A limit surface of one of the kinds of `kernels.surfaces`: it gives its `numbers`, the loops do the rest."""
+
+    kind: ClassVar[int]
+    """Kind of `kernels.surfaces`."""
+
+    def direction(self, units: np.ndarray) -> np.ndarray:
+        """Return `h` `[M, 3]` of unit scaled twists `[M, 3]` by compiled loops."""
+        h, (_, size, data) = np.empty_like(units), self.numbers
+        kernels.sliding_batch(self.kind, data, 0, size, units, h)
+        return h
+
+    def direction_slope(self, units: np.ndarray) -> np.ndarray:
+        """Return `dh/dV_S` `[M, 3, 3]` at unit scaled twists `[M, 3]` by compiled loops."""
+        slopes, (_, size, data) = np.empty((len(units), 9)), self.numbers
+        kernels.sliding_jacobian_batch(self.kind, data, 0, size, units, slopes)  # of h |V_S|
+        return slopes.reshape(-1, 3, 3) - np.einsum("mi,mj->mij", self.direction(units), units)
+
+
 def scaling(centre_of_pressure: np.ndarray, contact_radius: float) -> np.ndarray:
     """Return `F` of `V_S = F V`: from the frame's origin to the centre of pressure, spin times the contact radius."""
     x, y = centre_of_pressure

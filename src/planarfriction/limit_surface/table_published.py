@@ -9,8 +9,7 @@ import numpy as np
 
 from planarfriction.kernels import spin_sums
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.limit_surface.base import SurfaceNumbers
-from planarfriction.limit_surface.compiled import CompiledLimitSurface
+from planarfriction.limit_surface.base import CompiledLimitSurface, SurfaceNumbers
 from planarfriction.limit_surface.loops.published_twists import published_twists
 from planarfriction.limit_surface.stored import cell_sums
 

@@ -19,7 +19,7 @@ from mujoco import mjx
 
 from planarfriction.adapters.mjx.newton import HostResponse
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
-from planarfriction.adapters.mujoco.patches import Placed
+from planarfriction.adapters.mujoco.patches import Placed, surface_velocities
 from planarfriction.coupling import ALONG, FLAT
 from planarfriction.jax.namespace import xp
 from planarfriction.tensors.pressure import centre_of
@@ -144,9 +144,8 @@ class PatchPlaces(NamedTuple):
 
 def places(m: Any, placed: Sequence[Placed], radius: np.ndarray) -> PatchPlaces:
     """Return the places of patches found in a model."""
-    numbers = [(p.site, p.own, p.other, p.bodies[1], p.bodies[0], p.at_contact) for p in placed]
-    surface = getattr(m, "geom_surfacevel", np.zeros((m.ngeom, 6)))[[(p.own, p.other) for p in placed]]
-    return PatchPlaces(*map(np.array, zip(*numbers, strict=True)), radius=radius, surface=surface)
+    columns = (np.array([getattr(each, name) for each in placed]) for name in PatchPlaces._fields[:6])
+    return PatchPlaces(*columns, radius=radius, surface=surface_velocities(m, placed))
 
 
 class Geometry(NamedTuple):
