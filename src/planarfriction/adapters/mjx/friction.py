@@ -31,6 +31,8 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LIGHTEST
 from planarfriction.jax import DistributedModel, ReducedModelPublished
 from planarfriction.jax.base import FrictionPytree
+from planarfriction.jax.namespace import xp
+from planarfriction.tensors.pressure import twist_at, wrench_from
 from planarfriction.tensors.steps import LAW
 
 PASSES = 4
@@ -224,7 +226,7 @@ class Friction:
         where = responses.geometry(m, d, self._fixed.places, held, before)
         states = [where.carry(p, each) for p, each in enumerate(begun)]
         guess = jnp.stack([where.carry(p, each) for p, each in enumerate(guess.reshape(-1, 3))])
-        guess = responses.back(guess, own.displaced).ravel()
+        guess = wrench_from(xp, guess, own.displaced).ravel()
         guess = jnp.where(jnp.repeat(where.touching, 3), guess, 0.0)
         found = self._search(*jax.lax.stop_gradient((own, m, d, where, states, guess)))
         answer = responses.answer(m, d, where, found.active)
@@ -238,7 +240,7 @@ class Friction:
         kept = {"state": begun, "new": new, "guess": guess, "load": load, "held": held, "centre": where.moved(shift)}
         kept |= {"before": before, "axis": where.axes[:, 0]}
         shift = shift + own.displaced
-        kept |= {"wrench": responses.back(wrench.reshape(-1, 3), -shift), "twist": responses.about(twist, shift)}
+        kept |= {"wrench": wrench_from(xp, wrench.reshape(-1, 3), -shift), "twist": twist_at(xp, twist, shift)}
         kept |= {"time": given.time, "next": d.time, "iterations": found.iterations, "passes": found.passes}
         kept |= {
             "residual": found.residual,
@@ -328,7 +330,7 @@ class Friction:
     def _evaluate(self, own: _Own, pressed, shift, states, twist, load, dt) -> tuple[list[jax.Array], jax.Array]:
         """Return the new states and wrenches of steps; patches of the same model side by side."""
         shift, resize = shift + own.displaced, jnp.ones((len(states), 3)).at[:, 2].set(own.scale)
-        twist = resize * responses.about(twist, shift)
+        twist = resize * twist_at(xp, twist, shift)
         new, wrenches = [jnp.empty(0)] * len(states), [jnp.empty(0)] * len(states)
         for (_, _, at), model, followed in zip(self._groups(), own.models, pressed, strict=True):
             index = np.array(at)
@@ -336,7 +338,7 @@ class Friction:
             after, wrench = model.step(*given) if followed is None else model.step_pressed(followed, *given)
             for i, p in enumerate(at):
                 new[p], wrenches[p] = after[i], wrench[i]
-        return new, responses.back(resize * jnp.stack(wrenches), shift)
+        return new, wrench_from(xp, resize * jnp.stack(wrenches), shift)
 
     def _integrated(self, m, d, jacobian, wrench, answer: responses.WrenchResponse) -> Any:
         """Return the data after the step, with the forces of the user as they were."""

@@ -185,18 +185,6 @@ class Geometry(NamedTuple):
         return jnp.where((self.share > 0.0)[:, None], held, 0.0)
 
 
-def about(twist: jax.Array, shift: jax.Array) -> jax.Array:
-    """Return twists `[k, 3]` at origins that move by `[k, 2]` [m]."""
-    vx, vy, spin = twist.T
-    return jnp.stack([vx - spin * shift[:, 1], vy + spin * shift[:, 0], spin], axis=1)
-
-
-def back(wrench: jax.Array, shift: jax.Array) -> jax.Array:
-    """Return wrenches `[k, 3]` about the origin from those about origins that have moved by `[k, 2]` [m]."""
-    fx, fy, torque = wrench.T
-    return jnp.stack([fx, fy, torque + shift[:, 0] * fy - shift[:, 1] * fx], axis=1)
-
-
 def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Array) -> Geometry:
     """Return the geometry of the contacts of patches with their last origins and x axes `[k, 3]`, in the sites' frames.
 
