@@ -30,12 +30,6 @@ from planarfriction.kernels.following import Followers
 from planarfriction.kernels.steps import WORDS
 from planarfriction.models import FrictionModel
 
-ALONG = 1e-12
-"""Square of the sine of the angle between a frame's x axis and the normal below which its y axis takes its place."""
-
-FLAT = 0.25
-"""Square of that sine below which a patch that was in contact before keeps its x axis, carried along with its body."""
-
 TOLERANCE = 1e-9
 """Default error of the twists [m/s]: a bristle is off by a thousandth of its largest deflection after a second."""
 

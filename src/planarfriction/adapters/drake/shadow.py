@@ -15,8 +15,8 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.framework import DiagramBuilder
 
 from planarfriction.adapters.drake.patches import Placed
-from planarfriction.coupling import ALONG, FLAT
 from planarfriction.errors import InvalidValueError
+from planarfriction.kernels.coupling_rows import ALONG, FLAT
 
 _ORIGIN = np.zeros(3)
 

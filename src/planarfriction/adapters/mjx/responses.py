@@ -20,8 +20,8 @@ from mujoco import mjx
 from planarfriction.adapters.mjx.newton import HostResponse
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
 from planarfriction.adapters.mujoco.patches import Placed, surface_velocities
-from planarfriction.coupling import ALONG, FLAT
 from planarfriction.jax.namespace import xp
+from planarfriction.kernels.coupling_rows import ALONG, FLAT
 from planarfriction.tensors.pressure import centre_of
 
 

@@ -8,7 +8,7 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call_c
 from planarfriction.compiler.memory import at, doubles, integers, integers32
-from planarfriction.coupling import ALONG, FLAT
+from planarfriction.kernels.coupling_rows import ALONG, FLAT
 from planarfriction.kernels.vectors import dot, norm, plus, square, three, times
 
 

@@ -12,7 +12,7 @@ import warp as wp
 
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
 from planarfriction.adapters.mujoco.loops.records import Memory
-from planarfriction.coupling import ALONG, FLAT
+from planarfriction.kernels.coupling_rows import ALONG, FLAT
 
 FRICTIONLESS = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS))
 
