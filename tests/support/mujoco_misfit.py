@@ -16,7 +16,7 @@ def twists_and_loads(friction, d) -> tuple[np.ndarray, np.ndarray]:
             continue
         centre, axes = friction.frame(d, p)
         loads[p] = d.efc_force[d.contact.efc_address[chosen]].sum()
-        for side, body in zip((-1.0, 1.0), placed.bodies, strict=True):
+        for side, body in zip((-1.0, 1.0), (placed.support, placed.owner), strict=True):
             moves, turns = np.zeros((3, m.nv)), np.zeros((3, m.nv))
             mujoco.mj_jac(m, d, moves, turns, centre, body)
             twists[p] += side * np.array([*(axes[:2] @ moves @ d.qvel), axes[2] @ turns @ d.qvel])

@@ -424,7 +424,7 @@ def test_long_sweeps_have_few_files(tmp_path, monkeypatch):
     """A file comes after half a second and a fiftieth of the time so far, and holds the runs since the last one."""
     clock = itertools.count()
     monkeypatch.setattr(bookkeeping, "monotonic", lambda: 0.1 * next(clock))
-    book = bookkeeping.FolderBookkeeper(grid_of({"a": [1.0]}), False, tmp_path)
+    book = bookkeeping.Bookkeeper(grid_of({"a": [1.0]}), False, tmp_path)
     for number in range(10_000):  # 1,000 s
         book.add((0,), str(number), records.Record("success", "", {}), None)
         book.flush()

@@ -97,10 +97,7 @@ def run(scene: str, out: Path | None, plot: bool, animate: bool, **options: Any)
         return command.run(scene, folder=folder, pictures=pictures, **options)
 
 
-@app.command(
-    name="limit-surface",
-    short_help="Print, draw or tabulate a limit surface.",
-)
+@app.command(name="limit-surface", short_help="Print, draw or tabulate a limit surface.")
 @patch_option("Default: Circle.")
 @click.option("--pressure", type=FILE, help="Pressure map, as with --patch.")
 @map_options
@@ -150,10 +147,7 @@ def export(file: Path, **options: Any) -> None:
     command.export(file, **options)
 
 
-@app.command(
-    cls=FitOrPlan,
-    short_help="Estimate friction parameters from logs; plan the next measurement.",
-)
+@app.command(cls=FitOrPlan, short_help="Estimate friction parameters from logs; plan the next measurement.")
 @click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True, shell_complete=complete_log)
 @patch_option("Default: Circle.")
 @map_options

@@ -41,10 +41,7 @@ def complete_log(ctx: click.Context, parameter: object, incomplete: str) -> list
     return [*words, CompletionItem(incomplete, type="file")]
 
 
-@click.command(
-    name=NAME,
-    short_help=SHORT_HELP,
-)
+@click.command(name=NAME, short_help=SHORT_HELP)
 @click.argument("logs", metavar="[LOG]...", type=FILE, nargs=-1)
 @patch_option("Default: Circle.", "patch_name")
 @map_options

@@ -1,6 +1,8 @@
 """Friction laws: frozen parameters with validation (the equations are in `planarfriction.formulas`)."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+import lazy_loader
 
 from planarfriction.families import LAWS
 from planarfriction.laws.base import FrictionLaw
@@ -26,13 +28,8 @@ __all__ = [
 
 register = LAWS.register
 
-
-def __getattr__(name: str) -> Any:
-    if name == "RateLaw":  # brings the compiler with it, which laws of numbers do not need
-        from planarfriction.laws.rate_law import RateLaw
-
-        return RateLaw
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+# it brings the compiler with it, which laws of numbers do not need
+__getattr__, _, _ = lazy_loader.attach(__name__, submod_attrs={"rate_law": ["RateLaw"]})
 
 
 def __dir__() -> list[str]:

@@ -17,7 +17,7 @@ from planarfriction.errors import FrictionError, InvalidValueError, SolverError
 from planarfriction.geometry import transformed
 from planarfriction.kernels import surfaces as kernels
 from planarfriction.limit_surface.loops.twists import StoredPotential, table_twists
-from planarfriction.limit_surface.stored import across, descend, scaled_levers, table_of
+from planarfriction.limit_surface.stored import across, descend, table_of
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy, refuse_cell_metrics, symmetric_root
 from planarfriction.pictures import picture
@@ -84,6 +84,7 @@ class LimitSurface(ByValue):
     """Segments per quadrant of the table in which models store it [-]."""
 
     def __post_init__(self) -> None:
+        self._set(segments=validation.count("segments", self.segments, 2, MOST_SEGMENTS))
         validation.instance("patch", self.patch, ContactPatch, "a ContactPatch")
         if self.anisotropy != "any":
             refuse = refuse_anisotropy if self.anisotropy == "none" else refuse_cell_metrics
@@ -149,18 +150,19 @@ class LimitSurface(ByValue):
         return self.patch.root is None or self.patch.root.ndim == 2
 
     @functools.cached_property
-    def _scaled_levers(self) -> tuple[np.ndarray, np.ndarray]:
-        """Maps from scaled twists to what the loaded cells see, `[n, 2, 3]` (discs: `[n, 3, 3]`), and their weights."""
+    def _cell_rows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Maps from scaled twists to the velocities of the loaded cells `[2, 3, n]`, to what discs see of a spin `[n]`.
+
+        `C_i = [L_i frame^-1 | (-y_i, x_i)]` of lever coordinates in contact radii; with the weights `[n]`.
+        """
         x, y, weights = self._loaded_cells()
         loaded = self.patch.weights(self.normal_force) > 0.0
-        root = None if self._one_metric else self.patch.root[loaded]  # pyright: ignore[reportOptionalSubscript]
-        radius = self.contact_radius
-        levers = scaled_levers(x / radius, y / radius, root, self._frame()[:2, :2])
-        if not self.patch.has_discs:
-            return levers, weights
-        spin = np.zeros((len(x), 1, 3))
-        spin[:, 0, 2] = math.sqrt(0.5) * self.patch.lever_radii[loaded] / radius
-        return np.concatenate([levers, spin], axis=1), weights
+        radius, levers = self.contact_radius, np.zeros((2, 3, len(x)))
+        levers[0, 0], levers[1, 1], levers[0, 2], levers[1, 2] = 1.0, 1.0, -y / radius, x / radius
+        if not self._one_metric:
+            root = self.patch.root[loaded]  # pyright: ignore[reportOptionalSubscript]
+            levers[:, :2] = np.moveaxis(root @ np.linalg.inv(self._frame()[:2, :2]), 0, -1)
+        return levers, math.sqrt(0.5) * self.patch.lever_radii[loaded] / radius, weights
 
     @functools.cached_property
     def _lean(self) -> np.ndarray | None:
@@ -313,6 +315,25 @@ class LimitSurface(ByValue):
         """
         angle = table_twists(self._table, self._scaling, wrenches, found)
         return angle if angle < 0.0 else descend(self, wrenches, found)
+
+
+class CompiledLimitSurface(LimitSurface):
+    """A limit surface of one of the kinds of `kernels.surfaces`: it gives its `numbers`, the loops do the rest."""
+
+    kind: ClassVar[int]
+    """Kind of `kernels.surfaces`."""
+
+    def direction(self, units: np.ndarray) -> np.ndarray:
+        """Return `h` `[M, 3]` of unit scaled twists `[M, 3]` by compiled loops."""
+        h, (_, size, data) = np.empty_like(units), self.numbers
+        kernels.sliding_batch(self.kind, data, 0, size, units, h)
+        return h
+
+    def direction_slope(self, units: np.ndarray) -> np.ndarray:
+        """Return `dh/dV_S` `[M, 3, 3]` at unit scaled twists `[M, 3]` by compiled loops."""
+        slopes, (_, size, data) = np.empty((len(units), 9)), self.numbers
+        kernels.sliding_jacobian_batch(self.kind, data, 0, size, units, slopes)  # of h |V_S|
+        return slopes.reshape(-1, 3, 3) - np.einsum("mi,mj->mij", self.direction(units), units)
 
 
 def scaling(centre_of_pressure: np.ndarray, contact_radius: float) -> np.ndarray:

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.limit_surface.base import SurfaceNumbers
-from planarfriction.limit_surface.compiled import CompiledLimitSurface
+from planarfriction.limit_surface.base import CompiledLimitSurface, SurfaceNumbers
 from planarfriction.limit_surface.loops.cell_twists import cell_twists
-from planarfriction.limit_surface.stored import cell_slopes, cell_sums, stored_potential
+from planarfriction.limit_surface.stored import cell_sums, stored_potential
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +29,7 @@ class LimitSurfaceCells(CompiledLimitSurface):
     def numbers(self) -> SurfaceNumbers:
         """Scaled positions and weights of the loaded cells; of discs a table."""
         if self.patch.has_discs:
-            data = stored_potential(lambda units: (self.direction(units), self.direction_slope(units)), self.segments)
+            data = stored_potential(lambda units: cell_sums(self._cell_rows, units), self.segments)
             return SurfaceNumbers(kernels.POTENTIAL, self.segments, data)
         x, y, weights = self._loaded_cells()
         radius = self.contact_radius
@@ -38,23 +37,16 @@ class LimitSurfaceCells(CompiledLimitSurface):
 
     def direction(self, units: np.ndarray) -> np.ndarray:
         """Return `h` `[M, 3]` of unit scaled twists `[M, 3]`."""
-        return super().direction(units) if self._compiled else cell_sums(*self._scaled_levers, units)
+        return super().direction(units) if self._compiled else cell_sums(self._cell_rows, units)[0]
 
     def direction_slope(self, units: np.ndarray) -> np.ndarray:
         """Return `dh/dV_S` `[M, 3, 3]` at unit scaled twists `[M, 3]`."""
-        return super().direction_slope(units) if self._compiled else cell_slopes(*self._scaled_levers, units)
+        return super().direction_slope(units) if self._compiled else cell_sums(self._cell_rows, units)[1]
 
     @property
     def _compiled(self) -> bool:
         """True if compiled loops know the cells: points that share a metric."""
         return self._one_metric and not self.patch.has_discs
-
-    @functools.cached_property
-    def _cell_rows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Levers `[2, 3, n]`, what discs see of a spin `[n]`, and weights `[n]` for compiled loops."""
-        levers, weights = self._scaled_levers
-        spins = np.ascontiguousarray(levers[:, 2, 2]) if self.patch.has_discs else np.zeros(len(weights))
-        return np.ascontiguousarray(np.moveaxis(levers[:, :2], 0, -1)), spins, weights
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
         """Find twists; the minimum often lies on a kink: inside a flat facet the body turns about a cell."""

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.limit_surface.base import SurfaceNumbers
-from planarfriction.limit_surface.compiled import CompiledLimitSurface
+from planarfriction.limit_surface.base import CompiledLimitSurface, SurfaceNumbers
 from planarfriction.limit_surface.loops.twists import ellipsoid_twists
 
 

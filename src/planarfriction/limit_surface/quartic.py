@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from planarfriction import validation
 from planarfriction.errors import FrictionError, InvalidValueError, MissingExtraError
 from planarfriction.geometry import transformed
-from planarfriction.limit_surface.base import MOST_SEGMENTS, LimitSurface, _rows, scaling
+from planarfriction.limit_surface.base import LimitSurface, _rows, scaling
 from planarfriction.limit_surface.cells import LimitSurfaceCells
 from planarfriction.limit_surface.comparison import directions
 from planarfriction.limit_surface.loops.twists import BAD_WRENCH
@@ -161,7 +161,6 @@ class LimitSurfaceQuartic(LimitSurface):
     """Segments per quadrant of the table for compiled code [-]."""
 
     def __post_init__(self) -> None:
-        self._set(segments=validation.count("segments", self.segments, 2, MOST_SEGMENTS))
         if self.surface is not None and not isinstance(self.surface, LimitSurface):
             raise InvalidValueError("surface", "be a limit surface", self.surface)
         super().__post_init__()

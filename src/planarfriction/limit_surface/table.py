@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planarfriction import validation
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.limit_surface.base import MOST_SEGMENTS, SurfaceNumbers
-from planarfriction.limit_surface.compiled import CompiledLimitSurface
+from planarfriction.limit_surface.base import CompiledLimitSurface, SurfaceNumbers
 from planarfriction.limit_surface.exact import STORED_RULES, LimitSurfaceExact
 from planarfriction.limit_surface.loops.twists import table_twists
 from planarfriction.limit_surface.stored import cell_sums, stored_potential
@@ -33,10 +31,6 @@ class LimitSurfaceTable(CompiledLimitSurface):
     kind = kernels.POTENTIAL
     anisotropy = "any"
 
-    def __post_init__(self) -> None:
-        self._set(segments=validation.count("segments", self.segments, 2, MOST_SEGMENTS))
-        super().__post_init__()
-
     @functools.cached_property
     def _exact(self) -> LimitSurfaceExact:
         return LimitSurfaceExact(self.patch, normal_force=self.normal_force)
@@ -55,7 +49,7 @@ class LimitSurfaceTable(CompiledLimitSurface):
         if self._one_metric:
             data = stored_potential(lambda units: self._exact.sums(units, STORED_RULES), self.segments)
         else:
-            data = stored_potential(lambda units: (cell_sums(*self._scaled_levers, units), None), self.segments)
+            data = stored_potential(lambda units: (cell_sums(self._cell_rows, units)[0], None), self.segments)
         return SurfaceNumbers(self.kind, self.segments, data)
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planarfriction import validation
 from planarfriction.kernels import spin_sums
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.limit_surface.base import MOST_SEGMENTS, SurfaceNumbers
-from planarfriction.limit_surface.compiled import CompiledLimitSurface
+from planarfriction.limit_surface.base import CompiledLimitSurface, SurfaceNumbers
 from planarfriction.limit_surface.loops.published_twists import published_twists
 from planarfriction.limit_surface.stored import cell_sums
 
@@ -33,10 +31,6 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
     """Segments per quadrant [-]."""
 
     kind = kernels.BILINEAR
-
-    def __post_init__(self) -> None:
-        self._set(segments=validation.count("segments", self.segments, 2, MOST_SEGMENTS))
-        super().__post_init__()
 
     def _grid(self) -> tuple[tuple[float, float, float, float], np.ndarray]:
         """Return the patch's grid about the centre of pressure, and new memory for the sums at its corners.
@@ -70,7 +64,7 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
             polar, azimuth = angles[: self.segments + 1, None], angles
             sides = np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar) + 0.0 * azimuth
             units = np.stack(sides, -1).reshape(-1, 3)
-            nodes[..., :3] = cell_sums(*self._scaled_levers, units).reshape(*nodes.shape[:2], 3)
+            nodes[..., :3] = cell_sums(self._cell_rows, units)[0].reshape(*nodes.shape[:2], 3)
             return SurfaceNumbers(self.kind, self.segments, nodes.reshape(-1))
         place, corners = self._grid()
         spin_sums.smoothed_nodes(corners, place, *self._loaded_cells(), self.contact_radius, self.segments, nodes)

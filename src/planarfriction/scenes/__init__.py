@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+import lazy_loader
 
 from planarfriction.families import SCENES
 from planarfriction.scenes.body import Body
@@ -44,14 +46,8 @@ __all__ = [
 
 register = SCENES.register
 
-
-def __getattr__(name: str) -> Any:
-    if name == "simulate":  # brings the compiled solver with it
-        from planarfriction.scenes.simulation import simulate
-
-        globals()["simulate"] = simulate
-        return simulate
-    raise AttributeError(f"module 'planarfriction.scenes' has no attribute {name!r}")
+# it brings the compiled solver with it
+__getattr__, _, _ = lazy_loader.attach(__name__, submod_attrs={"simulation": ["simulate"]})
 
 
 def __dir__() -> list[str]:

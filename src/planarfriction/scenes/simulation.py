@@ -24,23 +24,24 @@ BRISTLES = ("none", "all")
 MOST_NUMBERS = 10**9
 """Numbers of bristles that a run records at most: 8 GB."""
 
-_BODY = {"vx": "m/s", "vy": "m/s", "omega": "rad/s", "x": "m", "y": "m", "theta": "rad"}
-_WRENCH = {"fx": "N", "fy": "N", "tau": "N m"}
-_LONG_NAMES = {
-    "time": "time",
-    "vx": "velocity of the centre of mass, world x",
-    "vy": "velocity of the centre of mass, world y",
-    "omega": "spin, counter-clockwise",
-    "x": "position of the centre of mass, world x",
-    "y": "position of the centre of mass, world y",
-    "theta": "orientation, counter-clockwise",
-    "fx": "friction on the body along x of the contact frame, one of the identical contacts",
-    "fy": "friction on the body along y of the contact frame, one of the identical contacts",
-    "tau": "friction torque on the body about the contact frame's origin, one of the identical contacts",
-    "normal_force": "normal force of one of the identical contacts",
-    "pressure_x": "centre of pressure along x of the contact frame",
-    "pressure_y": "centre of pressure along y of the contact frame",
+_BODY, _CONTACT = ("vx", "vy", "omega", "x", "y", "theta"), ("fx", "fy", "tau", "normal_force")
+
+_QUANTITIES = {
+    "time": ("s", "time"),
+    "vx": ("m/s", "velocity of the centre of mass, world x"),
+    "vy": ("m/s", "velocity of the centre of mass, world y"),
+    "omega": ("rad/s", "spin, counter-clockwise"),
+    "x": ("m", "position of the centre of mass, world x"),
+    "y": ("m", "position of the centre of mass, world y"),
+    "theta": ("rad", "orientation, counter-clockwise"),
+    "fx": ("N", "friction on the body along x of the contact frame, one of the identical contacts"),
+    "fy": ("N", "friction on the body along y of the contact frame, one of the identical contacts"),
+    "tau": ("N m", "friction torque on the body about the contact frame's origin, one of the identical contacts"),
+    "normal_force": ("N", "normal force of one of the identical contacts"),
+    "pressure_x": ("m", "centre of pressure along x of the contact frame"),
+    "pressure_y": ("m", "centre of pressure along y of the contact frame"),
 }
+"""Unit and description of what is recorded."""
 
 
 def simulate(
@@ -131,22 +132,20 @@ def _output(scene: Scene, times: np.ndarray, batches: SegmentBatches, bristles: 
 def _histories(scene: Scene, batches: SegmentBatches, output: Output) -> dict[str, History]:
     """Return what was recorded, by name, with units."""
 
-    def history(name: str, dims: tuple[str, ...], values: np.ndarray, unit: str) -> History:
-        long_name = _LONG_NAMES[name]
+    def history(name: str, values: np.ndarray) -> History:
+        unit, long_name = _QUANTITIES[name]
         if scene.velocity is not None and name in ("vx", "vy"):
             long_name = long_name.replace("centre of mass, world", "origin of the body's axes, body")
+        dims = ("time", "contact")[: values.ndim]
         return History(dims, values, {"units": unit, "long_name": long_name})
 
-    histories = {
-        name: history(name, ("time",), output.body[:, i], unit) for i, (name, unit) in enumerate(_BODY.items())
-    }
-    for i, (name, unit) in enumerate(_WRENCH.items()):
-        histories[name] = history(name, ("time", "contact"), output.wrench[:, :, i], unit)
-    histories["normal_force"] = history("normal_force", ("time", "contact"), output.load, "N")
+    histories = {name: history(name, output.body[:, i]) for i, name in enumerate(_BODY)}
+    for name, values in zip(_CONTACT, (*np.moveaxis(output.wrench, -1, 0), output.load), strict=True):
+        histories[name] = history(name, values)
     if scene.contacts[0].pressure == "follows":
         centres = centres_of_pressure(scene.contacts[0], output.pressure, output.load[:, 0])
         for i, name in enumerate(("pressure_x", "pressure_y")):
-            histories[name] = history(name, ("time", "contact"), centres[:, i : i + 1], "m")
+            histories[name] = history(name, centres[:, i : i + 1])
     if len(output.bristles):
         for c, contact in enumerate(scene.contacts):
             first, cells = batches.bristles, batches.cells[c]
@@ -155,13 +154,12 @@ def _histories(scene: Scene, batches: SegmentBatches, output: Output) -> dict[st
             if cells is not None:
                 size = contact.model.state_shape[0]
                 full = np.zeros((len(part), size, len(cells)))
-                full[:, :, cells] = part[:, : size * cells.sum()].reshape(
-                    len(part), size, -1
-                )  # no place of the pressure
+                bent = part[:, : size * cells.sum()]  # without the place of the pressure
+                full[:, :, cells] = bent.reshape(len(part), size, -1)
                 axis = "axis" if size == 2 else "component"
                 histories[name] = History(("time", axis, f"cell_{contact.name}"), full, {"units": "m"})
             else:
                 histories[name] = History(("time", "component"), part, {"units": contact.model.state_units})
-    histories["time"] = history("time", ("time",), output.time, "s")
+    histories["time"] = history("time", output.time)
     histories["contact"] = History(("contact",), np.array([contact.name for contact in scene.contacts]), {})
     return histories

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+import lazy_loader
 
 from planarfriction.solvers.statistics import Statistics
 
@@ -13,15 +14,9 @@ if TYPE_CHECKING:
 
 __all__ = ["RODAS3", "RODAS4", "Integration", "Statistics", "integrate"]
 
-_HOME = {"RODAS3": "methods", "RODAS4": "methods", "Integration": "structured", "integrate": "structured"}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module 'planarfriction.solvers' has no attribute {name!r}")
-    value = getattr(importlib.import_module(f"planarfriction.solvers.{_HOME[name]}"), name)  # brings the compiled code
-    globals()[name] = value
-    return value
+# these bring the compiled code
+_HOMES = {"methods": ["RODAS3", "RODAS4"], "structured": ["Integration", "integrate"]}
+__getattr__, _, _ = lazy_loader.attach(__name__, submod_attrs=_HOMES)
 
 
 def __dir__() -> list[str]:

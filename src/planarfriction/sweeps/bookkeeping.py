@@ -45,20 +45,38 @@ Index = tuple[int, ...]
 
 
 class Bookkeeper:
-    """Outcomes and results of the runs of a sweep; this one keeps them in memory, others also on disk."""
+    """Outcomes and results of the runs of a sweep, in memory and, if there is one, in a folder.
 
-    def __init__(self, grid: Grid, timed: bool) -> None:
+    The folder holds files of many runs that are done, and one of scene and reason for each that failed. A file is named
+    by the digest of its content, so that any number of sweeps write to one folder, and damage is seen.
+    """
+
+    def __init__(self, grid: Grid, timed: bool, path: str | Path | None = None) -> None:
         self.grid, self.timed = grid, timed
         self.runs: dict[Index, tuple[str, Record]] = {}
         """Keys and records of the runs that have been done."""
         self.found = self.new = self.failed = self.damaged = 0
         self.first_failure = ""
         self._ends: set[tuple[float, float]] = set()
+        self._folder = None if path is None else make_folder(path)
+        self._begin = self._written = monotonic()
+        self._kept: dict[str, Record] = {}
+        """Records of earlier sweeps by their keys."""
+        self._open: dict[str, Record] = {}
+        """Records that are in no file yet."""
+        for file in sorted(self._folder.glob("runs-*.npz")) if self._folder else ():
+            with contextlib.suppress(OSError):
+                content = file.read_bytes()
+                if file.name == _name(content):
+                    self._kept |= unpack(content)
+                    continue
+                file.unlink()
+            self.damaged += 1
 
     def look_up(self, index: Index, key: str, scene: Scene) -> bool:
         """Return True if the run with this key was done before, and take it over."""
         self._ends.add((scene.t_end, scene.save_every))
-        record = self._find(index, key)
+        record = self._kept.get(key)
         if record is not None:
             self.found += 1
             self.runs[index] = key, record
@@ -66,7 +84,8 @@ class Bookkeeper:
 
     def add(self, index: Index, key: str, record: Record, scene: Scene | None) -> None:
         """Keep the record of a run that has just ended."""
-        record = self._store(index, key, record, scene)
+        if self._folder is not None:
+            self._store(key, record, scene)
         self.new += 1
         if record.status == FAILED:
             self.failed += 1
@@ -74,7 +93,27 @@ class Bookkeeper:
         self.runs[index] = key, record
 
     def flush(self, at_once: bool = False) -> None:
-        """Write what is in memory, if it is time or `at_once`."""
+        """Write the open records as one file, whole or not at all, so seldom that a long sweep has few files."""
+        now = monotonic()
+        if self._open and (at_once or now - self._written > BETWEEN + SHARE * (now - self._begin)):
+            content = pack(self._open)
+            put(f"{self._folder}{os.sep}{_name(content)}", content)
+            self._open.clear()
+            self._written = now
+
+    def _store(self, key: str, record: Record, scene: Scene | None) -> None:
+        """Keep the record of a run for the next file, or write the file of a failure."""
+        failed = f"{self._folder}{os.sep}{key}.failed.json"
+        if record.status != FAILED:
+            self._open[key] = record
+            with contextlib.suppress(OSError):
+                os.unlink(failed)
+        elif key:  # there is a scene
+            try:
+                put(failed, failure(record.reason, scene).encode())
+            except FileError:
+                if not os.path.isdir(failed):
+                    raise
 
     def dataset(self) -> xr.Dataset:
         """Return the whole as one dataset; if the axis is the time, runs may have gone along it differently far."""
@@ -88,16 +127,6 @@ class Bookkeeper:
         variables |= {name: ((name,), np.array(labels)) for name, labels in self.grid.labels.items()}
         coordinates = [name for name, each in variables.items() if each[0] == (name,)]
         return xr.Dataset(variables).set_coords(coordinates)
-
-    # ------------------------------------------------------------------ overridden by those that keep files
-
-    def _find(self, index: Index, key: str) -> Record | None:
-        """Return the record of a run that was done before, or None."""
-        return None
-
-    def _store(self, index: Index, key: str, record: Record, scene: Scene | None) -> Record:
-        """Write the record of a run; returns it as it counts."""
-        return record
 
     # ------------------------------------------------------------------ arrays
 
@@ -153,58 +182,6 @@ class Bookkeeper:
                 arrays[name] = array = array.astype(np.result_type(array, values))
             array[index] = values
         self.runs[index] = key, record._replace(variables={})  # they are in the arrays now
-
-
-class FolderBookkeeper(Bookkeeper):
-    """Bookkeeper with a folder: files of many runs that are done, and one of scene and reason for each that failed.
-
-    A file is named by the digest of its content, so that any number of sweeps write to one folder, and damage is seen.
-    """
-
-    def __init__(self, grid: Grid, timed: bool, path: str | Path) -> None:
-        super().__init__(grid, timed)
-        self._folder = make_folder(path)
-        self._begin = self._written = monotonic()
-        self._kept: dict[str, Record] = {}
-        """Records of earlier sweeps by their keys."""
-        self._open: dict[str, Record] = {}
-        """Records that are in no file yet."""
-        for file in sorted(self._folder.glob("runs-*.npz")):
-            with contextlib.suppress(OSError):
-                content = file.read_bytes()
-                if file.name == _name(content):
-                    self._kept |= unpack(content)
-                    continue
-                file.unlink()
-            self.damaged += 1
-
-    def _find(self, index: Index, key: str) -> Record | None:
-        """Return the record of a run that a file has."""
-        return self._kept.get(key)
-
-    def _store(self, index: Index, key: str, record: Record, scene: Scene | None) -> Record:
-        """Keep the record of a run for the next file, or write the file of a failure."""
-        failed = f"{self._folder}{os.sep}{key}.failed.json"
-        if record.status != FAILED:
-            self._open[key] = record
-            with contextlib.suppress(OSError):
-                os.unlink(failed)
-        elif key:  # there is a scene
-            try:
-                put(failed, failure(record.reason, scene).encode())
-            except FileError:
-                if not os.path.isdir(failed):
-                    raise
-        return record
-
-    def flush(self, at_once: bool = False) -> None:
-        """Write the open records as one file, whole or not at all, so seldom that a long sweep has few files."""
-        now = monotonic()
-        if self._open and (at_once or now - self._written > BETWEEN + SHARE * (now - self._begin)):
-            content = pack(self._open)
-            put(f"{self._folder}{os.sep}{_name(content)}", content)
-            self._open.clear()
-            self._written = now
 
 
 def _name(content: bytes) -> str:

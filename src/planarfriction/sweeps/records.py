@@ -136,7 +136,7 @@ def pack(runs: Mapping[str, Record]) -> bytes:
     Variables of the same names, axes, types and shapes are stacked into one array each.
     """
     groups: dict[Any, list[tuple[str, Record]]] = {}
-    for key, record in runs.items():
+    for key, record in sorted(runs.items()):  # runs end in any order
         groups.setdefault(tuple(map(_layout, record.variables.items())), []).append((key, record))
     meta, arrays = [], {}
     for number, group in enumerate(groups.values()):

@@ -25,7 +25,7 @@ from planarfriction.compiler import threads
 from planarfriction.described import described
 from planarfriction.errors import InvalidValueError, SweepError, SweepInterrupted
 from planarfriction.scenes import Scene
-from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, FolderBookkeeper, Index
+from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, Index
 from planarfriction.sweeps.keys import Keys
 from planarfriction.sweeps.quantities import Grid, check_takes, grid_of
 from planarfriction.sweeps.records import FAILED, TURN, Batch, Record, reason_of, run_all
@@ -191,7 +191,7 @@ def _bookkeeper(out: str | Path | None, grid: Grid, timed: bool) -> Bookkeeper:
     if Path(out).suffix == ".zarr":
         rule = "be a folder (the dataset becomes a zarr store by its own method: data.to_zarr(path, zarr_format=2))"
         raise InvalidValueError("out", rule, str(out))
-    return FolderBookkeeper(grid, timed, out)
+    return Bookkeeper(grid, timed, out)
 
 
 def _maker(make_scene: Any, grid: Grid) -> Callable[..., Scene]:

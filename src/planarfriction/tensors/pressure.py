@@ -19,6 +19,19 @@ def centre_of(xp: Any, moments: Any, load: Any) -> Any:
     return xp.clip(xp.where(loaded, turned / xp.where(loaded, load[..., None], 1.0), 0.0), -REACH, REACH)
 
 
+def twist_at(xp: Any, twist: Any, offset: Any) -> Any:
+    """Return twists `[..., 3]` at points displaced by `offset` `[..., 2]` [m] (see `geometry.twist_at`)."""
+    spin = twist[..., 2]
+    vx, vy = twist[..., 0] - spin * offset[..., 1], twist[..., 1] + spin * offset[..., 0]
+    return xp.stack(xp.broadcast_arrays(vx, vy, spin), -1)
+
+
+def wrench_from(xp: Any, wrench: Any, offset: Any) -> Any:
+    """Return wrenches `[..., 3]` about the origin from those about points displaced by `offset` `[..., 2]` [m]."""
+    fx, fy = wrench[..., 0], wrench[..., 1]
+    return xp.stack(xp.broadcast_arrays(fx, fy, wrench[..., 2] + offset[..., 0] * fy - offset[..., 1] * fx), -1)
+
+
 def tilted(xp: Any, positions: Any, weights: Any, centre: Any) -> Any:
     """Return weights `[..., N]` of cells at `positions`, x then y `[..., N]`, that press about a centre `[..., 2]`."""
 
@@ -66,19 +79,11 @@ class Pressed(NamedTuple):
 
     def seen(self, xp: Any, twist: Any) -> Any:
         """Return the twist that the patch sees."""
-        if self.moved is None:
-            return twist
-        spin = twist[..., 2]
-        vx, vy = twist[..., 0] - spin * self.moved[..., 1], twist[..., 1] + spin * self.moved[..., 0]
-        return xp.stack(xp.broadcast_arrays(vx, vy, spin), -1)
+        return twist if self.moved is None else twist_at(xp, twist, self.moved)
 
     def pull(self, xp: Any, wrench: Any) -> Any:
         """Return its wrench about the origin."""
-        if self.moved is None:
-            return wrench
-        fx, fy = wrench[..., 0], wrench[..., 1]
-        tau = wrench[..., 2] + self.moved[..., 0] * fy - self.moved[..., 1] * fx
-        return xp.stack(xp.broadcast_arrays(fx, fy, tau), -1)
+        return wrench if self.moved is None else wrench_from(xp, wrench, self.moved)
 
 
 def follow(xp: Any, equations: Any, contact: Any, centre: Any) -> Pressed:

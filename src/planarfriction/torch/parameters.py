@@ -23,7 +23,8 @@ import torch
 from torch import Tensor, nn
 
 from planarfriction import validation
-from planarfriction.errors import InvalidValueError
+from planarfriction.laws import ElastoPlastic, LuGre
+from planarfriction.tensors.steps import LAW
 from planarfriction.torch.namespace import xp
 
 _POSITIVE = ("sigma_0", "mu_c", "v_s", "gamma", "contact_radius", "second_moment")
@@ -132,14 +133,8 @@ def _raw(name: str, values: Mapping[str, float], *, fixed_static: bool) -> tuple
 
 
 def _check(values: Mapping[str, float]) -> None:
-    for name, value in values.items():
-        if name in _POSITIVE:
-            validation.positive(name, value)
-        elif name.startswith("centre"):
-            validation.number(name, value)
-        else:
-            validation.non_negative(name, value)
-    if values["mu_s"] < values["mu_c"]:
-        raise InvalidValueError("mu_s", "be >= mu_c", f"mu_s={values['mu_s']}, mu_c={values['mu_c']}")
-    if values["breakaway_ratio"] >= 1.0:
-        raise InvalidValueError("breakaway_ratio", "be in [0, 1)", values["breakaway_ratio"])
+    """Raise for values that no law, or no patch, may have."""
+    LuGre(**{name: values[name] for name in LAW[:-1]})
+    ElastoPlastic(values["breakaway_ratio"])
+    for name in values.keys() - set(LAW):
+        (validation.number if name.startswith("centre") else validation.positive)(name, values[name])

@@ -8,15 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pydrake.geometry import (
-    Capsule,
-    Ellipsoid,
-    GeometryId,
-    ProximityProperties,
-    Role,
-    RoleAssign,
-    Sphere,
-)
+from pydrake.geometry import Capsule, Ellipsoid, GeometryId, ProximityProperties, Role, RoleAssign, Sphere
 from pydrake.multibody.plant import CoulombFriction
 from pydrake.multibody.tree import BodyIndex, FrameIndex
 

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple, Self
 
 import jax
 import jax.numpy as jnp
-import mujoco
 import numpy as np
 from mujoco import mjx
 
@@ -21,6 +20,7 @@ from planarfriction.adapters.mujoco.patches import (
     PatchContact,
     Placed,
     check_once,
+    check_options,
     memory,
     parameters_in,
     place_of_parameters,
@@ -31,12 +31,9 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LIGHTEST
 from planarfriction.jax import DistributedModel, ReducedModelPublished
 from planarfriction.jax.base import FrictionPytree
+from planarfriction.jax.namespace import xp
+from planarfriction.tensors.pressure import twist_at, wrench_from
 from planarfriction.tensors.steps import LAW
-
-INTEGRATORS = {
-    int(mujoco.mjtIntegrator.mjINT_EULER): "Euler",
-    int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST): "implicitfast",
-}
 
 PASSES = 4
 """Number of new solutions of a step because it has activated other constraints."""
@@ -109,7 +106,10 @@ class Friction:
     def __init__(self, m: Any, patches: Sequence[PatchContact]) -> None:
         check_once(patches)
         placed = [Placed(m, patch) for patch in patches]
-        _check(m, placed)
+        cone = ": MJX supports contacts without friction only with these"
+        check_options(m, "Euler", "implicitfast", cone=cone, sleeps=True)
+        for each in placed:
+            each.check(m)
         known = list({id(patch.model): patch.model for patch in patches}.values())
         self.models: tuple[FrictionPytree, ...] = tuple(map(_in_jax, known))
         at = memory(patches, m.nv, m.nuserdata)
@@ -226,7 +226,7 @@ class Friction:
         where = responses.geometry(m, d, self._fixed.places, held, before)
         states = [where.carry(p, each) for p, each in enumerate(begun)]
         guess = jnp.stack([where.carry(p, each) for p, each in enumerate(guess.reshape(-1, 3))])
-        guess = responses.back(guess, own.displaced).ravel()
+        guess = wrench_from(xp, guess, own.displaced).ravel()
         guess = jnp.where(jnp.repeat(where.touching, 3), guess, 0.0)
         found = self._search(*jax.lax.stop_gradient((own, m, d, where, states, guess)))
         answer = responses.answer(m, d, where, found.active)
@@ -240,7 +240,7 @@ class Friction:
         kept = {"state": begun, "new": new, "guess": guess, "load": load, "held": held, "centre": where.moved(shift)}
         kept |= {"before": before, "axis": where.axes[:, 0]}
         shift = shift + own.displaced
-        kept |= {"wrench": responses.back(wrench.reshape(-1, 3), -shift), "twist": responses.about(twist, shift)}
+        kept |= {"wrench": wrench_from(xp, wrench.reshape(-1, 3), -shift), "twist": twist_at(xp, twist, shift)}
         kept |= {"time": given.time, "next": d.time, "iterations": found.iterations, "passes": found.passes}
         kept |= {
             "residual": found.residual,
@@ -330,7 +330,7 @@ class Friction:
     def _evaluate(self, own: _Own, pressed, shift, states, twist, load, dt) -> tuple[list[jax.Array], jax.Array]:
         """Return the new states and wrenches of steps; patches of the same model side by side."""
         shift, resize = shift + own.displaced, jnp.ones((len(states), 3)).at[:, 2].set(own.scale)
-        twist = resize * responses.about(twist, shift)
+        twist = resize * twist_at(xp, twist, shift)
         new, wrenches = [jnp.empty(0)] * len(states), [jnp.empty(0)] * len(states)
         for (_, _, at), model, followed in zip(self._groups(), own.models, pressed, strict=True):
             index = np.array(at)
@@ -338,7 +338,7 @@ class Friction:
             after, wrench = model.step(*given) if followed is None else model.step_pressed(followed, *given)
             for i, p in enumerate(at):
                 new[p], wrenches[p] = after[i], wrench[i]
-        return new, responses.back(resize * jnp.stack(wrenches), shift)
+        return new, wrench_from(xp, resize * jnp.stack(wrenches), shift)
 
     def _integrated(self, m, d, jacobian, wrench, answer: responses.WrenchResponse) -> Any:
         """Return the data after the step, with the forces of the user as they were."""
@@ -363,21 +363,6 @@ def _moved(m: Any, d: Any) -> Any:
     d = mjx.sensor_pos(m, mjx.fwd_position(m, d))
     d = mjx.sensor_vel(m, mjx.fwd_velocity(m, d))
     return mjx.fwd_acceleration(m, mjx.fwd_actuation(m, d))
-
-
-def _check(m: Any, placed: Sequence[Placed]) -> None:
-    if m.opt.integrator not in INTEGRATORS:
-        rule = f"be {', '.join(INTEGRATORS.values())}"
-        name = mujoco.mjtIntegrator(m.opt.integrator).name.removeprefix("mjINT_")
-        raise InvalidValueError("integrator", rule, name)
-    if m.opt.cone != mujoco.mjtCone.mjCONE_PYRAMIDAL:
-        rule = "be pyramidal: MJX supports contacts without friction only with these"
-        raise InvalidValueError("cone", rule, mujoco.mjtCone(m.opt.cone).name.removeprefix("mjCONE_").lower())
-    if m.opt.noslip_iterations > 0:
-        rule = "be 0: they would change the solution"
-        raise InvalidValueError("noslip_iterations", rule, m.opt.noslip_iterations)
-    for each in placed:
-        each.check(m)
 
 
 def _in_jax(model: models.FrictionModel) -> FrictionPytree:

@@ -19,7 +19,7 @@ from mujoco import mjx
 
 from planarfriction.adapters.mjx.newton import HostResponse
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
-from planarfriction.adapters.mujoco.patches import Placed
+from planarfriction.adapters.mujoco.patches import Placed, surface_velocities
 from planarfriction.jax.namespace import xp
 from planarfriction.kernels.coupling_rows import ALONG, FLAT
 from planarfriction.tensors.pressure import centre_of
@@ -144,9 +144,8 @@ class PatchPlaces(NamedTuple):
 
 def places(m: Any, placed: Sequence[Placed], radius: np.ndarray) -> PatchPlaces:
     """Return the places of patches found in a model."""
-    numbers = [(p.site, p.own, p.other, p.bodies[1], p.bodies[0], p.at_contact) for p in placed]
-    surface = getattr(m, "geom_surfacevel", np.zeros((m.ngeom, 6)))[[(p.own, p.other) for p in placed]]
-    return PatchPlaces(*map(np.array, zip(*numbers, strict=True)), radius=radius, surface=surface)
+    columns = (np.array([getattr(each, name) for each in placed]) for name in PatchPlaces._fields[:6])
+    return PatchPlaces(*columns, radius=radius, surface=surface_velocities(m, placed))
 
 
 class Geometry(NamedTuple):
@@ -184,18 +183,6 @@ class Geometry(NamedTuple):
         """Return origins `[k, 3]` that move by `[k, 2]` [m] in the patches, in the frames of the sites."""
         held = self.origin + jnp.einsum("pi,pij->pj", shift, self.axes[:, :2])
         return jnp.where((self.share > 0.0)[:, None], held, 0.0)
-
-
-def about(twist: jax.Array, shift: jax.Array) -> jax.Array:
-    """Return twists `[k, 3]` at origins that move by `[k, 2]` [m]."""
-    vx, vy, spin = twist.T
-    return jnp.stack([vx - spin * shift[:, 1], vy + spin * shift[:, 0], spin], axis=1)
-
-
-def back(wrench: jax.Array, shift: jax.Array) -> jax.Array:
-    """Return wrenches `[k, 3]` about the origin from those about origins that have moved by `[k, 2]` [m]."""
-    fx, fy, torque = wrench.T
-    return jnp.stack([fx, fy, torque + shift[:, 0] * fy - shift[:, 1] * fx], axis=1)
 
 
 def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Array) -> Geometry:

@@ -25,6 +25,7 @@ from planarfriction.adapters.mujoco.patches import (
     PatchContact,
     Placed,
     check_once,
+    check_options,
     memory,
     parameters_in,
     place_of_parameters,
@@ -37,12 +38,6 @@ from planarfriction.environments import check
 from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.kernels import coupling as kernels
 from planarfriction.laws.base import is_rate_law
-
-INTEGRATORS = {
-    int(mujoco.mjtIntegrator.mjINT_EULER): "Euler",
-    int(mujoco.mjtIntegrator.mjINT_IMPLICIT): "implicit",
-    int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST): "implicitfast",
-}
 
 
 class Report(NamedTuple):
@@ -86,16 +81,7 @@ class Friction:
 
     def _check(self, m: Any) -> None:
         """Refuse options and parameters of a model that do not fit."""
-        options = m.opt
-        if options.integrator not in INTEGRATORS:
-            rule = f"be {', '.join(INTEGRATORS.values())}"
-            raise InvalidValueError("integrator", rule, mujoco.mjtIntegrator(options.integrator).name[6:])
-        if options.noslip_iterations > 0:
-            rule = "be 0: they would change the solution"
-            raise InvalidValueError("noslip_iterations", rule, options.noslip_iterations)
-        sleep = getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0)
-        if options.enableflags & int(sleep):
-            raise InvalidValueError("sleep", "be disabled: sleeping bodies do not react to wrenches", "enabled")
+        check_options(m, "Euler", "implicit", "implicitfast")
         for placed in self.placed:
             placed.check(m)
         check(self.parameters(m))
@@ -269,31 +255,15 @@ class Friction:
 
     def _host_row(self) -> np.ndarray:
         packed, k = self.coupled._packed, len(self.patches)
-        problem, scratch = (
-            self.coupled._blank_problem([each.follows for each in self.placed]),
-            scratch_layout(packed.words, int(packed.sizes.sum()), k, self.m.nv),
-        )
-        chosen = [
-            (
-                each.site,
-                each.own,
-                each.other,
-                *reversed(each.bodies),
-                each.pair,
-                each.at_contact,
-                each.has_faces,
-                each.on_box,
-            )
-            for each in self.placed
-        ]
-        columns = np.ascontiguousarray(np.array(chosen, np.int64).T)
-        names = ("sites", "own", "other", "own_bodies", "other_bodies", "pairs", "at_contact", "faces", "boxes")
+        problem = self.coupled._blank_problem([each.follows for each in self.placed])
+        scratch = scratch_layout(packed.words, int(packed.sizes.sum()), k, self.m.nv)
+        columns = np.array([[getattr(each, name) for each in self.placed] for name in _COLUMNS], np.int64)
         joints = np.flatnonzero(self.m.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE))
         free = np.array([joints, self.m.jnt_dofadr[joints]], np.int64)
         extents = np.array([each.extent() for each in self.placed])
         laws = np.array([not is_rate_law(patch.model.law) for patch in self.patches], np.int64)
         self._kept = problem, columns, free, packed, extents, laws
-        places = dict(zip(names, (place_of(columns) + 8 * k * np.arange(len(names))).tolist(), strict=True))
+        places = {name: place_of(columns) + 8 * k * i for i, name in enumerate(_COLUMNS.values())}
         host = Host(
             m=self.m._address, same_count=len(same()), same=place_of(same()),
             nv=self.m.nv, nuserdata=self.m.nuserdata, count=k, states=self.coupled.state_shape[0], words=packed.words,
@@ -305,6 +275,12 @@ class Friction:
         )  # fmt: skip
         return row_of(host)
 
+
+_COLUMNS = {
+    "site": "sites", "own": "own", "other": "other", "owner": "own_bodies", "support": "other_bodies",
+    "pair": "pairs", "at_contact": "at_contact", "has_faces": "faces", "on_box": "boxes",
+}  # fmt: skip
+"""Attributes of `Placed` that compiled steps read, with the names of their addresses in `Host`."""
 
 _ALONE = "mj_step has none by itself; call friction.step(d) instead, or mj_step within friction.install()"
 

@@ -215,6 +215,21 @@ def check_once(patches: Sequence[PatchContact]) -> None:
             raise InvalidValueError("patches", "have each pair of geoms once", ", ".join(sorted(pair)))
 
 
+def check_options(m: Any, *integrators: str, cone: str = "", sleeps: bool = False) -> None:
+    """Refuse options of a model that do not fit; `cone` is the reason why contacts have to have pyramidal ones."""
+    options = m.opt
+    integrator = mujoco.mjtIntegrator(options.integrator).name.removeprefix("mjINT_")
+    if integrator.lower() not in map(str.lower, integrators):
+        raise InvalidValueError("integrator", f"be {', '.join(integrators)}", integrator)
+    if cone and options.cone != mujoco.mjtCone.mjCONE_PYRAMIDAL:
+        name = mujoco.mjtCone(options.cone).name.removeprefix("mjCONE_").lower()
+        raise InvalidValueError("cone", f"be pyramidal{cone}", name)
+    if options.noslip_iterations > 0:
+        raise InvalidValueError("noslip_iterations", "be 0: they would change the solution", options.noslip_iterations)
+    if not sleeps and options.enableflags & int(getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0)):
+        raise InvalidValueError("sleep", "be disabled: sleeping bodies do not react to wrenches", "enabled")
+
+
 class Placed:
     """A patch found in a compiled model.
 
@@ -229,7 +244,7 @@ class Placed:
             raise InvalidValueError("site", f"be on the body of one of the geoms {patch.geoms}", patch.site)
         own = int(bodies[1] == owner)
         self.own, self.other = int(self.geoms[own]), int(self.geoms[1 - own])
-        self.bodies = int(bodies[1 - own]), int(owner)
+        self.owner, self.support = int(owner), int(bodies[1 - own])
         kinds = set(m.geom_type[self.geoms].tolist())
         faces = kinds == {_BOX} or (_PLANE in kinds and not _ROUND.intersection(kinds))
         free = faces and patch.model.law.reference_load is None
@@ -314,6 +329,12 @@ class Placed:
         mujoco.mju_rotVecQuat(axis, np.array([0.0, 0.0, 1.0]), m.geom_quat[self.own])
         along, (radius, half, _) = axis @ away, m.geom_size[self.own]
         return bool(abs(along) / half < math.sqrt(max(away @ away - along**2, 0.0)) / radius)
+
+
+def surface_velocities(m: Any, placed: Sequence[Placed]) -> np.ndarray:
+    """Return the velocities of the surfaces of both geoms of patches in their frames (`surfacevel`), `[k, 2, 6]`."""
+    surface = getattr(m, "geom_surfacevel", np.zeros((m.ngeom, 6)))
+    return surface[[(each.own, each.other) for each in placed]]
 
 
 def _named(m: Any, what: str, name: str, kind: Any) -> int:

@@ -19,20 +19,17 @@ from planarfriction.adapters.mujoco.patches import (
     PatchContact,
     Placed,
     check_once,
+    check_options,
     memory,
     parameters_in,
     place_of_parameters,
     room_of,
+    surface_velocities,
 )
 from planarfriction.adapters.mujoco_warp.loops import geometry, responses
 from planarfriction.coupling import HostStep, lever_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.warp import CoupledPatches
-
-INTEGRATORS = {
-    int(mujoco.mjtIntegrator.mjINT_EULER): "Euler",
-    int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST): "implicitfast",
-}
 
 DISPLACEMENT = "centre_x", "centre_y"
 """Parameters of a displacement (see `pf.randomise`)."""
@@ -253,26 +250,17 @@ class Friction:
 
     def _numbers(self) -> Any:
         """Return the numbers of the patches for kernels."""
-        names = "site", "own", "other", "owner", "support", "at_contact", "bristles", "first"
-        rows = [(p.site, p.own, p.other, p.bodies[1], p.bodies[0], int(p.at_contact)) for p in self.placed]
-        device, levers = self.coupled.device, [lever_of(each.model) for each in self.patches]
-        shapes = [each.model.state_shape for each in self.patches]
-        firsts = np.cumsum([0, *map(math.prod, shapes)]).tolist()
-        rows = [(*row, math.prod(shape[1:]), first) for row, shape, first in zip(rows, shapes, firsts, strict=False)]
-        columns = zip(names, zip(*rows, strict=True), strict=True)
-        found = {name: wp.array(each, dtype=int, device=device) for name, each in columns}
-        surface = getattr(self.m, "geom_surfacevel", np.zeros((self.m.ngeom, 6)))
-        surface = surface[[(each.own, each.other) for each in self.placed]].astype(np.float32)
+        device, shapes = self.coupled.device, [each.model.state_shape for each in self.patches]
+        names = "site", "own", "other", "owner", "support", "at_contact"
+        columns = {name: [int(getattr(each, name)) for each in self.placed] for name in names}
+        columns |= {"bristles": [math.prod(shape[1:]) for shape in shapes]}
+        columns |= {"first": np.cumsum([0, *map(math.prod, shapes)])[:-1].tolist()}
+        found = {name: wp.array(each, dtype=int, device=device) for name, each in columns.items()}
+        surface = surface_velocities(self.m, self.placed).astype(np.float32)
         found["surface"] = wp.array(surface, dtype=wp.spatial_vector, device=device)
-        return _filled(
-            geometry.Patches(),
-            {
-                **found,
-                "count": len(self.patches),
-                "states": self.coupled.state_shape[0],
-                "radius": wp.array(levers, dtype=float, device=device),
-            },
-        )
+        found["radius"] = wp.array([lever_of(each.model) for each in self.patches], dtype=float, device=device)
+        sizes = {"count": len(self.patches), "states": self.coupled.state_shape[0]}
+        return _filled(geometry.Patches(), found | sizes)
 
     def _bound(self, m: Any, d: Any) -> dict[str, Any]:
         """Return the arrays of model and data in the structs of kernels."""
@@ -323,16 +311,7 @@ def _filled(struct: Any, values: Mapping[str, Any]) -> Any:
 
 def _check(m: Any, placed: Sequence[Placed]) -> None:
     """Refuse options of a model that do not fit."""
-    if m.opt.integrator not in INTEGRATORS:
-        name = mujoco.mjtIntegrator(m.opt.integrator).name.removeprefix("mjINT_")
-        raise InvalidValueError("integrator", f"be {', '.join(INTEGRATORS.values())}", name)
-    if m.opt.cone != mujoco.mjtCone.mjCONE_PYRAMIDAL:
-        name = mujoco.mjtCone(m.opt.cone).name.removeprefix("mjCONE_").lower()
-        raise InvalidValueError("cone", "be pyramidal, where constraints are linear in their ranges", name)
-    if m.opt.noslip_iterations > 0:
-        raise InvalidValueError("noslip_iterations", "be 0: they would change the solution", m.opt.noslip_iterations)
-    if m.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP):
-        raise InvalidValueError("sleep", "be disabled: sleeping bodies do not react to wrenches", "enabled")
+    check_options(m, "Euler", "implicitfast", cone=", where constraints are linear in their ranges")
     if m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_ACTUATION):
         raise InvalidValueError(
             "actuation", "be enabled: MuJoCo Warp calls control callbacks with it alone", "disabled"

@@ -1,4 +1,4 @@
-"""Twists of wrenches for sums over cells: the least dissipation, whose minimum often lies on a kink.
+"""Sums over cells, and their twists of wrenches: the least dissipation, whose minimum often lies on a kink.
 
 A cell sees `u = C V` of a scaled twist: in the plane `target . V = 1` `u = c + a d + b e` at the place `(a, b)`. Cells
 that are discs have a third row in C, and no kink.
@@ -13,7 +13,7 @@ import numpy as np
 from planarfriction.compiler import jit, kernel
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.discs import sliding
-from planarfriction.kernels.vectors import dot, plus, times
+from planarfriction.kernels.vectors import dot, norm, plus, times
 from planarfriction.limit_surface.loops.twists import lean_of, newton_move, of_each, plane
 
 _BALANCED = 1e-13
@@ -37,19 +37,47 @@ _RESTS = 1e-6
 _FULL = 1.0 + 1e-6
 """Most of its friction that a resting cell may bear [-], with what rounding off a kink leaves of it."""
 
+_AT_REST = 1e-14
+"""Speed, relative to the scaled twist, below which a cell stands in the centre of rotation and adds nothing [-]."""
+
 _MOST_STEPS = 60
 """Newton steps for each rounding; a handful are usual."""
 
 
 @kernel
 def _pull(u):
-    """Return the friction `W/S` of a disc."""
+    """Return the friction `W/S` of a disc; without a spin that of a point, `u/|u|`."""
     _, _, speed, pull = sliding(u)
     return times(1.0 / speed, pull)
 
 
 _PULL = derive(_pull, ("u",), ("u",))
 _FORTH, _BACK = _PULL.forth, _PULL.back
+
+
+@kernel
+def _seen_along(levers, spins, i, axis):
+    """Return what cell i sees of a unit of one component of the scaled twist."""
+    return levers[0, axis, i], levers[1, axis, i], spins[i] if axis == 2 else 0.0
+
+
+@jit
+def cell_sums(levers, spins, weights, units, h, slopes):
+    """Write h `[M, 3]` and `dh/dV_S` `[M, 3, 3]` at unit scaled twists `[M, 3]`; cells are those of `cell_twists`."""
+    h[:], slopes[:] = 0.0, 0.0
+    for m in range(units.shape[0]):
+        for i in range(weights.shape[0]):
+            by_x, by_y = _seen_along(levers, spins, i, 0), _seen_along(levers, spins, i, 1)
+            along = by_x, by_y, _seen_along(levers, spins, i, 2)
+            u = plus(plus(times(units[m, 0], by_x), units[m, 1], by_y), units[m, 2], along[2])
+            if norm(u) <= _AT_REST:
+                continue
+            (pull,), tape = _FORTH(u)
+            for j in range(3):
+                h[m, j] += weights[i] * dot(pull, along[j])
+                (bend,) = _BACK(tape, (along[j],))
+                for k in range(3):
+                    slopes[m, j, k] += weights[i] * dot(bend, along[k])
 
 
 @kernel
