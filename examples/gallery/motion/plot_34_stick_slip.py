@@ -2,8 +2,9 @@
 Classics: stick-slip of a mass on a spring
 ==========================================
 
-A mass is pulled over a table by a spring whose end moves at a constant speed. It sticks until the spring overcomes static
-friction, slips, and is caught again: the classic of every lecture on friction, with the parameters of the LuGre paper.
+A mass is pulled over a table by a spring whose end moves at a constant speed. It sticks until the spring overcomes
+static friction, slips, and is caught again: the classic of every lecture on friction, with the numbers of the LuGre
+paper.
 """
 
 import matplotlib.pyplot as plt
@@ -26,6 +27,7 @@ force.set(xlabel="time [s]", ylabel="friction [N]")
 
 # %%
 # `planarfriction reproduce --only classics` has the paper's other experiments: presliding, break-away, friction lag.
-# The mass has moved 2.5451 m after 30 s, as an integration of the one-dimensional equations without this library has it.
+# The mass has moved 2.5451 m after 30 s, as an integration of the equations in one dimension without this library
+# has it.
 print(f"{float(data.x[-1]):.6f} m")
 assert abs(float(data.x[-1]) - 2.5451019) < 1e-6

@@ -1,6 +1,7 @@
 """The experiments of the source paper, each with its data, its figures and its numbers beside the published ones.
 
-Two more go beyond it and have our own converged references: `classics`, the experiments of the LuGre paper, and `beyond`.
+Two more go beyond it, with converged references of their own: `classics`, the experiments of the LuGre paper, and
+`beyond`.
 
 `EXPERIMENTS` lists them by name; each lives in a folder of its own, whose module `run` has a function
 `run(work) -> Result`, and whose `findings.md.j2` holds what is said about it.
