@@ -11,6 +11,7 @@ from planarfriction.errors import SolverError
 from planarfriction.sliding_body import BodyStep
 
 DISC = pf.ContactPatch.disc(radius=0.01)
+GRAINED = pf.ContactPatch.rectangle(0.02, 0.01, cells=7).with_friction_metric([[1.0, 0.2], [0.2, 1.5]])
 MASS, INERTIA, PUSH = 0.2, 1e-5, 1.5
 
 
@@ -43,7 +44,7 @@ def test_a_pushed_block_stays_at_any_time_step(sigma_0, loads):
 
 def four_feet(angles=0.0):
     feet = [(0.05, 0.03), (0.05, -0.03), (-0.05, 0.03), (-0.05, -0.03)]
-    models = [model_of(), model_of(1e4), pf.DistributedModel(DISC, pf.LuGre()), model_of()]
+    models = [model_of(), model_of(1e4), pf.DistributedModel(GRAINED, pf.LuGre()), model_of()]
     return pf.SlidingBody(MASS, 2e-4, models, feet, angles)
 
 
