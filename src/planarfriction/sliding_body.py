@@ -107,7 +107,7 @@ class SlidingBody(ByValue):
                 raise InvalidValueError(name, "have shape [..., 3]", f"shape {list(value.shape)}")
         load = self._loads(normal_force)
         validation.broadcast(twist=twist[..., 0], wrench=wrench[..., 0], dt=dt, angle=angle, normal_force=load[..., 0])
-        to_patches = geometry.rotate(self._to_patches, angle[..., None])
+        to_patches = geometry.rotate(self._to_patches, angle[..., None]) if angle.any() else self._to_patches
         response = dt[..., None] * self._per_mass
         pushed = twist + response * wrench
         free = np.einsum("...ij,...j->...i", to_patches, pushed)
