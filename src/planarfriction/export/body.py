@@ -32,8 +32,9 @@ def body_of(model: Any, precision: str) -> dict[str, Any]:
         count=Fixed(1), steps=_STEP, slopes=_SLOPES, radius=Array("lever_arm", (1,), fixed=True)
     )
     writer, p = Writer(), Record("p", record)
-    replaced = {coupling._step: lambda given: _FUNCTIONS[given[2]], coupling._load_slopes: lambda _: ""}
-    loops = Loops(writer, {record: "search_t"}, replaced)
+    loops = Loops(writer, {record: "search_t"})
+    loops.replaced[coupling._step] = lambda given: _FUNCTIONS[given[2]]
+    loops.replaced[coupling._load_slopes] = lambda _: "(void)"  # the load is given
     loops.add(coupling.prepare, (own, p))
     loops.add(coupling.search, (own, p, Scalar("tolerance"), Fixed(ITERATIONS)))
     functions = re.sub(r"\breal\b", "double", "\n\n".join(loops.functions))

@@ -50,16 +50,12 @@ _LARGER = {min: "<", builtins.max: ">", compiled_math.minimum: "<", compiled_mat
 
 
 class Loops:
-    """Source of C functions, each in front of those that call it.
+    """Source of C functions, each in front of those that call it."""
 
-    `replaced` gives kernels the name of a C function, from their arguments, that takes the record among these alone;
-    calls of one without a name are left out.
-    """
-
-    def __init__(
-        self, writer: Writer, structs: dict[np.dtype, str] | None = None, replaced: dict[Any, Any] | None = None
-    ) -> None:
-        self.writer, self.structs, self.replaced = writer, structs or {}, replaced or {}
+    def __init__(self, writer: Writer, structs: dict[np.dtype, str] | None = None) -> None:
+        self.writer, self.structs = writer, structs or {}
+        self.replaced: dict[Any, Callable[[Any], str]] = {}
+        """Names of C functions, from their arguments, that take the record among these in place of a kernel."""
         self.functions: list[str] = []
         self._made: dict[Any, tuple[str, list[bool], Any]] = {}
 
@@ -212,10 +208,8 @@ class _Translated(_Function):
         first, last = limits[:2] if len(limits) > 1 else ("0", limits[0])
         index = "rounds" if node.target.id == "_" else node.target.id
         self._declare(index, Scalar(index, "int"))
-        down = len(limits) > 2
-        self._line(
-            f"for ({index} = {first}; {index} {'>' if down else '<'} {last}; {'--' if down else '++'}{index}) {{"
-        )
+        until, on = (">", "--") if len(limits) > 2 else ("<", "++")
+        self._line(f"for ({index} = {first}; {index} {until} {last}; {on}{index}) {{")
         self._block(node.body)
         self._line("}")
 
@@ -394,8 +388,6 @@ class _Translated(_Function):
             self.locals[f"{name}[{given[0]}]"] = "real"
             return Array(name, (plain(given[0]),))
         name, taken, result = self.loops.add(function, given)
-        if not name:
-            return None
         texts = [self._of(each) for each, wanted in zip(leaves(given), taken, strict=True) if wanted]
         if isinstance(result, Scalar):
             return Scalar(f"{name}({', '.join(texts)})", result.kind)
