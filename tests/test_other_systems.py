@@ -6,15 +6,12 @@ import math
 import os
 import subprocess
 import sys
-from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 from planarfriction import writing
 from planarfriction.compiler.threads import processors
 from planarfriction.errors import FileError
-from planarfriction.sweeps import zarr_store
 from planarfriction_studies.bench import workflows
 
 POSIX = ("fcntl", "grp", "pty", "pwd", "resource", "termios")
@@ -44,50 +41,6 @@ def test_a_file_that_is_open_elsewhere_is_tried_again(write, tmp_path, monkeypat
     with pytest.raises(FileError, match=r"run\.json: cannot be written: Access is denied"):
         write(path, "newer")
     assert path.read_text() == "new" and os.listdir(tmp_path) == ["run.json"]
-
-
-def test_an_empty_folder_is_replaced_where_renaming_does_not(tmp_path, monkeypatch):
-    rename = Path.rename
-
-    def refused(part, target):
-        if target.exists():
-            raise FileExistsError(17, "Cannot create a file when that file already exists")
-        return rename(part, target)
-
-    monkeypatch.setattr(Path, "rename", refused)
-    (tmp_path / "store").mkdir()
-    for name in ("first", "second"):
-        with writing.making_folder(tmp_path / "store") as part:
-            (part / name).touch()
-    assert [each.name for each in tmp_path.rglob("*")] == ["store", "first"]
-
-
-@pytest.fixture
-def windows_locks(monkeypatch) -> list[tuple[str, int]]:
-    """Locks of Windows instead of those of POSIX; returns the bytes that are locked."""
-    locked: list[tuple[str, int]] = []
-
-    def locking(file, mode, count):
-        byte = os.readlink(f"/proc/self/fd/{file}"), os.lseek(file, 0, os.SEEK_CUR)
-        if byte in locked:
-            raise PermissionError(13, "Permission denied")
-        locked.append(byte)
-
-    monkeypatch.setitem(sys.modules, "fcntl", None)
-    monkeypatch.setitem(sys.modules, "msvcrt", SimpleNamespace(locking=locking, LK_NBLCK=2))
-    return locked
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux for the name of an open file")
-def test_a_store_is_locked_with_the_locks_of_windows(windows_locks, tmp_path):
-    journals = [(tmp_path / "journal").open("a+b", buffering=0) for _ in range(2)]
-    journals[0].write(b"a line\n")
-    zarr_store._lock(journals[0], tmp_path)
-    assert journals[0].tell() == 7 and windows_locks[0][1] > 7  # what is written stays readable, and goes on there
-    with pytest.raises(FileError, match="another sweep is writing to it"):
-        zarr_store._lock(journals[1], tmp_path)
-    for journal in journals:
-        journal.close()
 
 
 def test_processors_without_affinity(monkeypatch):

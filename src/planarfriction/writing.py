@@ -6,7 +6,6 @@ Everything that the library writes is written here.
 from __future__ import annotations
 
 import contextlib
-import errno
 import io
 import os
 import secrets
@@ -107,29 +106,6 @@ def make_folder(path: str | Path) -> Path:
     except (OSError, ValueError) as error:
         raise FileError(f"cannot write to folder {path}: {_reason(error)}") from None
     return path
-
-
-@contextlib.contextmanager
-def making_folder(path: Path) -> Iterator[Path]:
-    """Yield a new folder that becomes `path` when the block ends, whole or not at all.
-
-    If another process has made `path` meanwhile, and it is not empty, that one stays.
-
-    Raises FileError in one line where the folder cannot be written.
-    """
-    part = _part(path)
-    with reporting(path):
-        part.mkdir()
-        try:
-            yield part
-            with contextlib.suppress(OSError):
-                path.rmdir()  # an empty one, which Windows does not replace
-            part.rename(path)
-        except OSError as error:
-            if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
-                raise
-        finally:
-            shutil.rmtree(part, ignore_errors=True)  # there is none after the renaming
 
 
 def _replace(target: Path, content: memoryview) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ import mujoco  # noqa: E402
 from planarfriction.adapters import mujoco as adapter  # noqa: E402
 from planarfriction.adapters.mjx import Friction, PatchContact, newton, prepare  # noqa: E402
 from planarfriction.adapters.mjx.friction import _in_jax  # noqa: E402
+from planarfriction.coupling import CoupledPatches  # noqa: E402
 from planarfriction_studies.bench import coulomb_disc  # noqa: E402
 from planarfriction_studies.bench.mujoco_scenes import STARTS, Native, disc, grip  # noqa: E402
 from tests.support.coupling_problems import random_bodies, random_patches, random_run  # noqa: E402
@@ -145,6 +147,20 @@ def test_environments_do_what_mujoco_does(discs):
     assert bool(ours.report(end).converged) and float(ours.report(end).passes) == 1.0
 
 
+def test_a_stiffness_that_ignores_the_load_does_what_it_does_in_mujoco():
+    law = pf.LuGre(mu_c=0.4, mu_s=0.5, sigma_0=1e5, elasto_plastic=0.9, reference_load=1.5)
+    scene = disc(0.05, 1.0)
+    m, d, patches = made(scene, pf.DistributedModel(pf.ContactPatch.disc(radius=0.05, cells=5), law))
+    d.qvel[:] = scene.start
+    friction, theirs = Friction(m, patches), adapter.Friction(m, patches)
+    end, path = rolled(friction, m, [d], 100)
+    for i in range(1, 101):
+        theirs.step(d)
+        np.testing.assert_allclose(path[i, 0], d.qpos, atol=100 * DT * 1e-9 + 1e-9)
+    np.testing.assert_allclose(friction.wrenches(end)[0], theirs.wrenches(d), atol=1e-6)
+    assert abs(friction.states(end)[0]).max() > 1e-7
+
+
 def test_data_go_from_one_into_the_other(discs):
     """The bristles are where both look for them."""
     friction, ours = adapter.Friction(discs.m, discs.patches), discs.friction
@@ -248,6 +264,7 @@ def test_a_grip_beside_the_centre_of_mass_holds_as_in_mujoco():
 def in_operations(patches):
     """`CoupledPatches.step` in operations of JAX, for a batch of problems."""
     models = [_in_jax(model) for model in patches.models]
+    by_load = any(model.reference_load is not None for model in models)
     radius = jnp.array([np.sqrt((model.patch.positions**2).sum(1).mean()) for model in patches.models])
 
     @jax.jit
@@ -255,11 +272,12 @@ def in_operations(patches):
     def solve(states, twist, load, response, load_response, guess, dt):
         host = newton.HostResponse(twist - response @ guess, load - load_response @ guess, response, load_response)
 
-        def unit(twists):
-            each = zip(models, states, twists, strict=True)
-            return jnp.stack([model.step(z, v, 1.0, dt)[1] for model, z, v in each])
+        def unit(twists, loads):
+            loads = jnp.maximum(loads, 1e-12) if by_load else jnp.ones_like(loads)
+            each = zip(models, states, twists, loads, strict=True)
+            return jnp.stack([model.step(z, v, load, dt)[1] / load for model, z, v, load in each])
 
-        found = newton.solve(unit, host, guess, radius, 1e-9, 50)
+        found = newton.solve(newton.Unit(unit, by_load), host, guess, radius, 1e-9, 50)
         return found, host.twists(found.wrench), host.loads(found.wrench)
 
     def step(state, host, dt):
@@ -272,9 +290,12 @@ def in_operations(patches):
     return step
 
 
-def compare_with_compiled(seed: int, kinds, steps: int, bodies: int) -> None:
+def compare_with_compiled(seed: int, kinds, steps: int, bodies: int, reference_load: float | None = None) -> None:
     generator = np.random.default_rng(seed)
     patches = random_patches(generator, 2, kinds)
+    if reference_load is not None:
+        laws = [dataclasses.replace(model.law, reference_load=reference_load) for model in patches.models]
+        patches = CoupledPatches([model.with_law(law) for model, law in zip(patches.models, laws, strict=True)])
     radius = np.array([np.sqrt((model.patch.positions**2).sum(1).mean()) for model in patches.models])
     lever = np.stack([np.ones(2), np.ones(2), radius], 1)
     step, both, rounds = in_operations(patches), 0, 0
@@ -292,8 +313,9 @@ def compare_with_compiled(seed: int, kinds, steps: int, bodies: int) -> None:
     assert rounds / both < 0.2
 
 
-def test_the_step_in_contact_space_is_the_compiled_one():
-    compare_with_compiled(1, (pf.DistributedModel,), 40, 64)
+@pytest.mark.parametrize("reference_load", [None, 1.5])
+def test_the_step_in_contact_space_is_the_compiled_one(reference_load):
+    compare_with_compiled(1, (pf.DistributedModel,), 40, 64, reference_load)
 
 
 @pytest.mark.slow
@@ -302,9 +324,11 @@ def test_the_step_in_contact_space_is_the_compiled_one_for_all_models(kind):
     compare_with_compiled(3, (kind,), 100, 64)
 
 
-def test_derivatives_of_the_step_in_contact_space_are_differences():
+@pytest.mark.parametrize("reference_load", [None, 1.5])
+def test_derivatives_of_the_step_in_contact_space_are_differences(reference_load):
     """A patch slides and spins under a changing load: derivatives to the host's numbers and to friction."""
-    model = _in_jax(pf.DistributedModel(pf.ContactPatch.disc(radius=0.01, cells=5), pf.LuGre(mu_s=1.2)))
+    law = pf.LuGre(mu_s=1.2, reference_load=reference_load)
+    model = _in_jax(pf.DistributedModel(pf.ContactPatch.disc(radius=0.01, cells=5), law))
     response = 0.01 * np.array([[1.0, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1e4]])
     load_response = np.array([[0.2, -0.1, 3.0]])
 
@@ -312,10 +336,10 @@ def test_derivatives_of_the_step_in_contact_space_are_differences():
         twist, load, mu_c, share = numbers[:3], numbers[3:4], numbers[4], numbers[5]
         own = model.replace(parameters=model.parameters._replace(mu_c=mu_c))
 
-        def unit(twists):
-            return own.step(jnp.full((1, *own.rest().shape), 1e-7), twists, 1.0, 1e-3)[1]
+        def unit(twists, loads):
+            return own.step(jnp.full((1, *own.rest().shape), 1e-7), twists, loads, 1e-3)[1] / loads[:, None]
 
-        return unit, newton.HostResponse(twist, load, share * response, share * load_response)
+        return newton.Unit(unit, True), newton.HostResponse(twist, load, share * response, share * load_response)
 
     @jax.jit
     @jax.value_and_grad

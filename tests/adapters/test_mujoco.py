@@ -209,6 +209,7 @@ def test_other_models_are_left_alone_and_copies_are_not():
     assert np.hypot(*friction.wrenches(other)[:, :2].T).sum() > 1.0
 
 
+@pytest.mark.filterwarnings("ignore:the time of these data went on:UserWarning")
 def test_another_model_of_the_same_size_is_not_served():
     """It has the same joints and user data, and pads with other friction; a model prepared for the same is a copy."""
     scene = dataclasses.replace(mujoco_scenes.grip(), model=PAD)

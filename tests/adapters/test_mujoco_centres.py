@@ -80,9 +80,9 @@ def test_pads_with_jumping_points_do_not_creep(centre):
     path = scene.run(m, d, step)
     assert np.ptp(points[-500:], axis=0)[1:].max() > 5e-4
     moved = abs(path[-1] - path[len(path) // 2]) / (0.5 * scene.time)
-    # 0.001 um/s and 1e-5 degrees a second in the plane of the pads; along their normal MuJoCo rocks the block
+    # 0.001 um/s and 2e-5 degrees a second in the plane of the pads; along their normal MuJoCo rocks the block
     assert moved[1:3].max() < 1e-9
-    assert 2.0 * np.degrees(moved[4]) < 1e-5
+    assert 2.0 * np.degrees(moved[4]) < 2e-5
 
 
 FAULTS = {

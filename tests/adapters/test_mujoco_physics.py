@@ -36,6 +36,19 @@ def test_a_grip_beside_the_centre_of_mass_neither_creeps_nor_turns(pad, dt):
     assert abs(friction.wrenches(d)[:, 2]).sum() == pytest.approx(0.2 * 9.81 * 4e-3, rel=1e-3)
 
 
+@pytest.mark.parametrize(("reference", "low", "high"), [(3.0, 0.0, 1e-9), (None, 1e-7, 1e-6)])
+def test_a_grip_whose_load_swings_keeps_still_with_a_fixed_stiffness(reference, low, high):
+    """Beside the centre of mass, under 3 N +- 20 % at 2 Hz; the published law lets the part swing by 0.2 um."""
+    scene = mujoco_scenes.grip("box")
+    press = np.array(scene.control(0.0))
+    scene = dataclasses.replace(scene, control=lambda t: tuple(press * (1.0 + 0.2 * np.sin(4.0 * np.pi * t))), time=1.0)
+    model = scene.model.with_law(dataclasses.replace(scene.model.law, reference_load=reference))
+    m, d, friction = scene.ours(2e-3, model=model)
+    path = scene.run(m, d, lambda: step_checked(friction, d, 1e-8))
+    assert low < np.ptp(path[len(path) // 2 :, :3], axis=0).max() < high
+    assert np.hypot(*friction.wrenches(d)[:, :2].T).sum() == pytest.approx(0.2 * 9.81, rel=1e-5)
+
+
 def test_a_gripper_of_four_bar_linkages_holds():
     scene = linkage()
     m, d, friction = scene.ours()

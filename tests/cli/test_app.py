@@ -25,6 +25,7 @@ from planarfriction.cli.app import app
 from planarfriction.cli.options import find_patch
 from planarfriction.cli.run import build_scenes, largest_differences
 from planarfriction.errors import SimulationInterrupted, SolverError
+from planarfriction.families import SCENES
 from planarfriction.kernels import rosenbrock
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.plots import animation
@@ -476,6 +477,11 @@ def test_an_own_shape_without_parameters_keeps_the_names_of_patches(monkeypatch)
 
     SHAPES.register("thumb", lambda: pf.ContactPatch.disc(0.01))
     assert find_patch("disc", {}).name == "disc"
+
+
+@pytest.mark.parametrize("command", ["run", "sweep"])
+def test_the_help_names_every_ready_scene(command):
+    assert all(name in str(app.commands[command].help) for name in SCENES)
 
 
 # ---------------------------------------------------------------------- commands of other packages

@@ -1,4 +1,4 @@
-"""Docstrings: sentences that stand alone; for public names also units, shapes and the errors that they raise."""
+"""Docstrings of public names: units, shapes and the errors that they raise."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import inspect
 import re
 import textwrap
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
@@ -170,40 +169,3 @@ def test_help_says_what_each_argument_is(where):
 def test_the_tab_key_shows_public_names_alone(where):
     module = getattr(pf, where)
     assert dir(module) == sorted(module.__all__) and all(hasattr(module, name) for name in dir(module))
-
-
-ROOT = Path(__file__).parents[2]
-OPENINGS = re.compile(r"(What|Where|Whether|How|Which|Of|Who)\b")
-"""Openings of half sentences: a function's docstring begins with a verb, that of a record or constant with a noun."""
-
-
-def docstrings(code: str) -> Iterator[tuple[int, str]]:
-    """Yield the line and the text of each docstring: of modules, classes, functions, attributes and constants."""
-    for node in ast.walk(ast.parse(code)):
-        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)):
-            for each in node.body:
-                if isinstance(each, ast.Expr) and isinstance(each.value, ast.Constant):
-                    yield each.lineno, str(each.value.value).lstrip()
-
-
-@pytest.mark.parametrize("folder", ["src", "tests", "studies"])
-def test_docstrings_stand_alone(folder):
-    found = [
-        f"{file.relative_to(ROOT)}:{line}: {text.splitlines()[0]}"
-        for file in sorted((ROOT / folder).rglob("*.py"))
-        for line, text in docstrings(file.read_text(encoding="utf-8"))
-        if OPENINGS.match(text)
-    ]
-    assert not found, "\n".join(found)
-
-
-def test_docstrings_of_every_kind_are_found():
-    code = '''"""Of all."""
-X = 1
-"""Which."""
-class A:
-    """Who."""
-    def f(self):
-        """ What."""'''
-    assert [text for _, text in docstrings(code) if OPENINGS.match(text)] == ["Of all.", "Which.", "Who.", "What."]
-    assert not OPENINGS.match("Offset of each map.")

@@ -1,4 +1,4 @@
-"""Sizes that keep the code readable: lines of files and functions, characters of the names of tests."""
+"""Sizes that keep the code readable: lines of files and functions."""
 
 from __future__ import annotations
 
@@ -14,9 +14,6 @@ MAX_FILE = 400
 
 MAX_FUNCTION = 60
 """Lines of a function without its docstring."""
-
-MAX_TITLE = 69
-"""Characters of the name of a test."""
 
 TOO_LONG = {"tables.tables"}
 """Functions that are longer still: they shrink, and none is added."""
@@ -52,14 +49,3 @@ def test_lines_of_a_function_are_counted_without_its_docstring():
     code = 'def f(x):\n    """Return x.\n\n    Unchanged.\n    """\n    y = x\n    return y\n'
     assert lines(ast.parse(code).body[0]) == 3
     assert lines(ast.parse("def f(x):\n    return x").body[0]) == 2
-
-
-def test_names_of_tests_stay_short():
-    titles = [
-        name
-        for folder in ("tests", "studies/tests")
-        for _, function in functions(folder)
-        if (name := function.name).startswith("test_")
-    ]
-    assert len(titles) > 1000
-    assert [title for title in titles if len(title) > MAX_TITLE] == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -85,7 +86,15 @@ SOFT = {
     "soft cells, metric": distributed(TIP.with_friction_metric(METRIC), "wide"),
     "soft cells, few": Case(lambda: pf.ReducedModel(TIP, LAWS["wide"], cells=9)),
 }
-CASES = FIXED | SOFT
+REFERENCED = {name: dataclasses.replace(law, reference_load=LOAD) for name, law in LAWS.items()}
+STIFF = {
+    **{f"fixed stiffness, {law}": Case(lambda law=law: pf.DistributedModel(PATCH, REFERENCED[law])) for law in LAWS},
+    "fixed stiffness, metric": Case(lambda: pf.DistributedModel(DIRECTED["metric"], REFERENCED["wide"])),
+    "fixed stiffness, many": Case(lambda: pf.DistributedModel(MANY, REFERENCED["elasto-plastic"])),
+    "fixed stiffness, few": Case(lambda: pf.ReducedModel(MANY, REFERENCED["wide"], cells=20)),
+}
+"""Loads fall below those that hold what bristles carry."""
+CASES = FIXED | SOFT | STIFF
 
 every_case = pytest.mark.parametrize("name", CASES)
 

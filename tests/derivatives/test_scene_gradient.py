@@ -51,9 +51,14 @@ def changed(scene: pf.Scene, name: str, k: int, component: int, change: float) -
     return dataclasses.replace(scene, contacts=[own, scene.contacts[1]])
 
 
-@pytest.mark.parametrize("kind", ["distributed", "ellipsoid", "reduced"])
+@pytest.mark.parametrize(
+    "kind", ["distributed", "ellipsoid", "reduced", pytest.param("fixed reduced", marks=pytest.mark.slow)]
+)
 def test_derivatives_to_knots_and_start_are_differences(kind):
-    """Differences of order 4 of tight simulations; both sides are right to a few 1e-7 of the largest value."""
+    """Differences of order 4 of tight simulations; both sides are right to a few 1e-7 of the largest value.
+
+    Bristles of a fixed stiffness that a falling load brings back are stiffer: forces by a torque differ more.
+    """
     scene = pushed(kind)
     found = scene_sensitivities(scene, (), signals=SIGNALS, initial=list(START))
     numbers = [(name, 0, 0, h) for name, h in START.items()]
@@ -68,7 +73,7 @@ def test_derivatives_to_knots_and_start_are_differences(kind):
                 near, back, far, far_back = (data[variable].values for data in tight)
                 expected = (8.0 * (near - back) - (far - far_back)) / (12.0 * h)
                 error = np.abs(values[..., i] - expected).max() / np.abs(expected).max()
-                assert error <= 1e-5, (found.names[p], variable, error)
+                assert error <= (5e-5 if "fixed" in kind else 1e-5), (found.names[p], variable, error)
 
 
 def test_a_sliding_block_loses_speed_to_each_knot_of_its_load():
@@ -112,7 +117,7 @@ def agree(scene: pf.Scene, numbers: dict, of_motion: float, of_wrenches: float) 
             assert error < allowed, (name, slope is None, error)
 
 
-@pytest.mark.parametrize("kind", ["ellipsoid", "reduced", "distributed"])
+@pytest.mark.parametrize("kind", ["ellipsoid", "reduced", "fixed reduced", "distributed"])
 def test_the_reverse_is_the_product_with_the_derivatives_forwards(kind):
     """Two methods of order 4 with steps of their own; through a lost load, stops and a new slip.
 

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from tests.support.c_libraries import MODELS, STRICT, samples
+from tests.support.c_libraries import FIXED, MODELS, STRICT, samples
 
 ca = pytest.importorskip("casadi", reason="needs the extra [casadi]")
 pytestmark = [pytest.mark.casadi, pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")]
 
 
-@pytest.fixture(scope="module", params=["few", "table"])
+@pytest.fixture(scope="module", params=["few", "table", "fixed discs"])
 def loaded(request, tmp_path_factory):
     """Return a model, its function in CasADi, inputs and the model's parameters."""
-    model, folder = MODELS[request.param](), tmp_path_factory.mktemp("casadi")
+    model, folder = (MODELS | FIXED)[request.param](), tmp_path_factory.mktemp("casadi")
     pf.export_c(model, folder, casadi=True)
     command = ["gcc", *STRICT, "-O1", "-shared", "-fPIC", "friction.c", "friction_casadi.c", "-o", "friction.so", "-lm"]
     subprocess.run(command, cwd=folder, check=True)

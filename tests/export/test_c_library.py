@@ -11,7 +11,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.derivatives import parameter_names, parameters_of, rollout_vjp
-from tests.support.c_libraries import DISC, KINDS, LAW, MODELS, STRICT, VECTOR, library, run, run_steady, samples
+from tests.support.c_libraries import DISC, FIXED, KINDS, LAW, MODELS, STRICT, VECTOR, library, run, run_steady, samples
 from tests.support.rate_laws import BoucWen
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
@@ -37,7 +37,7 @@ def misfit(name, precision, count, seed=0):
 
 
 @pytest.mark.parametrize("precision", KINDS)
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*NAMES, *FIXED])
 def test_steps(name, precision):
     of_states, of_wrenches = misfit(name, precision, 3000)
     assert of_states < (1e-11 if precision == "double" else 1e-3)
@@ -100,7 +100,7 @@ def by_cell(name, derivative, shape):
     return derivative.reshape(shape)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*NAMES, *FIXED])
 def test_slopes(name):
     """Off the bound of slip, where derivatives are one-sided; to 1e-9 of the largest per load."""
     made = library(name)
@@ -115,7 +115,8 @@ def test_slopes(name):
         scale = per_load if field.startswith("wrench") and field != "wrench_load" else np.ones(len(per_load))
         scale = scale.reshape(-1, *[1] * (own.ndim - 1))
         wanted = by_cell(field, getattr(exact, field), own.shape) * scale
-        assert np.abs(own * scale - wanted).max() < 1e-9 * np.abs(wanted).max(), field
+        near = 1e-7 if name in FIXED and field == "wrench_load" else 1e-9  # Python's is a difference there
+        assert np.abs(own * scale - wanted).max() < near * np.abs(wanted).max(), field
 
 
 @pytest.mark.parametrize("name", NAMES)

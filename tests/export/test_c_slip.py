@@ -60,6 +60,22 @@ def test_bad_wrenches():
         code, found = call(hold, made.kind, load, mu, count=1)
         assert code == 2 and found == 7.0
     assert call(hold, made.kind, [0.0] * 3, 0.5, count=1) == (0, 0.0)
+    code, found = call(hold, made.kind, [1.0, 0.0, 0.0], 5e-324, count=1)  # beyond the largest number
+    assert code == 2 and found == 7.0
+
+
+@pytest.mark.parametrize("precision", ["double", "float"])
+def test_subnormal_wrenches(precision):
+    """One over the least number is none: they have the twists of their directions all the same, as in Python."""
+    made = library("few", precision)
+    least = np.finfo(made.kind).smallest_subnormal
+    surface = LimitSurfaceTable(made.model.patch)
+    for wrench in (np.array([1.0, 0.0, 0.0]), np.array([3.0, -4.0, 0.0])):
+        code, twist = call(made.functions.friction_twist, made.kind, (wrench * least).astype(made.kind), count=3)
+        assert code == 0
+        wanted = surface.twist(wrench)
+        np.testing.assert_allclose(twist, wanted, atol=(1e-9 if precision == "double" else 1e-3) * np.abs(wanted).max())
+        np.testing.assert_allclose(surface.twist(wrench * 5e-324), wanted, atol=1e-9 * np.abs(wanted).max())
 
 
 def test_a_point_has_no_limit_surface(tmp_path):

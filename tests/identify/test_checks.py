@@ -311,7 +311,7 @@ def test_separators_and_other_names(log, tmp_path, separator, point):
 @pytest.mark.parametrize(
     ("headings", "words"),
     [
-        ("t,vx,vy,omega,fx,fy,torque,normal_force", "has no column tau; found t, vx, vy, omega, fx, fy, torque, "),
+        ("t,vx,vy,omega,fx,fy,moment,normal_force", "has no column tau; found t, vx, vy, omega, fx, fy, moment, "),
         ("t,x,y,theta,fx,fy,tau", "has no column normal_force; found"),
         ("stamp,vx,vy,fx,fy,tau,fn", "has no column t, omega; found"),
         ("t,vx [mm/s],vy,omega,fx,fy,tau,fn", "column vx [mm/s] must be in SI units, got mm/s"),

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from planarfriction.identify.uncertainty import LONGEST, _over_time
+from planarfriction.identify.uncertainty import LONGEST, Uncertainty, _over_time
 
 
 def test_votes_at_lags_count_with_weights_that_fall_linearly():
@@ -20,3 +20,14 @@ def test_votes_at_lags_count_with_weights_that_fall_linearly():
         expected += (1.0 - lag / (lags + 1.0)) * (both + both.T)
     found = _over_time(fit, residual, slopes, np.zeros((1, 2)), 0.9, np.eye(2))
     assert found == pytest.approx(np.diag(expected), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("chi2", "strain", "held_out", "rejected"),
+    [(1.0, 2.9, 2.9, False), (1.6, 0.0, 1.0, True), (1.0, 3.1, 1.0, True), (1.0, 0.0, 25.0, True)],
+)
+def test_what_rejects_a_fit(chi2, strain, held_out, rejected):
+    """More than noise, a disturbance that no rig has, or parts that it misses where it did not see them."""
+    empty, strains = np.zeros((0, 0)), [(strain, "load_drift 0.2")]
+    tests = Uncertainty(empty, empty, empty, chi2, 1.5, strains, 0.0, np.full(5, held_out), np.zeros(0))
+    assert tests.rejected == rejected

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planarfriction import ContactPatch, DistributedModel, LuGre, formulas
-from planarfriction.kernels import disc_cells, disc_passes, discs, distributed_step
+from planarfriction.kernels import cell_passes, disc_cells, discs, points
 from planarfriction.kernels.cell_blocks import LANES
 from planarfriction.kernels.twins import twin
 
@@ -17,7 +17,7 @@ PLAIN = LuGre(mu_c=0.4, mu_s=0.6, v_s=1e-3, sigma_0=1e5, sigma_1=3e2, sigma_2=0.
 KAPPA = math.sqrt(0.5)
 SPEEDS = st.floats(-1.0, 1.0).map(lambda x: 0.05 * x)
 
-sliding, evaluate, step, point_step = map(twin, (discs.sliding, discs.evaluate, discs.step, distributed_step.cell))
+sliding, evaluate, step, point_step = map(twin, (discs.sliding, discs.evaluate, discs.step, points.step))
 
 
 def _mean_speed(q):
@@ -133,7 +133,7 @@ def test_passes_step_as_the_function_they_come_from(count):
 
 def test_passes_hand_little_on():
     """A pass that handed on everything would leave the nearest cache: 64 lanes of 12 rows are 6 kB."""
-    written = disc_passes.forward_passes(disc_cells.POSITIONS, 3)
+    written = cell_passes.forward_passes(cell_passes.KINDS[3, False, False])
     assert written.rows <= 24
-    assert written.source.count("def pass_") == disc_passes.FORWARD["count"]
+    assert written.source.count("def pass_") == cell_passes.DISC.forward.count
     assert LANES * written.rows * 8 <= 16384

@@ -10,8 +10,8 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.derive import NotStraightError, derive
-from planarfriction.kernels.distributed_step import cell
 from planarfriction.kernels.forward import forward, forwards
+from planarfriction.kernels.points import step as cell
 from planarfriction.kernels.vectors import dot, norm, plus, square, times
 
 LAW = LawNumbers(1e5, 300.0, 0.4, 0.5, 0.8, 1e-3, 1.7, 1.0, 0.3, 0.0)

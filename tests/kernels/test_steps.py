@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import bristle_step, distributed_step, leaning_cells, published_step
+from planarfriction.kernels import bristle_step, leaning_cells, points, published_step
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.published_contact import PublishedPatch
 from tests.support.referee import exact, misfit
@@ -22,7 +22,7 @@ GRIP = LAW.sigma_0 / 0.6
 """One over the largest deflection [1/m] at some speed."""
 
 BRISTLE = derive(bristle_step.step, ("z", "u", "v", "per_h", "q", "law.breakaway_ratio"), ("z", "u"))
-CELL = derive(distributed_step.cell, ("z", "u"), ("z", "u"))
+CELL = derive(points.step, ("z", "u"), ("z", "u"))
 LEANING = derive(leaning_cells.step, ("z", "u"), ("lean.a", "z", "u"))
 
 TURNS = 0.0, 1e-8, 1e-4, 0.5, 1.0, 0.5 * math.pi, 3.0, math.pi - 1e-8

@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planarfriction.derivatives import rollout, rollout_jvp, rollout_vjp
+from planarfriction.derivatives import RolloutTangent, parameters_of, rollout_jacobian, rollout_jvp, rollout_vjp
 from planarfriction.errors import InvalidValueError
-from planarfriction.export.pieces import pieces_of
 from planarfriction.laws import CoulombStribeck, Dahl, LuGre
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
@@ -161,7 +160,8 @@ def test_derivatives_are_those_of_differences(patch, kind, given, load):
     size = np.abs(rate).max()
     np.testing.assert_allclose(slopes.rate_load, rate, rtol=1e-5, atol=1e-6 * size)
     np.testing.assert_allclose(slopes.wrench_load, wrench, rtol=1e-5, atol=1e-8)
-    (of_step,) = _differences(lambda f: model.step(state, twist, f, 1e-3)[1:], 1e-6, load)
+    of_new, of_step = _differences(lambda f: model.step(state, twist, f, 1e-3), 1e-6, load)
+    np.testing.assert_allclose(step.state_load, of_new, rtol=1e-5, atol=1e-6 * np.abs(of_new).max())
     np.testing.assert_allclose(step.wrench_load, of_step, rtol=1e-5, atol=1e-7)
     by_state, by_twist = 1e-12 * rng.normal(size=state.shape), 1e-9 * np.array([1.0, -2.0, 50.0])
     for found, d_state, d_twist in (("state", by_state, 0.0 * by_twist), ("twist", 0.0 * by_state, by_twist)):
@@ -207,20 +207,21 @@ def test_a_single_bristle_follows_the_same_equations():
         fixed.rate(z, v)
 
 
-def test_rollouts_are_steps_and_their_derivatives_refuse():
-    model, twists, loads = (
-        DistributedModel(_DISC, LuGre(reference_load=REFERENCE)),
-        _twists(5),
-        np.linspace(0.5, 3.0, 40),
-    )
-    done, state = rollout(model, None, twists, loads, 1e-3), model.rest()
-    for t, (twist, load) in enumerate(zip(twists, loads, strict=True)):
-        state, pull = model.step(state, twist, load, 1e-3)
-        np.testing.assert_array_equal(done.wrenches[t], pull)
-    np.testing.assert_array_equal(done.state, state)
-    for refused, more in ((rollout_vjp, (np.ones((40, 3)),)), (rollout_jvp, ())):
-        with pytest.raises(InvalidValueError, match="law must have no reference_load for compiled roll-outs"):
-            refused(model, None, twists, loads, 1e-3, *more)
+@every_patch
+@every_law
+def test_at_the_reference_load_derivatives_of_rollouts_are_the_published(patch, kind, given):
+    fixed, published = (DistributedModel(patch, kind(**given, reference_load=f)) for f in (REFERENCE, None))
+    rng, twists = np.random.default_rng(6), _twists(5)
+    state, bars = 1e-7 * rng.normal(size=fixed.state_shape), rng.normal(size=(40, 3))
+    found, wanted = (rollout_vjp(model, state, twists, REFERENCE, 1e-3, bars) for model in (fixed, published))
+    assert found.normal_force != wanted.normal_force
+    for got, want in ((getattr(each, name) for each in (found, wanted)) for name in ("state", "twist", "parameters")):
+        np.testing.assert_array_equal(got, want)
+    slopes = (rollout_jacobian(model, state, twists, REFERENCE, 1e-3).d_wrenches for model in (fixed, published))
+    np.testing.assert_array_equal(*slopes)
+    turned = RolloutTangent(state, twists, parameters=parameters_of(fixed))
+    changes = (rollout_jvp(model, state, twists, REFERENCE, 1e-3, turned).wrenches_dot for model in (fixed, published))
+    np.testing.assert_array_equal(*changes)
 
 
 def test_what_does_not_know_a_fixed_stiffness_says_so():
@@ -237,7 +238,5 @@ def test_what_does_not_know_a_fixed_stiffness_says_so():
         model.step(model.rest(), np.zeros(3), 1.0, 1e-3, moments=[0.0, 0.0])
     with pytest.raises(TypeError):
         CoulombStribeck(reference_load=1.0)
-    with pytest.raises(InvalidValueError, match="law must have no reference_load for compiled sources"):
-        pieces_of(model)
     assert "reference_load=2" in repr(model)
     assert law != LuGre() and LuGre(reference_load=None) == LuGre()

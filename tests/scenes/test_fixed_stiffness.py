@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from planarfriction.derivatives import scene_sensitivities
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import LuGre
 from planarfriction.models import DistributedModel, ReducedModel
@@ -123,10 +122,18 @@ def test_a_scene_may_start_under_load_or_sliding(start):
         np.testing.assert_allclose(force, force[:, :1] * np.ones(force.shape[1]), rtol=1e-5, atol=1e-12)
 
 
-def test_derivatives_of_scenes_refuse():
-    scene = Scene(_body(), Contact(DistributedModel(ONE, LuGre(reference_load=1.0)), 1.0), 0.01)
-    with pytest.raises(InvalidValueError, match="law must have no reference_load for derivatives of scenes"):
-        scene_sensitivities(scene, ["mass"])
+@pytest.mark.parametrize("ratio", [None, 0.5])
+@pytest.mark.parametrize("hold", ["linear", "previous"])
+def test_a_sliding_body_may_lose_its_load_and_get_it_back(hold, ratio):
+    """It slows down by `int mu f_N dt/m`, but for the micrometres in which bristles bend."""
+    law = LuGre(mu_c=0.5, sigma_1=1.0, sigma_2=0.0, elasto_plastic=ratio, reference_load=2.0)
+    load = Signal([0.0, 0.02, 0.03, 0.04, 0.1], [2.0, 0.0, 0.0, 3.0, 1.0], hold)
+    body = Body(0.4, 1e-4, velocity=(0.5, 0.1, 0.0), gravity=(0.0, 0.0))
+    scene = Scene(body, Contact(DistributedModel(DISCS, law), load, mounted_on="body"), 0.1, save_every=0.1)
+    data = simulate(scene, rtol=1e-8, atol=1e-8).data
+    lost = 0.5 * {"linear": 0.02 + 0.015 + 0.12, "previous": 0.04 + 0.18}[hold] / 0.4
+    found = np.hypot(0.5, 0.1) - np.hypot(data["vx"].values[-1], data["vy"].values[-1])
+    assert found == pytest.approx(lost, rel=1e-4)
 
 
 def test_a_pressure_that_follows_the_load_refuses():

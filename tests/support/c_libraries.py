@@ -38,6 +38,13 @@ FOLLOWING = {
     "maps": lambda: pf.DistributedModel(pf.ContactPatch.from_pressure(MAPS, cell_size=1e-3), LAW),
 }
 """Models whose shape follows the load."""
+_FIXED_LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9, reference_load=2.0)
+FIXED = {
+    "fixed discs": lambda: pf.ReducedModel(DISC, _FIXED_LAW),
+    "fixed points": lambda: pf.DistributedModel(FEW, pf.LuGre(mu_s=1.2, reference_load=2.0)),
+    "fixed metric": lambda: pf.DistributedModel(METRIC, _FIXED_LAW),
+}
+"""Models whose stiffness does not grow with the load."""
 REDUCED = [name for name in MODELS if name != "distributed"]
 KINDS = {"double": np.float64, "float": np.float32}
 STRICT = "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror"
@@ -87,7 +94,7 @@ def _folder() -> tempfile.TemporaryDirectory:
 @functools.cache
 def library(name: str, precision: str = "double", *options: str) -> Library:
     """Compile the model called `name` once, without a warning, and load it."""
-    model = (MODELS | FOLLOWING)[name]()
+    model = (MODELS | FOLLOWING | FIXED)[name]()
     folder = Path(_folder().name) / "-".join([name, precision, *options])
     pf.export_c(model, folder, precision=precision)
     (folder / "driver.c").write_text(DRIVER)
@@ -116,6 +123,7 @@ def slopes_type(model: Any, kind: type) -> np.dtype:
         "wrench_state": (3, states), "wrench_twist": (3, 3), "wrench_load": (3,), "wrench_params": (3, count),
         "state_state": (states, own), "state_twist": (states, 3), "state_params": (states, count),
     }  # fmt: skip
+    shapes |= {} if model.law.reference_load is None else {"state_load": (states,)}
     return np.dtype([(name, kind, shape) for name, shape in shapes.items()])
 
 

@@ -23,8 +23,9 @@ import pytest
 
 import planarfriction as pf
 from planarfriction import sweeps
-from planarfriction.errors import SweepError, SweepInterrupted
-from planarfriction.sweeps import keys, records
+from planarfriction.errors import FileError, SweepError, SweepInterrupted
+from planarfriction.sweeps import bookkeeping, keys, records
+from planarfriction.sweeps.quantities import grid_of
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 PATCH = pf.ContactPatch.disc(0.01, cells=7)
@@ -225,6 +226,14 @@ def found(folder: Path, grips: list[float], **options) -> int:
     return told[-1].found
 
 
+def kept(folder: Path) -> dict[str, records.Record]:
+    """Return the runs in the files of a folder, by their keys."""
+    runs = {}
+    for file in folder.glob("runs-*.npz"):
+        runs |= records.unpack(file.read_bytes())
+    return runs
+
+
 # ---------------------------------------------------------------------- going on
 
 
@@ -235,11 +244,13 @@ def test_a_sweep_goes_on_where_another_has_ended(tmp_path):
     data = pf.sweep(grip, values, out=tmp_path, progress=told.append)
     assert data.identical(reference())  # whichever came from files
     assert told[-1][:5] == (6, 6, 4, 0, 0) and str(told[-1]) == "6 of 6 runs (4 found)"
-    assert {file.stem for file in tmp_path.glob("*.npz")} == set(data.run.values.ravel().tolist())
+    assert kept(tmp_path).keys() == set(data.run.values.ravel().tolist())
 
 
 def test_damaged_files_do_not_count(tmp_path):
-    data = pf.sweep(grip, {"grip": GRIPS}, out=tmp_path)
+    for load in GRIPS:
+        pf.sweep(grip, {"grip": [load]}, out=tmp_path)
+    data = pf.sweep(grip, {"grip": GRIPS})
     whole, cut, changed = sorted(tmp_path.glob("*.npz"))
     cut.write_bytes(cut.read_bytes()[:-40])
     content = bytearray(changed.read_bytes())
@@ -250,16 +261,16 @@ def test_damaged_files_do_not_count(tmp_path):
     again = pf.sweep(grip, {"grip": GRIPS}, out=tmp_path, progress=told.append)
     assert told[-1].found == 1 and told[-1].damaged == 2 and "2 damaged and done again" in str(told[-1])
     assert again.identical(data)
+    assert found(tmp_path, GRIPS) == 3 and not cut.exists() and not changed.exists()
 
 
-def test_a_folder_in_place_of_a_file_fails_one_run(tmp_path):
-    """It does for a file of results, and one in place of the file of a failure changes nothing."""
-    runs = pf.sweep(grip, {"grip": GRIPS}).run.values.tolist()
-    (tmp_path / f"{runs[1]}.npz").mkdir()
-    (tmp_path / f"{runs[1]}.failed.json").mkdir()
-    data = pf.sweep(grip, {"grip": GRIPS}, out=tmp_path)
-    assert data.status.values.tolist() == ["success", "failed", "success"]
-    assert "cannot be written" in str(data.failure[1].item()) and runs[1] in str(data.failure[1].item())
+def test_a_folder_in_place_of_a_file_changes_nothing(tmp_path):
+    pf.sweep(grip, {"grip": GRIPS}, out=tmp_path)
+    (file,) = tmp_path.glob("*.npz")
+    file.unlink()
+    file.mkdir()
+    with pytest.raises(FileError, match="cannot be written: Is a directory"):
+        pf.sweep(grip, {"grip": GRIPS}, out=tmp_path)
     refused = pf.sweep(crossed, {"grip": GRIPS, "mass": MASSES})
     (tmp_path / f"{refused.run.values[2, 0]}.failed.json").mkdir()
     again = pf.sweep(crossed, {"grip": GRIPS, "mass": MASSES}, out=tmp_path)
@@ -272,12 +283,17 @@ def test_files_hold_what_runs_have_left_and_nothing_is_lost():
         "how many/ever φ": records.History((), np.array(3), {}),
         "file": records.History(("n",), np.array(["a", "bcd"]), {}),
     }
-    record = records.Record("success", "", variables, 1.5)
-    content = records.pack(record)
+    other = {**variables, "file": records.History(("n",), np.array(["a", "b"]), {})}
+    runs = {name: records.Record("success", "", each, 1.5) for name, each in (("a", variables), ("b", other))}
+    runs["c"] = runs["a"]._replace(status="at rest")
+    content = records.pack(runs)
     back = records.unpack(content)
-    assert records.pack(back) == content and back[:2] == record[:2] and back.end == 1.5
-    for name, each in variables.items():
-        assert back.variables[name] == each and back.variables[name].values.dtype == each.values.dtype
+    assert back.keys() == runs.keys() and records.pack(back) == content
+    for key, record in runs.items():
+        assert back[key][:2] == record[:2] and back[key].end == 1.5
+        for name, each in record.variables.items():
+            found = back[key].variables[name]
+            assert found == each and found.values.dtype == each.values.dtype
 
 
 def test_failures_are_recorded_with_reason_and_scene_and_are_no_end(tmp_path):
@@ -350,20 +366,22 @@ def test_ctrl_c_keeps_what_is_done(tmp_path):
     with pytest.raises(SweepInterrupted) as stop:
         pf.sweep(grip, values, out=tmp_path, measure=slow, progress=press)
     done = int((stop.value.data.status == "success").sum())
-    assert 2 <= done < 40 and done == len(list(tmp_path.glob("*.npz"))) == len(MEASURED)
+    assert 2 <= done < 40 and done == len(kept(tmp_path)) == len(MEASURED)
     assert int((stop.value.data.status == "missing").sum()) == 40 - done
     assert int(stop.value.data.y.notnull().sum()) == done
 
 
 KILLED = """
 import sys, numpy as np, planarfriction as pf
+from planarfriction.sweeps import bookkeeping
 from tests.sweeps import test_running as t
+bookkeeping.BETWEEN = 0.01
 pf.sweep(t.grip, {"grip": np.linspace(1.0, 3.0, int(sys.argv[2]))}, out=sys.argv[1], measure=t.end)
 """
 
 
 def kill_on_the_way(folder: Path, runs: int, after: int) -> int:
-    """Begin a sweep in another process, kill it when some files are there; returns how many there are then.
+    """Begin a sweep in another process, kill it when some runs are there; returns how many there are then.
 
     That they are found afterwards shows too that digests are the same in every process.
     """
@@ -372,13 +390,13 @@ def kill_on_the_way(folder: Path, runs: int, after: int) -> int:
     process = subprocess.Popen([sys.executable, "-c", KILLED, str(folder), str(runs)], env=environment)
     try:
         limit = time.monotonic() + 300.0
-        while len(list(folder.glob("*.npz"))) < after:
+        while len(kept(folder)) < after:
             assert process.poll() is None and time.monotonic() < limit
             time.sleep(0.002)
     finally:
         process.kill()
         process.wait()
-    return len(list(folder.glob("*.npz")))
+    return len(kept(folder))
 
 
 def after_a_kill(folder: Path, runs: int, after: int) -> None:
@@ -386,11 +404,12 @@ def after_a_kill(folder: Path, runs: int, after: int) -> None:
     assert after <= there < runs
     grips = np.linspace(1.0, 3.0, runs).tolist()
     assert found(folder, grips, measure=end) == there  # none is lost, none is half
-    assert len(list(folder.glob("*.npz"))) == runs
-    assert found(folder, grips, measure=end) == runs
+    assert len(kept(folder)) == runs
+    data = pf.sweep(grip, {"grip": grips}, out=folder, measure=end)
+    assert data.identical(pf.sweep(grip, {"grip": grips}, measure=end))
 
 
-def test_a_killed_sweep_goes_on(tmp_path):
+def test_a_killed_sweep_goes_on_with_the_same_bits(tmp_path):
     after_a_kill(tmp_path, 400, 30)
 
 
@@ -401,7 +420,39 @@ def test_ten_thousand_runs_go_on_after_kills(tmp_path):
     after_a_kill(tmp_path, 10_000, 7000)
 
 
+def test_long_sweeps_have_few_files(tmp_path, monkeypatch):
+    """A file comes after half a second and a fiftieth of the time so far, and holds the runs since the last one."""
+    clock = itertools.count()
+    monkeypatch.setattr(bookkeeping, "monotonic", lambda: 0.1 * next(clock))
+    book = bookkeeping.FolderBookkeeper(grid_of({"a": [1.0]}), False, tmp_path)
+    for number in range(10_000):  # 1,000 s
+        book.add((0,), str(number), records.Record("success", "", {}), None)
+        book.flush()
+    book.flush(at_once=True)
+    files = list(tmp_path.glob("runs-*.npz"))
+    assert 100 < len(files) < 200 and len(kept(tmp_path)) == 10_000
+    assert sum(len(records.unpack(file.read_bytes())) for file in files) == 10_000
+
+
 # ---------------------------------------------------------------------- executors
+
+
+def test_a_ctrl_c_while_a_result_is_collected_ends_the_sweep(monkeypatch, tmp_path):
+    asked: list[concurrent.futures.Future] = []
+
+    def pressed(ask):
+        def answer(future, timeout=None):
+            asked.append(future)
+            if len(asked) == 3:
+                raise KeyboardInterrupt
+            return ask(future, timeout)
+
+        return answer
+
+    for name in ("result", "exception"):
+        monkeypatch.setattr(concurrent.futures.Future, name, pressed(getattr(concurrent.futures.Future, name)))
+    with pytest.raises(SweepInterrupted):
+        pf.sweep(grip, {"grip": GRIPS, "mass": MASSES}, out=tmp_path, measure=end)
 
 
 def test_any_executor_gives_the_same_bits():

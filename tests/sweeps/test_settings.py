@@ -15,6 +15,7 @@ from planarfriction.cli.run import build_scenes, one_each
 from planarfriction.errors import SweepInterrupted
 from planarfriction.sweeps import running
 from planarfriction.sweeps.settings import Settable, parse
+from tests.sweeps.test_running import kept
 
 SCENE = """
 t_end = 0.03
@@ -232,7 +233,7 @@ def test_the_command_measures_with_a_function_of_a_file(file, capsys):
     captured = capsys.readouterr()
     assert "1 failed; the first: make_scene: scene.toml: [contact]: normal_force" in captured.err
     assert "down" in captured.out
-    assert len(list(Path("sweep").glob("*.npz"))) == 2
+    assert len(kept(Path("sweep"))) == 2
 
 
 def test_ctrl_c_says_how_to_go_on(file, capsys, monkeypatch):

@@ -222,3 +222,11 @@ def test_nan_in_traced_values_stays_and_spoils_no_other_contact(kind, method, na
         slope, alone = gradient(bad["twist"]), gradient(sequences)
         np.testing.assert_array_equal(finite(slope), [True, False, True])
         np.testing.assert_allclose(front.plain(slope)[::2], front.plain(alone)[::2], rtol=1e-9, atol=1e-12)
+
+
+def test_parameters_are_as_many_as_their_names(front):
+    model = front.model("DistributedModel")
+    assert model.names[0] == "sigma_0" and len(model.names) == 8
+    with pytest.raises(InvalidValueError, match=r"parameters must have shape \[..., 8\] \(sigma_0, .*got shape \[3\]"):
+        model.rate(**{name: value for name, value in arguments(front, model).items() if name != "dt"},
+                   parameters=front.array([1.0, 2.0, 3.0]))  # fmt: skip

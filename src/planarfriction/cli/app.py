@@ -15,7 +15,7 @@ from planarfriction.cli.doctor import doctor
 from planarfriction.cli.identify_plan import FitOrPlan, complete_log
 from planarfriction.cli.options import FILE, cells_option, complete_scene, map_options, patch_option
 from planarfriction.cli.sweep import sweep
-from planarfriction.families import MODELS, SCENES, SURFACES, Family
+from planarfriction.families import MODELS, SURFACES, Family
 
 
 class MemberOf(click.Choice):
@@ -44,29 +44,13 @@ class MemberOf(click.Choice):
     cls=Commands,
     name="planarfriction",
     context_settings={"max_content_width": 100, "help_option_names": ["-h", "--help"]},
-    help="Friction of contact patches that slide and spin at the same time: simulate, fit to measurements, compare.",
 )
 @click.version_option(__version__, message="%(prog)s %(version)s")
 def app() -> None:
-    """Run a command (the help above is what users see)."""
+    """Friction of contact patches that slide and spin at the same time: simulate, fit to measurements, compare."""
 
 
-@app.command(
-    short_help="Simulate a ready scene or a scene file.",
-    help=f"""Simulate a ready scene or a scene file with one friction model, or with several to compare them.
-
-    SCENE is {", ".join(SCENES)}, or a file (.toml, .json).
-
-    \b
-    Examples:
-      planarfriction run in-hand --model both --out out/ --plot
-      planarfriction run drift --model reduced --patch Square --t-end 2
-      planarfriction run in-hand --model both --cells 64
-      planarfriction run in-hand --patch pad.csv --cell-size 0.001 --animate
-      planarfriction run scene.toml --rtol 1e-7 --out results/
-      planarfriction run scene.toml --set body.mass=0.3 --set fingers.law.mu_c=0.5
-    """,
-)
+@app.command(short_help="Simulate a ready scene or a scene file.")
 @click.argument("scene", shell_complete=complete_scene)
 @click.option(
     "--model",
@@ -88,7 +72,19 @@ def app() -> None:
 @click.option("--plot", is_flag=True, help="Draw histories, motion and patch as PNG (in out/ by default).")
 @click.option("--animate", is_flag=True, help="Draw motion and slip as an animated GIF (in out/ by default).")
 def run(scene: str, out: Path | None, plot: bool, animate: bool, **options: Any) -> int:
-    """Simulate a scene (the help above is what users see)."""
+    """Simulate a ready scene or a scene file with one friction model, or with several to compare them.
+
+    SCENE is in-hand, drift, free-slide, driven, pushed, pivot, foot or curling, or a file (.toml, .json).
+
+    \b
+    Examples:
+      planarfriction run in-hand --model both --out out/ --plot
+      planarfriction run drift --model reduced --patch Square --t-end 2
+      planarfriction run in-hand --model both --cells 64
+      planarfriction run in-hand --patch pad.csv --cell-size 0.001 --animate
+      planarfriction run scene.toml --rtol 1e-7 --out results/
+      planarfriction run scene.toml --set body.mass=0.3 --set fingers.law.mu_c=0.5
+    """
     # Compiler, arrays and, where asked for, datasets and pictures load now, a million objects that all stay: not
     # looking for garbage among them saves up to a tenth of the run. `main` turns the collector on again.
     gc.disable()
@@ -104,17 +100,6 @@ def run(scene: str, out: Path | None, plot: bool, animate: bool, **options: Any)
 @app.command(
     name="limit-surface",
     short_help="Print, draw or tabulate a limit surface.",
-    help="""Show the limit surface of a contact patch: numbers, a picture (next to its ellipsoid), a table as CSV.
-
-    The CSV has the columns vx vy omega fx fy tau: twists in all directions and their friction wrenches for mu f_N = 1,
-    about the origin of the contact frame, in m/s, rad/s, 1 and m.
-
-    \b
-    Examples:
-      planarfriction limit-surface --patch NonConvex1 --out surface.png
-      planarfriction limit-surface --patch NonConvex1 --out surface.html --alone
-      planarfriction limit-surface --pressure pad.png --cell-size 0.0005 --surface table --csv samples.csv
-    """,
 )
 @patch_option("Default: Circle.")
 @click.option("--pressure", type=FILE, help="Pressure map, as with --patch.")
@@ -124,15 +109,32 @@ def run(scene: str, out: Path | None, plot: bool, animate: bool, **options: Any)
 @click.option("--alone", is_flag=True, help="Draw the surface without the ellipsoid.")
 @click.option("--csv", type=FILE, help="Table of samples to write (.csv).")
 def limit_surface(patch: str | None, pressure: Path | None, size: dict[str, Any], **options: Any) -> None:
-    """Show a limit surface (the help above is what users see)."""
+    """Show the limit surface of a contact patch: numbers, a picture (next to its ellipsoid), a table as CSV.
+
+    The CSV has the columns vx vy omega fx fy tau: twists in all directions and their friction wrenches for mu f_N = 1,
+    about the origin of the contact frame, in m/s, rad/s, 1 and m.
+
+    \b
+    Examples:
+      planarfriction limit-surface --patch NonConvex1 --out surface.png
+      planarfriction limit-surface --patch NonConvex1 --out surface.html --alone
+      planarfriction limit-surface --pressure pad.png --cell-size 0.0005 --surface table --csv samples.csv
+    """
     from planarfriction.cli import limit_surface as command
 
     command.show(command.choose_patch(patch, pressure, size), **options)
 
 
-@app.command(
-    short_help="Write the friction model of a file as C source.",
-    help="""Write the friction model of a file as C source for a controller: NAME.h and NAME.c, C99 and C++17.
+@app.command(short_help="Write the friction model of a file as C source.")
+@click.argument("file", type=FILE, shell_complete=complete_scene)
+@click.option("--out", type=FILE, required=True, help="Folder for the files.")
+@click.option(
+    "--name", default="friction", show_default=True, help="Name of the files, and what names in them begin with."
+)
+@click.option("--precision", default="double", show_default=True, help="double or float.")
+@click.option("--contact", metavar="NAME", help="Contact of the scene whose model it is, if they have different ones.")
+def export(file: Path, **options: Any) -> None:
+    """Write the friction model of a file as C source for a controller: NAME.h and NAME.c, C99 and C++17.
 
     NAME_test.c compares the library with numbers of the model; NAME.cmake has targets for both.
 
@@ -142,17 +144,7 @@ def limit_surface(patch: str | None, pressure: Path | None, size: dict[str, Any]
     Examples:
       planarfriction export model.toml --out friction/
       planarfriction export scene.toml --contact fingers --out src/ --name finger --precision float
-    """,
-)
-@click.argument("file", type=FILE, shell_complete=complete_scene)
-@click.option("--out", type=FILE, required=True, help="Folder for the files.")
-@click.option(
-    "--name", default="friction", show_default=True, help="Name of the files, and what names in them begin with."
-)
-@click.option("--precision", default="double", show_default=True, help="double or float.")
-@click.option("--contact", metavar="NAME", help="Contact of the scene whose model it is, if they have different ones.")
-def export(file: Path, **options: Any) -> None:
-    """Write C source (the help above is what users see)."""
+    """
     from planarfriction.cli import export as command
 
     command.export(file, **options)
@@ -161,7 +153,24 @@ def export(file: Path, **options: Any) -> None:
 @app.command(
     cls=FitOrPlan,
     short_help="Estimate friction parameters from logs; plan the next measurement.",
-    help="""Estimate friction parameters of a contact from logs of its motion and its friction wrench.
+)
+@click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True, shell_complete=complete_log)
+@patch_option("Default: Circle.")
+@map_options
+@click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: law and radius.")
+@click.option("--start", metavar="NAME=VALUE", multiple=True, help="Initial guess, or fixed value if not estimated.")
+@click.option("--normal-force", type=float, help="Normal force in N, if the logs have no such column.")
+@click.option("--contact", metavar="NAME", help="Contact whose columns (NAME.vx) are read, if there are several.")
+@click.option("--noise", metavar="FX,FY,TAU", help="Noise of the measured wrench in N and N m. Default: estimated.")
+@click.option("--plain", is_flag=True, help="Use plain LuGre bristles. Default: what fits better.")
+@click.option("--steady", is_flag=True, help="The logs begin in steady sliding, not at rest.")
+@click.option("--model", default="auto", show_default=True, help="reduced-published, reduced, distributed, or auto.")
+@click.option("--nuisance", metavar="NAMES", help="Rig disturbances: delay,bias,load,twist or none. Default: all.")
+@click.option("--starts", type=int, default=4, show_default=True, help="Number of starting points of the search.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Random seed of the starting points.")
+@click.option("--out", type=FILE, help="Folder for the estimates (JSON) and the residual plot (PNG).")
+def identify(logs: tuple[Path, ...], patch: str | None, size: dict[str, Any], **options: Any) -> int:
+    """Estimate friction parameters of a contact from logs of its motion and its friction wrench.
 
     Each LOG is a CSV file with a heading and the columns t, vx, vy, omega (or x, y, theta), fx, fy, tau, normal_force
     in s, m/s, rad/s, N and N m. Twist and wrench are about the origin of the contact frame, in its axes; the wrench
@@ -175,40 +184,19 @@ def export(file: Path, **options: Any) -> None:
       planarfriction identify slow.csv fast.csv --patch pad.csv --cell-size 0.001
       planarfriction identify log.csv --parameters mu_c,mu_s,v_s --start sigma_0=1e5 --start sigma_1=100
       planarfriction identify plan slow.csv --patch disc
-    """,
-)
-@click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True, shell_complete=complete_log)
-@patch_option("Default: Circle.")
-@map_options
-@click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: law and radius.")
-@click.option("--start", metavar="NAME=VALUE", multiple=True, help="Initial guess, or fixed value if not estimated.")
-@click.option("--normal-force", type=float, help="Normal force in N, if the logs have no such column.")
-@click.option("--contact", metavar="NAME", help="Contact whose columns (NAME.vx) are read, if there are several.")
-@click.option("--noise", metavar="FX,FY,TAU", help="Noise of the measured wrench in N and N m. Default: estimated.")
-@click.option("--plain", is_flag=True, help="Use plain LuGre bristles instead of elasto-plastic ones.")
-@click.option("--steady", is_flag=True, help="The logs begin in steady sliding, not at rest.")
-@click.option("--model", default="auto", show_default=True, help="reduced-published, reduced, distributed, or auto.")
-@click.option("--nuisance", metavar="NAMES", help="Rig disturbances: delay,bias,load,twist or none. Default: all.")
-@click.option("--starts", type=int, default=4, show_default=True, help="Number of starting points of the search.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Random seed of the starting points.")
-@click.option("--out", type=FILE, help="Folder for the estimates (JSON) and the residual plot (PNG).")
-def identify(logs: tuple[Path, ...], patch: str | None, size: dict[str, Any], **options: Any) -> int:
-    """Identify (the help above is what users see)."""
+    """
     from planarfriction.cli import identify as command
     from planarfriction.cli.options import find_patch
 
     return command.identify(logs, find_patch(patch, size), **options)
 
 
-@app.command(
-    short_help="Compile everything in advance.",
-    help="""Compile everything in advance, so that later runs need not wait. Code in the cache is not recompiled.
+@app.command(short_help="Compile everything in advance.")
+def warm() -> None:
+    """Compile everything in advance, so that later runs need not wait. Code in the cache is not recompiled.
 
     Ctrl-C stops it; finished parts are kept.
-    """,
-)
-def warm() -> None:
-    """Warm up (the help above is what users see)."""
+    """
     from planarfriction.cli.console import print_table, work_progress
     from planarfriction.warm import warm_up
 

@@ -151,17 +151,14 @@ def step_times() -> list[tuple[str, str]]:
     return rows
 
 
-@click.command(
-    short_help="Check this installation; the output belongs in bug reports.",
-    help="""Check this installation: versions, extras, machine code on disk, processor, time of a step, and a self-test.
+@click.command(short_help="Check this installation; the output belongs in bug reports.")
+def doctor() -> int:
+    """Check this installation: versions, extras, machine code on disk, processor, time of a step, and a self-test.
 
     The self-test compares a few results with known numbers. It takes some ten seconds where code has to be compiled.
     The exit code is 1 if a number is out of its tolerance or a needed package is missing or too old.
     Please copy the output into bug reports.
-    """,
-)
-def doctor() -> int:
-    """Check the installation (the help above is what users see)."""
+    """
     from planarfriction.cli import OUT_OF_TOLERANCE
     from planarfriction.cli.console import work_progress
 

@@ -33,12 +33,11 @@ def identify(
 ) -> int:
     """Estimate the parameters from the logs, print them, and write JSON and picture into `out`; options as typed."""
     from planarfriction.identify import FitOptions, Log, identify_lugre
-    from planarfriction.laws import ElastoPlastic
 
     chosen: dict[str, Any] = {"parameters": parse_names(parameters), "start": parse_start(start), "model": model}
     options = FitOptions(
         noise=parse_noise(noise),
-        elasto_plastic=None if plain else ElastoPlastic(),
+        elasto_plastic=None if plain else "auto",
         begins="steady" if steady else "rest",
         nuisance=parse_nuisance(nuisance),
         **search,

@@ -44,17 +44,6 @@ def complete_log(ctx: click.Context, parameter: object, incomplete: str) -> list
 @click.command(
     name=NAME,
     short_help=SHORT_HELP,
-    help="""Rank motions by the information that each is expected to add to the logs so far.
-
-    Each LOG is a file as for `planarfriction identify`; the logs are fitted first. Without a log, the law is guessed
-    from --start. Prints the gains in bits, and the errors expected after the best motion; --out writes that motion.
-
-    \b
-    Examples:
-      planarfriction identify plan --patch disc --start mu_c=0.5 --start sigma_0=2e4 --out next.csv
-      planarfriction identify plan slow.csv --patch disc --speed 0.03 --spin 2
-      planarfriction identify plan slow.csv --wanted sigma_1
-    """,
 )
 @click.argument("logs", metavar="[LOG]...", type=FILE, nargs=-1)
 @patch_option("Default: Circle.", "patch_name")
@@ -83,7 +72,17 @@ def plan(
     out: Path | None,
     **motion: Any,
 ) -> int:
-    """Plan (the help above is what users see)."""
+    """Rank motions by the information that each is expected to add to the logs so far.
+
+    Each LOG is a file as for `planarfriction identify`; the logs are fitted first. Without a log, the law is guessed
+    from --start. Prints the gains in bits, and the errors expected after the best motion; --out writes that motion.
+
+    \b
+    Examples:
+      planarfriction identify plan --patch disc --start mu_c=0.5 --start sigma_0=2e4 --out next.csv
+      planarfriction identify plan slow.csv --patch disc --speed 0.03 --spin 2
+      planarfriction identify plan slow.csv --wanted sigma_1
+    """
     from planarfriction.cli import identify, output
     from planarfriction.cli.console import note
     from planarfriction.cli.options import find_patch

@@ -22,23 +22,7 @@ KINDS = {"m": "length", "m/s": "speed", "rad": "angle", "N": "force", "N m": "to
 """Kinds of quantities, by their SI units."""
 
 
-@click.command(
-    short_help="Simulate a scene for every combination of values.",
-    help=f"""Simulate a scene for every combination of some of its values; an interrupted sweep can be continued.
-
-    SCENE is {", ".join(SCENES)}, or a file (.toml, .json). PATH is the name of a value in it, such as body.mass, t_end,
-    or fingers.law.mu_c for a contact called fingers; for a ready scene also an argument of its function, such as mass.
-
-    Each run is a file in --out; the same command simulates only the missing ones. The dataset of all runs is written to
-    sweep.nc in --out. If --out ends in .zarr, it is the dataset itself.
-
-    \b
-    Examples:
-      planarfriction sweep scene.toml --set body.mass=0.1:0.3:20 --set fingers.law.mu_c=0.5,0.8
-      planarfriction sweep in-hand --set mass=0.1:0.3:5 --set fingers.model=reduced,distributed --out runs/
-      planarfriction sweep scene.toml --set body.position.0=0:0.02:50 --measure mine.py:slip
-    """,
-)
+@click.command(short_help="Simulate a scene for every combination of values.")
 @click.argument("scene", shell_complete=complete_scene)
 @click.option(
     "--set",
@@ -56,11 +40,25 @@ KINDS = {"m": "length", "m/s": "speed", "rad": "angle", "N": "force", "N m": "to
 @click.option(
     "--measure", metavar="FILE.py:NAME", help="Function of a solution that returns what to keep. Default: all."
 )
-@click.option("--out", type=FILE, default=Path("sweep"), show_default=True, help="Folder for the runs, or .zarr store.")
+@click.option("--out", type=FILE, default=Path("sweep"), show_default=True, help="Folder for the runs.")
 def sweep(
     scene: str, settings: tuple[str, ...], model: str | None, measure: str | None, out: Path, **options: Any
 ) -> int:
-    """Sweep (the help above is what users see)."""
+    """Simulate a scene for every combination of some of its values; an interrupted sweep can be continued.
+
+    SCENE is in-hand, drift, free-slide, driven, pushed, pivot, foot or curling, or a file (.toml, .json). PATH is the
+    name of a value in it, such as body.mass, t_end, or fingers.law.mu_c for a contact called fingers; for a ready scene
+    also an argument of its function, such as mass.
+
+    The runs are kept in --out; the same command simulates only the missing ones. The dataset of all runs is written to
+    sweep.nc in --out.
+
+    \b
+    Examples:
+      planarfriction sweep scene.toml --set body.mass=0.1:0.3:20 --set fingers.law.mu_c=0.5,0.8
+      planarfriction sweep in-hand --set mass=0.1:0.3:5 --set fingers.model=reduced,distributed --out runs/
+      planarfriction sweep scene.toml --set body.position.0=0:0.02:50 --measure mine.py:slip
+    """
     from planarfriction import sweeps, validation
     from planarfriction.cli import INTERRUPTED
     from planarfriction.cli.console import count_progress, note
@@ -105,10 +103,7 @@ def _show(data: xr.Dataset, out: Path) -> None:
     if failed:
         note(f"{len(failed)} failed; the first: {failed[0]} (for all reasons see the variable failure)")
     swept = data.status.dims
-    if out.suffix == ".zarr":
-        note(f"wrote {out}")
-    else:
-        note(f"wrote {write_dataset(data, out / 'sweep.nc')}")
+    note(f"wrote {write_dataset(data, out / 'sweep.nc')}")
     ends = data.isel(time=-1) if "time" in data.dims else data
     columns = dict(
         _in_units(each) for each in ends.data_vars.values() if each.dims == swept and each.dtype.kind in "fiu"

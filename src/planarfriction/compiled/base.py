@@ -39,6 +39,8 @@ class StepJacobians(NamedTuple):
     """d new state / d state: distributed `[..., 2, 2, N]` (cell by cell), of three states `[..., 3, 3]`."""
     state_twist: np.ndarray
     """d new state / d twist: distributed `[..., 2, N, 3]`, of three states `[..., 3, 3]`."""
+    state_load: np.ndarray
+    """d new state / d normal_force, `[..., *s]`: zero but for a fixed stiffness, as in `ModelJacobians`."""
     wrench_state: np.ndarray
     """d wrench / d state: distributed `[..., 3, 2, N]`, of three states `[..., 3, 3]`."""
     wrench_twist: np.ndarray
@@ -79,7 +81,7 @@ class CompiledModel:
         """Number of states, and numbers of d new state / d state, whose shape is `square_shape`."""
         n = self._size
         self._new, self._wrench, self._room, self._table = slice(n), slice(n, n + 3), n + 9, None
-        shapes = square_shape, (*state_shape, 3), (3, *state_shape), (3, 3), (3,)
+        shapes = square_shape, (*state_shape, 3), state_shape, (3, *state_shape), (3, 3), (3,)
         ends = [0, *itertools.accumulate(map(math.prod, shapes))]
         self._derivatives = [
             (slice(*span), shape) for span, shape in zip(itertools.pairwise(ends), shapes, strict=True)
@@ -281,7 +283,7 @@ class CompiledModel:
         """Bring the derivatives of patches that have moved to the twist and the wrench about the origin, in place."""
         at = np.tile(np.eye(3), (len(moved), 1, 1))
         at[:, 0, 2], at[:, 1, 2] = -moved[:, 1], moved[:, 0]
-        back, (_, state_twist, wrench_state, wrench_twist, wrench_load) = at.mT, (p for p, _ in self._derivatives)
+        back, (_, state_twist, _, wrench_state, wrench_twist, wrench_load) = at.mT, (p for p, _ in self._derivatives)
         for place, left, right in ((state_twist, None, at), (wrench_state, back, None), (wrench_twist, back, at)):
             block = found[rows, place].reshape(len(moved), *((-1, 3) if left is None else (3, -1)))
             block = block if right is None else block @ right

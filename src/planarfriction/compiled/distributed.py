@@ -14,14 +14,11 @@ from planarfriction.compiled.packed import PackedModel
 from planarfriction.compiled.rates import linearised
 from planarfriction.compiled.shapes_by_load import ShapesByLoad, cells_by_load
 from planarfriction.compiler.memory import places_of, rows_of, size_of
-from planarfriction.kernels import cells as contacts
-from planarfriction.kernels import disc_cells
-from planarfriction.kernels import distributed_step as steps
+from planarfriction.kernels.cell_steps import functions_of_cells
+from planarfriction.kernels.cells import CellsContact
 from planarfriction.kernels.contacts import ModelFunctions
-from planarfriction.kernels.disc_steps import functions_of_discs
 from planarfriction.kernels.discs import KAPPA
 from planarfriction.kernels.general_cells import LINEAR, MATRICES, A, C, E, F
-from planarfriction.kernels.leaning_cells import RATES_OF_LEANING, STEPS_OF_LEANING
 from planarfriction.kernels.steps import StepFunctions
 from planarfriction.patch.tilt import tilted
 
@@ -47,21 +44,14 @@ class CompiledDistributed(CompiledModel):
         super().__init__(functions, (self.size, cells), (self.size, self.size, cells))
 
     def _functions(self) -> tuple[ModelFunctions, StepFunctions]:
-        turned = self.patch.anisotropic
-        if self.size == 3:
-            if self.patch.asymmetric:
-                return disc_cells.RATES_OF_LEANING_DISCS, disc_cells.STEPS_OF_LEANING_DISCS
-            return functions_of_discs(turned)[:2]
-        if self.patch.asymmetric:
-            return RATES_OF_LEANING, STEPS_OF_LEANING
-        return (contacts.TURNED, steps.TURNED) if turned else (contacts.ISOTROPIC, steps.ISOTROPIC)
+        return functions_of_cells(self.size, self.patch.anisotropic, self.patch.asymmetric)
 
     def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         """Return the record of a contact, and how many numbers of a linearisation each cell has."""
-        rows = LINEAR * self.size**2 if self.size == 3 or self.patch.asymmetric else contacts.LINEAR_ROWS
+        rows = LINEAR * self.size**2
         if self.reference > 0.0:
             rows = MATRICES * self.size**2 + 1  # the factor on the stiffness behind
-        return contacts.CellsContact(self.law.numbers, numbers.shape[1], numbers, weights), rows
+        return CellsContact(self.law.numbers, numbers.shape[1], numbers, weights), rows
 
     # ------------------------------------------------------------------ at given loads
 
@@ -84,7 +74,7 @@ class CompiledDistributed(CompiledModel):
         yield slice(None), self._packed(weights), None
 
     def linearisation(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
-        """Return linearisations `[..., L, N]` as `kernels.cells.LinearCells`, or those of `kernels.general_cells`."""
+        """Return linearisations `[..., L, N]` of `kernels.general_cells`."""
         ((_, contact),) = self.at_each_load(load)
         cells = state.shape[-1]
         seen = driven(contact, twist.reshape(-1, 3), load.reshape(-1))
@@ -99,16 +89,10 @@ class CompiledDistributed(CompiledModel):
         law, d, lin = self.law.numbers, self.size, self.linearisation(state, twist, load)
         if self.reference > 0.0:
             lin = lin[..., : MATRICES * d * d, :]
-        identity = np.eye(d)[:, :, None]
-        if lin.shape[-2] == contacts.LINEAR_ROWS:
-            k, k_z, k_v = lin[..., :1, None, :], lin[..., None, 1:3, :], lin[..., None, 3:5, :]
-            by_state = -k * identity - state[..., :, None, :] * k_z
-            by_velocity = identity - state[..., :, None, :] * k_v
-        else:
-            matrices = np.moveaxis(lin.reshape(*load.shape, -1, d, d, lin.shape[-1]), -4, 0)
-            by_state, by_velocity = matrices[A], matrices[F]
-            if len(matrices) == MATRICES:
-                return by_state, by_velocity, matrices[C], matrices[E]
+        matrices = np.moveaxis(lin.reshape(*load.shape, lin.shape[-2] // d**2, d, d, lin.shape[-1]), -4, 0)
+        by_state, by_velocity, identity = matrices[A], matrices[F], np.eye(d)[:, :, None]
+        if len(matrices) == MATRICES:
+            return by_state, by_velocity, matrices[C], matrices[E]
         pull_state, pull_velocity = law.sigma_0 * identity + law.sigma_1 * by_state, law.sigma_2 * identity
         return by_state, by_velocity, -pull_state, -(pull_velocity + law.sigma_1 * by_velocity)
 

@@ -55,7 +55,7 @@ class RolloutInputs(NamedTuple):
             shapes = shapes(loads if len(loads) else np.array([LIGHTEST]), slopes)
         return Inputs(
             self.rows, shapes.data, self.twist, self.normal_force, self.dt, which,
-            shapes.surface, shapes.shapes, shapes.by_load,
+            shapes.surface, shapes.shapes, shapes.by_load, self.model.reference,
         )  # fmt: skip
 
 

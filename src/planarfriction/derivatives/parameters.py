@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -13,12 +14,13 @@ from planarfriction.compiler import threads
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
-from planarfriction.kernels import cells_rollout, cells_sensitivities, disc_rollouts, published_step
+from planarfriction.kernels import cells_rollout, cells_sensitivities, published_step
 from planarfriction.kernels.cell_blocks import divided
+from planarfriction.kernels.cell_kinds import rollouts_of_cells
 from planarfriction.kernels.law import LAW
 from planarfriction.kernels.published_rollouts import gradient, rollout, sensitivities, tangent
 from planarfriction.kernels.rollouts import Inputs
-from planarfriction.laws.base import is_rate_law, refuse_fixed_stiffness
+from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModelPublished
 from planarfriction.models.reduced_published import PublishedShape, axes_of
 
@@ -71,7 +73,11 @@ PUBLISHED = Family(
 """`ReducedModelPublished`."""
 
 
-def _cells(entries: cells_rollout.CellRollouts, forwards: Callable[..., None], size: int = 2) -> Family:
+@functools.cache
+def _cells(size: int, turned: bool) -> Family:
+    """Return the roll-outs of `DistributedModel` of points, size 2, or of discs, 3; `turned` with a metric."""
+    entries, forwards = rollouts_of_cells(size, turned)
+
     def sensitivities(
         inputs: Inputs, span: Any, z: np.ndarray, columns: np.ndarray, wrenches: np.ndarray, slopes: np.ndarray
     ) -> None:
@@ -100,19 +106,6 @@ def _cells(entries: cells_rollout.CellRollouts, forwards: Callable[..., None], s
     return Family(names, columns, entries.rollout, entries.gradient, sensitivities, entries.tangent)
 
 
-CELLS, TURNED_CELLS = (
-    _cells(cells_rollout.ISOTROPIC, cells_sensitivities.ISOTROPIC),
-    _cells(cells_rollout.TURNED, cells_sensitivities.TURNED),
-)
-"""`DistributedModel` of points, isotropic or with a friction metric."""
-
-DISCS, TURNED_DISCS = (
-    _cells(*disc_rollouts.DISCS, 3),
-    _cells(*disc_rollouts.TURNED_DISCS, 3),
-)
-"""`DistributedModel` of discs."""
-
-
 class Packed(NamedTuple):
     """A model as compiled loops see it."""
 
@@ -125,6 +118,8 @@ class Packed(NamedTuple):
     """Symmetric `[3, 3]`, or None: twists go in through it, wrenches come out."""
     inner: tuple[int, ...] = (3,)
     """Shape of the state of one contact."""
+    reference: float = 0.0
+    """Reference load [N] of a law whose stiffness does not grow with the load; 0 of others."""
 
     def turned(self, vectors: np.ndarray) -> np.ndarray:
         """Turn twists into the axes of the compiled loops, or wrenches out of them, `[..., 3]`."""
@@ -169,10 +164,8 @@ def _family(model: Any) -> Family:
     model = getattr(model, "reduction", model)
     if isinstance(model, ReducedModelPublished):
         return PUBLISHED
-    refuse_fixed_stiffness(getattr(model, "law", None), "compiled roll-outs")
     if isinstance(model, DistributedModel) and not (is_rate_law(model.law) or model.patch.asymmetric):
-        families = (DISCS, TURNED_DISCS) if model.patch.has_discs else (CELLS, TURNED_CELLS)
-        return families[model.patch.anisotropic]
+        return _cells(model.patch.bristles, model.patch.anisotropic)
     given = "cells with a RateLaw or an asymmetry" if isinstance(model, DistributedModel) else type(model).__name__
     raise InvalidValueError("model", "be one that has compiled roll-outs", given)
 
@@ -207,7 +200,7 @@ def _packed(model: Any) -> Packed:
     if isinstance(model, DistributedModel):
         at_loads = model.compiled.at_loads
         shapes = at_loads if model.depends_on_load else at_loads(np.ones(1), False)
-        return Packed(family, np.array(law), shapes, inner=model.state_shape)
+        return Packed(family, np.array(law), shapes, inner=model.state_shape, reference=model.compiled.reference)
     return pack_shape(law, model.shape_at(1.0))
 
 
@@ -238,11 +231,11 @@ def pack_cells(elasto_plastic: bool, positions: np.ndarray, weights: np.ndarray)
     `positions` are `[2, N]`, or levers `[5, N]`; of discs `[3, N]` or `[6, N]`, with `kappa a` behind them.
     """
     levers, shares = np.asarray(positions, dtype=float), np.asarray(weights, dtype=float)[None]
-    family = {2: CELLS, 3: DISCS, 5: TURNED_CELLS, 6: TURNED_DISCS}[len(levers)]
-    inner = 3 if len(levers) in (3, 6) else 2, len(weights)
-    if len(levers) > 3:
+    inner, turned = (3 if len(levers) in (3, 6) else 2, len(weights)), len(levers) > 3
+    if turned:
         levers = np.vstack([levers, np.zeros((2, levers.shape[1]))])  # no asymmetry
-    return Packed(family, np.array(_any_law(elasto_plastic)), cells_by_load(levers, shares, None), inner=inner)
+    shapes = cells_by_load(levers, shares, None)
+    return Packed(_cells(inner[0], turned), np.array(_any_law(elasto_plastic)), shapes, inner=inner)
 
 
 def _any_law(elasto_plastic: bool) -> LawNumbers:

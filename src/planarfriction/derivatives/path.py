@@ -189,6 +189,8 @@ class _Adjoint:
             self._next -= 1
         self._propagate(*place, drives, since, reach)
         self._gain[: len(drives.kind)] += self._inputs.gained(drives, self._moments)
+        if reach == 0.0:
+            tangent.settle(system.address, piece, self._state[None, :])
         if reach == 0.0 and system.motion.body_axes:
             here = np.flatnonzero(drives.kind == tangent.VELOCITY)
             self._gain[here] += drives.weight[here, 0] * self._state[drives.place[here] - 6]

@@ -77,7 +77,7 @@ class _Tangents:
         self._slopes, inputs = motion.inputs.start(motion.batches), motion.inputs.inputs
         (count, n), instants, contacts = self._slopes.shape, motion.instants, len(motion.batches.models)
         self._space, self._atol = workspace_for(count, inputs, n), motion.accuracy * motion.scale
-        self._state, self._scratch, self._wrench = np.empty(n), np.empty((2, n)), np.empty((contacts, 3))
+        self._state, self._scratch, self._wrench = np.empty(n), np.empty((3, n)), np.empty((contacts, 3))
         self.recorded = np.zeros((instants, 6, count)), np.zeros((instants, contacts, 3, count))
         """Derivatives of motion and wrenches at the instants."""
         self._next = 0
@@ -93,6 +93,7 @@ class _Tangents:
             drives = self._inputs.at(system, piece)
             if since == 0.0:
                 self._inputs.begin(drives, self._slopes)
+                tangent.settle(system.address, piece, self._slopes)
             while self._next < len(instants) and instants[self._next] <= time:
                 instant = instants[self._next]
                 here = reach if instant == time else float(instant - begin)

@@ -190,8 +190,8 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, grip: dict, ki
     functions = _functions(writer, pieces)
     places, words = model.compiled.points()
     moves, places = not words, dict(zip(("place_x", "place_y"), places.T, strict=True))
-    functions["tilt"] = tilt_of(pieces.count)
-    tables = _tables(writer, pieces.tables | places, functions) | ({} if slip is None else _tables(writer, slip.tables))
+    functions |= {} if pieces.fixed else {"tilt": tilt_of(pieces.count)}
+    tables = _tables(writer, places | pieces.tables, functions) | ({} if slip is None else _tables(writer, slip.tables))
     step = functions["step"].splitlines()
     vector = Writer(precision, own=precision == "double")
     share = "(at->low[k] + at->part * (at->high[k] - at->low[k]))" if pieces.rungs else "share[k]"
@@ -243,7 +243,7 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, grip: dict, ki
 
 def _columns(pieces: Pieces) -> int:
     """Return the number of derivatives of a number of a cell."""
-    return pieces.states + 3 + len(pieces.parameters)
+    return pieces.states + 3 + len(pieces.parameters) + pieces.fixed
 
 
 def _places(pieces: Pieces) -> list[str]:
@@ -291,7 +291,7 @@ def _tables(
         table: _table(writer, numbers)
         for table, numbers in tables.items()
         if functions is None
-        or table in ("share", "rungs", "place_x", "place_y")
+        or (table in ("share", "rungs", "place_x", "place_y") and len(numbers) > 0)
         or any(f"{table}[" in each for each in functions.values())
     }
 

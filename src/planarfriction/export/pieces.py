@@ -10,26 +10,28 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import formulas
+from planarfriction.compiler import compiled_math as xp
 from planarfriction.errors import InvalidValueError
+from planarfriction.export.twins import twin
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import (
     cells,
     cells_rollout,
     disc_cells,
     discs,
-    distributed_step,
     moment_steps,
+    points,
     published_step,
 )
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.law import grip
 from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, Root
 from planarfriction.kernels.rules import ratio
+from planarfriction.kernels.settle import within
 from planarfriction.kernels.surfaces import CELLS
 from planarfriction.kernels.trace import Block, Mathematics, Number, Table, Trace, traced
-from planarfriction.kernels.twins import twin
 from planarfriction.kernels.vectors import norm, times
-from planarfriction.laws.base import is_rate_law, refuse_fixed_stiffness
+from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.shared import loads_of_change
@@ -83,15 +85,19 @@ class Pieces(NamedTuple):
     tables: dict[str, np.ndarray]
     """Constant arrays by name; `share` [count] is that in the load."""
     step: Block
-    """New states, then the wrench per unit load, from `p`, `k`, `z`, `v` and `dt`."""
+    """New states, then the wrench per unit load, from `p`, `k`, `z`, `v`, `dt`, and `normal_force` if it is `fixed`."""
     parameters: dict[str, float]
     """Numbers of the law that may change at run time."""
     steady: Block
     """Wrench of steady sliding per unit load."""
     slopes: Callable[[], Block]
-    """Trace new states, wrench and derivatives by states, twist and parameters: rows of the wrench, then of states."""
+    """Trace new states, wrench and derivatives: rows of the wrench, then of states.
+
+    Derivatives are by states, twist, parameters and, of a fixed stiffness, by the load."""
     rungs: int = 0
     """Number of loads, the table `rungs`, that `share` [rungs, count] is for; 0 for a fixed shape."""
+    fixed: bool = False
+    """True for a stiffness that does not grow with the load."""
 
 
 def pieces_of(model: Any, precision: str = "double", *, fixed: bool = True, count: int = 0) -> Pieces:
@@ -104,7 +110,6 @@ def pieces_of(model: Any, precision: str = "double", *, fixed: bool = True, coun
     depends on the load, friction that differs from cell to cell in other ways than by a metric.
     """
     whole, law = model.reduction if isinstance(model, ReducedModel) else model, getattr(model, "law", None)
-    refuse_fixed_stiffness(law, "compiled sources")
     for kind, taken_apart in _KINDS.items():
         if type(whole) is kind and isinstance(getattr(law, "numbers", None), LawNumbers) and not is_rate_law(law):
             if whole.patch.depends_on_load and (fixed or kind is not DistributedModel):
@@ -166,16 +171,35 @@ def _with(function: Any, **others: Any) -> Any:
     return FunctionType(own.__code__, own.__globals__ | others, own.__name__)
 
 
+LIGHTEST = {"double": formulas.LIGHTEST, "float": 1e-6}
+"""Share of a reference load below which loads count as that, by precision: the range of numbers is short."""
+
+
+def _settled(cell: Any, reference: float, lightest: float) -> Any:
+    """Return the step of a cell with a fixed stiffness under a load (see `kernels.settle`)."""
+
+    def settled(law: Any, z: Any, u: Any, dt: Any, load: Any) -> Any:
+        factor = reference / xp.maximum(load, lightest)
+        new, traction = cell(law, within(law, times(factor, z)), u, factor * dt)
+        return times(1.0 / factor, new), traction
+
+    return settled
+
+
 def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     if model.patch.asymmetry is not None:
         raise InvalidValueError("model", "have no asymmetry", model.patch.asymmetry)
     numbers, law, size = model.compiled.numbers(), model.law.numbers, model.compiled.size
     more = max(count - model.patch.cells, 0)
     n = model.patch.cells + more
-    kind, cell, sliding = cells, distributed_step.cell, _sliding
+    kind, cell, sliding = cells, points.step, _sliding
     if size == 3:
         kind, sliding = disc_cells, discs.sliding if precision == "double" else _sliding_of_disc
         cell = _with(discs.step, sliding=sliding)
+    reference, by = model.compiled.reference, cells_rollout.BY
+    fixed = reference > 0.0
+    moved, by = (_settled(cell, reference, LIGHTEST[precision] * reference), (*by, "load")) if fixed else (cell, by)
+    given = ("dt", "normal_force") if fixed else ("dt",)
     lever = twin(kind.LEVERS if model.patch.anisotropic else kind.POSITIONS)
     names = (
         ["lever_xx", "lever_xy", "lever_yy", "lever_x", "lever_y"]
@@ -186,7 +210,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     def step(trace: Trace) -> Any:
         own = _vector(trace, *(f"{name}[k]" for name in names))
         u = lever.seen(own, _vector(trace, *_TWIST))
-        new, traction = twin(cell)(_law(trace, law), _state(trace, size, n), u, Number(trace, "dt"))
+        new, traction = twin(moved)(_law(trace, law), _state(trace, size, n), u, *_vector(trace, *given))
         return new, lever.wrench(own, traction)
 
     def steady(trace: Trace) -> Any:
@@ -198,13 +222,13 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
 
     def slopes(trace: Trace) -> Any:
         own = _vector(trace, *(f"{name}[k]" for name in names))
-        written = derive(cell, cells_rollout.BY, ("z", "u"))
+        written = derive(moved, by, ("z", "u"))
         forth, back = twin(written.forth), twin(written.back)
         u, none = lever.seen(own, _vector(trace, *_TWIST)), (0.0,) * size
-        (new, traction), tape = forth(_law(trace, law), _state(trace, size, n), u, Number(trace, "dt"))
+        (new, traction), tape = forth(_law(trace, law), _state(trace, size, n), u, *_vector(trace, *given))
         bars = [back(tape, (none, lever.seen(own, unit))) for unit in np.eye(3).tolist()]
         bars += [back(tape, (tuple(unit), none)) for unit in np.eye(size).tolist()]
-        kept = [cells_rollout.PARAMETERS.index(name) for name in _parameters(law)]
+        kept = [cells_rollout.PARAMETERS.index(name) for name in _parameters(law)] + [-1] * fixed
         rows = tuple((by_z, lever.wrench(own, by_u), *(by_law[i] for i in kept)) for by_z, by_u, *by_law in bars)
         return new, lever.wrench(own, traction), rows
 
@@ -215,7 +239,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
         rungs = len(ladder.rungs)
     else:
         tables["share"] = np.pad(model.patch.weights(), (0, more))
-    return Pieces(n, size, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes), rungs)
+    return Pieces(n, size, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes), rungs, fixed)
 
 
 def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
@@ -235,7 +259,8 @@ def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
     def step(trace: Trace) -> Any:
         new, out, dt = [0.0] * 3, [0.0] * 3, Number(trace, "dt")
         z, twist = _state(trace, 3, 1), _vector(trace, *_TWIST)
-        twin(moment_steps.step)(frame, hold, taped_step, contact(trace), z, twist, dt, new, out)
+        model = {"frame": frame, "hold": hold, "taped_step": taped_step}
+        twin(moment_steps.step)(contact(trace), z, twist, dt, new, out, **model)
         return tuple(new), tuple(out)
 
     def steady(trace: Trace) -> Any:
@@ -258,7 +283,8 @@ def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
         new, out, dt = [0.0] * 3, [0.0] * 39, Number(trace, "dt")
         z, twist = _state(trace, 3, 1), _vector(trace, *_TWIST)
         given = contact(trace), z, twist, dt, new, out
-        twin(moment_steps.slopes)(frame, twin(steps.MODEL.hold_slopes), taped_step, pull_back, True, *given)
+        model = {"frame": frame, "hold_slopes": twin(steps.MODEL.hold_slopes), "taped_step": taped_step}
+        twin(moment_steps.slopes)(*given, **model, pull_back=pull_back, whole=True)
         by_law = [tuple(getattr(each, name) for name in _parameters(law)) for each in laws]
         rows = [
             (*out[at + 18 : at + 21], *out[at : at + 3], bar) for at, bar in zip(range(3, 21, 3), by_law, strict=True)

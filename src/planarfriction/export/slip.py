@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction.export.c_source import Writer
-from planarfriction.kernels.trace import Block, Number, Table, Trace, traced
-from planarfriction.kernels.twins import twin
+from planarfriction.export.twins import twin
+from planarfriction.kernels.trace import Block, Mathematics, Number, Table, Trace, traced
 from planarfriction.limit_surface import LimitSurfaceTable
 from planarfriction.limit_surface.base import CERTIFIED
 from planarfriction.limit_surface.loops import twists
@@ -67,7 +67,8 @@ def slip_of(patch: ContactPatch, precision: str) -> Slip | None:
         table = StoredPotential(numbers, size, data, 0.0)
         lean, (axes, s) = twin(twists.lean_of)(frame), place(trace)
         evaluate = twin(twists.table_at)
-        return twin(twists.try_place)(evaluate, table, lean, axes, LIMITS[precision], s, [0.0] * 9)
+        found = twin(twists.try_place)(evaluate, table, lean, axes, LIMITS[precision], s, [0.0] * 9)
+        return found._replace(going=Mathematics.where(found.going, 1.0, 0.0))
 
     def end(trace: Trace) -> Any:
         (axes, s), twist = place(trace), [0.0] * 3

@@ -1,12 +1,23 @@
-"""Names and units of the columns of logs, as files, sensors and ROS messages write them."""
+"""Columns of the file of a log: names as files, sensors and ROS messages write them, units, what may be left out."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from planarfriction import validation
+from planarfriction.errors import FileError, InvalidValueError, shown
+
+TWIST = ("vx", "vy", "omega")
+MOTION = ("x", "y", "theta")
+WRENCH = ("fx", "fy", "tau")
+LOAD = ("normal_force",)
 
 ALIASES = {
     **{"time": "t", "time_s": "t", "t_s": "t", "wz": "omega"},
     **{"fn": "normal_force", "fz": "normal_force", "mz": "tau", "tz": "tau"},
+    **{"force": "fx", "velocity": "vx", "position": "x", "torque": "tau", "angle": "theta"},
 }
 """Other names of columns, in small letters."""
 
@@ -29,11 +40,89 @@ UNITS = {
 
 _MESSAGE = re.compile(r"(?:.*[./_])?(force|torque|linear|angular|position)[./_]([xyz])")
 
+_HEADING = re.compile(r"(?P<name>[^\[(]*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?")
 
-def column_name(heading: str) -> str:
+
+def find_columns(path: Path, headings: Sequence[str], *, contact: str | None, with_load: bool) -> dict[str, str]:
+    """Find the heading of each column of a log: `t`, twist or else motion, wrench, and normal force if it is there.
+
+    An angle beside a twist is found too: it shows if the twist is a mean (see `Log.held`). Names are read without
+    regard to case and may carry a unit in brackets; `ALIASES` are known. If columns are named "contact.vx", those of
+    `contact` are taken, or of the only contact that has them all.
+
+    Raises FileError for a column that is missing, that is there twice, or that has another unit.
+    """
+    named = _named(path, headings)
+    contacts = sorted({name.rpartition(".")[0] for name in named} - {""})
+    if contact is not None:
+        try:
+            contact = validation.choice("contact", contact, contacts)
+        except InvalidValueError as error:
+            raise FileError(f"{path}: {error}") from None
+    elif _missing(named, "", with_load):
+        whole = [each for each in contacts if not _missing(named, f"{each}.", with_load)]
+        if len(whole) > 1:
+            raise FileError(f"{path}: has the contacts {shown(', '.join(whole))}: choose one of them")
+        contact = whole[0] if whole else None
+    prefix = "" if contact is None else f"{contact}."
+    if missing := _missing(named, prefix, with_load):
+        raise FileError(
+            f"{path}: has no column {', '.join(missing)}; found {shown(', '.join(headings))}; needed t, "
+            f"{', '.join(TWIST)} (or {', '.join(MOTION)}), {', '.join((*WRENCH, *LOAD))}"
+        )
+    wanted = [name for name in (*_measured(named, prefix), *LOAD) if prefix + name in named]
+    found = {"t": named.get(f"{prefix}t") or named["t"], **{name: named[prefix + name] for name in wanted}}
+    for name, heading in found.items():
+        unit = _parts(heading)[1]
+        if unit is not None and unit.lower().replace(" ", "") not in UNITS[name]:
+            raise FileError(f"{path}: column {shown(repr(heading))} must be in SI units, got {shown(unit)}")
+    angle = named.get(f"{prefix}theta") or named.get("theta")
+    if angle is not None and (_parts(angle)[1] or "rad").strip().lower() == "rad":
+        found.setdefault("theta", angle)
+    return found
+
+
+def _named(path: Path, headings: Sequence[str]) -> dict[str, str]:
+    """Map names of columns to headings; an alias counts only where the name itself is missing."""
+    named: dict[str, str] = {}
+    for heading in headings:
+        name = _column_name(_parts(heading)[0])
+        if name in named:
+            raise FileError(f"{path}: columns {shown(repr(named[name]))} and {shown(repr(heading))} are the same")
+        if name:
+            named[name] = heading
+    for name in list(named):
+        prefix, dot, last = name.rpartition(".")
+        if last in ALIASES:
+            named.setdefault(prefix + dot + ALIASES[last], named[name])
+    return named
+
+
+def _column_name(heading: str) -> str:
     """Return the name of a column without its unit: "contact.vx" with a small vx, or that of a message's number."""
     message = _MESSAGE.fullmatch(heading.lower())
     if message is not None and ".".join(message.groups()) in MESSAGES:
         return MESSAGES[".".join(message.groups())]
     prefix, dot, name = heading.rpartition(".")
     return prefix + dot + name.lower()
+
+
+def _parts(heading: str) -> tuple[str, str | None]:
+    """Split a heading such as "vx [m/s]" into name and unit."""
+    match = _HEADING.fullmatch(heading)
+    return (heading, None) if match is None else (match["name"].strip(), match["unit"])
+
+
+def _measured(named: dict[str, str], prefix: str) -> Sequence[str]:
+    """Return the names of the columns of motion and wrench that a file should have: of one axis, if it has no other."""
+    there = {name for name in (*TWIST, *MOTION, *WRENCH) if prefix + name in named}
+    for speed, place, wrench in zip(TWIST, MOTION, WRENCH, strict=True):
+        if wrench in there and there <= {speed, place, wrench} and len(there) > 1:
+            return (speed if speed in there else place), wrench
+    return (*(MOTION if {*MOTION} <= there and not {*TWIST} <= there else TWIST), *WRENCH)
+
+
+def _missing(named: dict[str, str], prefix: str, with_load: bool) -> list[str]:
+    wanted = (*_measured(named, prefix), *(LOAD if with_load else ()))
+    lacking = [name for name in wanted if prefix + name not in named]
+    return [*([] if "t" in named or f"{prefix}t" in named else ["t"]), *lacking]

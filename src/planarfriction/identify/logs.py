@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.equality import ByValue
-from planarfriction.errors import FileError, InvalidValueError, shown
+from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.geometry import rotate
-from planarfriction.identify.columns import ALIASES, UNITS, column_name
+from planarfriction.identify.columns import LOAD, MOTION, TWIST, WRENCH, find_columns
 from planarfriction.reading import Table
 from planarfriction.scenes import Solution
 
@@ -29,17 +28,11 @@ MEAN = 1e-3
 """Largest error of an angle that is summed from means, as a share of that of the trapezoidal rule."""
 
 LEVER = 1e-9
-"""Torque over force [m] up to which the torque is rounding: no contact and no offset is as small as a nanometre."""
-
-TWIST = ("vx", "vy", "omega")
-MOTION = ("x", "y", "theta")
-WRENCH = ("fx", "fy", "tau")
-LOAD = ("normal_force",)
+"""Torque over force [m] up to which the torque is rounding, force over torque [1/m] or the largest force up to which a
+force is: no contact and no offset is as small as a nanometre."""
 
 AT_ONCE = 50_000
 """Number of samples that are differentiated together."""
-
-_HEADING = re.compile(r"(?P<name>[^\[(]*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?")
 
 TURN, QUARTER = 2.0 * np.pi, 0.5 * np.pi
 """One turn, and largest step of an angle, or change of its step, between two samples that shows the turns [rad]."""
@@ -104,9 +97,9 @@ class Log(ByValue):
 
     @property
     def channels(self) -> np.ndarray:
-        """Mask `[3]` of the measured ones of fx, fy, tau; a tau that is always 0, up to rounding, was not measured."""
+        """Mask `[3]` of the measured ones of fx, fy, tau: a channel that is always 0, up to rounding, was not."""
         largest = np.abs(self.wrench).max(axis=0)
-        return np.array([True, True, bool(largest[2] > LEVER * largest[:2].max())])
+        return largest > LEVER * largest.max()
 
     @property
     def interval(self) -> float:
@@ -160,11 +153,45 @@ class Log(ByValue):
         return cls(time, differentiated(time, motion, window=window), wrench, normal_force, name, turns)
 
     @classmethod
+    def from_axis(
+        cls,
+        time: ArrayLike,
+        force: ArrayLike,
+        normal_force: ArrayLike,
+        *,
+        velocity: ArrayLike | None = None,
+        position: ArrayLike | None = None,
+        axis: str = "x",
+        window: int = 7,
+        name: str = "log",
+    ) -> Log:
+        """Make a log of one coordinate: a slide with a force gauge, or with `axis="theta"` a joint with a torque.
+
+        `force` `[T]` is the friction on the moving body [N, or N m], against the motion: minus the pull of a gauge.
+        `velocity` `[T]` [m/s or rad/s] is used as it is; `position` `[T]` [m or rad] is differentiated over `window`
+        samples. The other coordinates stay at 0 and take no part in a fit.
+
+        Raises InvalidValueError unless one of the two is given, for wrong shapes, and for times that do not increase.
+        """
+        place = MOTION.index(validation.choice("axis", axis, MOTION))
+        if (velocity is None) == (position is None):
+            raise InvalidValueError("velocity", "be given, or position, and not both", "both or neither")
+        time = increasing(time)
+        motion, wrench = np.zeros((2, len(time), 3))
+        moved = ("velocity", velocity) if position is None else ("position", position)
+        motion[:, place] = validation.array(*moved, (len(time),))
+        wrench[:, place] = validation.array("force", force, (len(time),))
+        if position is None:
+            return cls(time, motion, wrench, normal_force, name)
+        return cls.from_motion(time, motion, wrench, normal_force, window=window, name=name)
+
+    @classmethod
     def from_csv(
         cls, path: str | Path, *, normal_force: float | None = None, window: int = 7, contact: str | None = None
     ) -> Log:
         """Read a log from a CSV file with a heading: columns t, vx, vy, omega (or x, y, theta), fx, fy, tau,
-        normal_force [SI].
+        normal_force [SI]. A file of one coordinate has only t, vx (or x) and fx, or `velocity` (or `position`) and
+        `force`, or omega (or theta) and tau: the others are 0, as in `from_axis`.
 
         Other columns and lines that begin with # are ignored, but for a theta of numbers beside the twist, which shows
         if that is `held`. `time` and `fn` are accepted for t and normal_force, capital letters for small ones, and
@@ -183,16 +210,22 @@ class Log(ByValue):
             normal_force = validation.non_negative("normal_force", normal_force)
         table = Table(path)
         found = find_columns(path, table.names, contact=contact, with_load=normal_force is None)
-        motion = TWIST if "vx" in found else MOTION
+        motion = TWIST if "vx" in found or "omega" in found else MOTION
         spare = [found["theta"]] if motion is TWIST and "theta" in found else []
         values = table.numbers(list(found.values()), spare)
-        columns, moved, wrench = dict(zip(found, values.T, strict=True)), values[:, 1:4], values[:, 4:7]  # no copies
+        columns = dict(zip(found, values.T, strict=True))
+        moved, wrench = values[:, 1:4], values[:, 4:7]  # no copies
+        if not {*WRENCH} <= found.keys():
+            moved, wrench = np.zeros((2, len(values), 3))
+            place = next(k for k, each in enumerate(WRENCH) if each in found)
+            motion = TWIST if TWIST[place] in found else MOTION
+            moved[:, place], wrench[:, place] = columns[motion[place]], columns[WRENCH[place]]
         loads = columns.get("normal_force")
         if loads is None:
             loads = np.array(normal_force)
         try:
             if motion is TWIST:
-                held = "theta" in found and is_mean(columns["t"], moved[:, 2], columns["theta"])
+                held = "theta" in found and "omega" in found and is_mean(columns["t"], moved[:, 2], columns["theta"])
                 return cls(columns["t"], moved, wrench, loads, path.stem, held=held)
             return cls.from_motion(columns["t"], moved, wrench, loads, window=window, name=path.stem)
         except InvalidValueError as error:
@@ -221,6 +254,13 @@ def as_logs(name: str, log: Log | Sequence[Log]) -> tuple[Log, ...]:
     if not logs or not all(isinstance(each, Log) for each in logs):
         raise InvalidValueError(name, "be a Log or a list of them", log)
     return logs
+
+
+def one_coordinate(logs: Sequence[Log]) -> bool:
+    """Return True if all logs have one wrench channel only, and move only along it."""
+    measured = np.any([log.channels for log in logs], axis=0)
+    moving = np.any([log.twist.any(axis=0) for log in logs], axis=0)
+    return bool(measured.sum() == 1 and not (moving & ~measured).any())
 
 
 def differentiated(time: ArrayLike, motion: ArrayLike, *, window: int = 7) -> np.ndarray:
@@ -309,79 +349,3 @@ def unwrapped(time: np.ndarray, angle: np.ndarray, name: str = "theta") -> tuple
             found = f"a step of {shown_steps[i]:.3g} at t = {time[i + 1]:g} s"
             raise InvalidValueError(f"{name} [rad]", rule, found)
     return angle - TURN * np.concatenate([[0.0], np.cumsum(turns)]), int(np.count_nonzero(turns))
-
-
-# ---------------------------------------------------------------------- columns of a file
-
-
-def find_columns(path: Path, headings: Sequence[str], *, contact: str | None, with_load: bool) -> dict[str, str]:
-    """Find the heading of each column of a log: `t`, twist or else motion, wrench, and normal force if it is there.
-
-    An angle beside a twist is found too: it shows if the twist is a mean (see `Log.held`). Names are read without
-    regard to case and may carry a unit in brackets; `ALIASES` are known. If columns are named "contact.vx", those of
-    `contact` are taken, or of the only contact that has them all.
-
-    Raises FileError for a column that is missing, that is there twice, or that has another unit.
-    """
-    named = _named(path, headings)
-    contacts = sorted({name.rpartition(".")[0] for name in named} - {""})
-    if contact is not None:
-        try:
-            contact = validation.choice("contact", contact, contacts)
-        except InvalidValueError as error:
-            raise FileError(f"{path}: {error}") from None
-    elif _missing(named, "", with_load):
-        whole = [each for each in contacts if not _missing(named, f"{each}.", with_load)]
-        if len(whole) > 1:
-            raise FileError(f"{path}: has the contacts {shown(', '.join(whole))}: choose one of them")
-        contact = whole[0] if whole else None
-    prefix = "" if contact is None else f"{contact}."
-    if missing := _missing(named, prefix, with_load):
-        raise FileError(
-            f"{path}: has no column {', '.join(missing)}; found {shown(', '.join(headings))}; needed t, "
-            f"{', '.join(TWIST)} (or {', '.join(MOTION)}), {', '.join((*WRENCH, *LOAD))}"
-        )
-    motion = _motion(named, prefix)
-    wanted = [name for name in (*motion, *WRENCH, *LOAD) if prefix + name in named]
-    found = {"t": named.get(f"{prefix}t") or named["t"], **{name: named[prefix + name] for name in wanted}}
-    for name, heading in found.items():
-        unit = _parts(heading)[1]
-        if unit is not None and unit.lower().replace(" ", "") not in UNITS[name]:
-            raise FileError(f"{path}: column {shown(repr(heading))} must be in SI units, got {shown(unit)}")
-    angle = named.get(f"{prefix}theta") or named.get("theta")
-    if angle is not None and (_parts(angle)[1] or "rad").strip().lower() == "rad":
-        found.setdefault("theta", angle)
-    return found
-
-
-def _named(path: Path, headings: Sequence[str]) -> dict[str, str]:
-    """Map names of columns to headings; an alias counts only where the name itself is missing."""
-    named: dict[str, str] = {}
-    for heading in headings:
-        name = column_name(_parts(heading)[0])
-        if name in named:
-            raise FileError(f"{path}: columns {shown(repr(named[name]))} and {shown(repr(heading))} are the same")
-        if name:
-            named[name] = heading
-    for name in list(named):
-        prefix, dot, last = name.rpartition(".")
-        if last in ALIASES:
-            named.setdefault(prefix + dot + ALIASES[last], named[name])
-    return named
-
-
-def _parts(heading: str) -> tuple[str, str | None]:
-    """Split a heading such as "vx [m/s]" into name and unit."""
-    match = _HEADING.fullmatch(heading)
-    return (heading, None) if match is None else (match["name"].strip(), match["unit"])
-
-
-def _motion(named: dict[str, str], prefix: str) -> Sequence[str]:
-    twist, motion = (all(prefix + name in named for name in names) for names in (TWIST, MOTION))
-    return MOTION if motion and not twist else TWIST
-
-
-def _missing(named: dict[str, str], prefix: str, with_load: bool) -> list[str]:
-    wanted = (*_motion(named, prefix), *WRENCH, *(LOAD if with_load else ()))
-    lacking = [name for name in wanted if prefix + name not in named]
-    return [*([] if "t" in named or f"{prefix}t" in named else ["t"]), *lacking]

@@ -35,8 +35,8 @@ def _surface(name: str, value: Any) -> type[LimitSurface]:
     return value
 
 
-def _bristles(_: str, value: Any) -> ElastoPlastic | float | None:
-    return LuGre(elasto_plastic=value).elasto_plastic
+def _bristles(_: str, value: Any) -> ElastoPlastic | float | str | None:
+    return value if value == "auto" else LuGre(elasto_plastic=value).elasto_plastic
 
 
 @described
@@ -63,7 +63,12 @@ class FitOptions(Checked):
     samples: int = checked(validation.count, 1000, default=20_000)
     """Most samples that a fit takes of all logs together: of longer logs, the windows that differ most are taken, and
     the result says so."""
-    elasto_plastic: ElastoPlastic | float | None = checked(_bristles, default=ElastoPlastic(0.9))
-    """Kind of bristles, unless a whole law is given as start."""
+    elasto_plastic: ElastoPlastic | float | str | None = checked(_bristles, default="auto")
+    """Kind of bristles, None for plain ones, unless a whole law is given as start. "auto" takes what fits better: plain
+    ones or a breakaway ratio of 0.9; and for logs at clearly different loads, a stiffness that grows with the load or
+    one that does not (`LuGre.reference_load`)."""
+    loss: str = checked(validation.choice, ("linear", "soft_l1"), default="linear")
+    """Loss of a residual: its square, or "soft_l1" as SciPy has it. A fit with the latter ends without samples off by
+    more than six times the noise, if these are fewer than a tenth."""
     surface: type[LimitSurface] = checked(_surface, default=LimitSurfaceTablePublished)
     """Class of the limit surface of the model "reduced-published"."""

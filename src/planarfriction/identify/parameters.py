@@ -66,8 +66,8 @@ ALL = {**LAW, **SHAPE, **SOFT_FINGER}
 USUAL = ("mu_c", "mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2", "contact_radius")
 """Parameters that `identify_lugre` estimates by default."""
 
-RADIUS, SECOND_MOMENT = PARAMETERS.index("contact_radius"), PARAMETERS.index("second_moment")
-"""Places of the numbers of the shape in the vector of a model."""
+STIFFNESS, RADIUS, SECOND_MOMENT = (PARAMETERS.index(each) for each in ("sigma_0", "contact_radius", "second_moment"))
+"""Places of the stiffness and of the numbers of the shape in the vector of a model."""
 
 PRIOR, SHAPE_PRIOR = 3.0, 1.0
 """Standard deviations a priori of logarithms (a factor of 20), of that of the Stribeck exponent and `mu_s/mu_c - 1`."""
@@ -176,6 +176,15 @@ def fitted_law(law: LuGre, given: Mapping[str, float]) -> LuGre:
     return dataclasses.replace(law, **fields)
 
 
+def bristles_of(law: LuGre, names: Sequence[str]) -> str:
+    """Return the kind of bristles of a law in words, of which `names` are estimated."""
+    kind = "plain bristles"
+    if isinstance(law.elasto_plastic, ElastoPlastic):
+        given = "" if "breakaway_ratio" in names else f" ({law.elasto_plastic.breakaway_ratio:g})"
+        kind = f"elasto-plastic bristles{given}"
+    return kind if law.reference_load is None else f"{kind} of a stiffness that does not grow with the load"
+
+
 def scaled_patch(patch: ContactPatch, scale: float, centre: Any = None) -> ContactPatch:
     """Return the patch times `scale` about its centre of pressure, its grid too, with that centre moved to `centre`.
 
@@ -196,10 +205,16 @@ def scaled_patch(patch: ContactPatch, scale: float, centre: Any = None) -> Conta
 
 
 class VectorMap:
-    """Map from values to the vector of the model at one load: the law directly, the shape through its constants."""
+    """Map from values to the vector of the model at one load: the law directly, the shape through its constants.
 
-    def __init__(self, names: Sequence[str], base: np.ndarray, patch: Any, normal_force: float):
+    A stiffness that holds at a `reference_load` is `sigma_0 reference_load/f_N` per unit load.
+    """
+
+    def __init__(
+        self, names: Sequence[str], base: np.ndarray, patch: Any, normal_force: float, reference: float | None = None
+    ):
         self.names, self.base, self.load = tuple(names), np.array(base, dtype=float), normal_force
+        self._stiffness = 1.0 if reference is None else reference / normal_force
         self._ratio = float(base[SECOND_MOMENT] / base[RADIUS] ** 2)
         self._finger = patch.pressure if any(name in SOFT_FINGER for name in names) else None
 
@@ -225,6 +240,8 @@ class VectorMap:
             for row, (moment, by) in zip((RADIUS, SECOND_MOMENT), moments, strict=True):
                 vector[row] = moment
                 slopes[row] += [by.get(name, 0.0) for name in self.names]
+        vector[STIFFNESS] *= self._stiffness
+        slopes[STIFFNESS] *= self._stiffness
         return vector, slopes
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -9,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from planarfriction.derivatives import PARAMETERS, parameters_of
-from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
 from planarfriction.identify.decimation import redrawn
+from planarfriction.identify.loads import check_loads, mean_load
 from planarfriction.identify.logs import Log
+from planarfriction.identify.loss import FEW, SPOILED, softened
 from planarfriction.identify.options import FitOptions
 from planarfriction.identify.parameters import RADIUS, Coordinates, VectorMap
 from planarfriction.identify.rig import Rig, as_measured, smoothed, wrench_noise
@@ -20,7 +22,7 @@ from planarfriction.identify.simulators import SIMULATORS, PartsPrediction, Pred
 from planarfriction.identify.uncertainty import covariance
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface.base import scaling
-from planarfriction.patch import ContactPatch, SoftFinger
+from planarfriction.patch import ContactPatch
 
 COARSE = 0.2
 """Largest error of an estimate from the size of the steps, as a share of its standard error."""
@@ -34,9 +36,6 @@ FINEST = 32
 NEARBY = 0.03
 """Change of the values, as a share, up to which derivatives are kept: it moves no estimate by more than this share of
 its standard error, as they decide on the way to the minimum, and meet residuals of noise there."""
-
-CONSTANT = 0.1
-"""Share by which the load of a log may stray from its mean if the patch changes with the load."""
 
 
 class Problem:
@@ -135,7 +134,7 @@ class LogProblem(Problem):
         self.logs, self.patch, self.names, self.law = logs, patch, names, law
         self.options, self.model, self.progress = options, model, progress
         loads = [mean_load(log) for log in logs]
-        _check(logs, loads, patch, [name for name in names if name in known.SOFT_FINGER])
+        check_loads(logs, loads, patch, law, [name for name in names if name in known.SOFT_FINGER])
         self.reference_load = float(np.median(loads))
         self.fixed_patch = patch
         if patch.depends_on_load:
@@ -146,18 +145,24 @@ class LogProblem(Problem):
         self.twists = [smoothed(log) if "twist" in options.nuisance else as_measured(log) for log in logs]
         # A log at rest has no sample before its first step; its first wrench shows bristles that nobody knows.
         self.used = [log.inner[1 if options.begins == "rest" else 0 :] for log in logs]
-        self.simulator = SIMULATORS[model](self.fixed_patch, law, options.surface)
+        self.simulator = SIMULATORS[model](self.fixed_patch, self._per_load, options.surface)
         self.steps = options.refine or 1
         self.predictions = self._predictions(self.steps)
         self._shown: tuple[np.ndarray, list[np.ndarray]] | None = None
         self._slopes: tuple[np.ndarray, list[np.ndarray]] | None = None
 
+    @property
+    def _per_load(self) -> LuGre:
+        """The law with a stiffness per load; at the constant load of a log it is one, whatever it does else."""
+        return dataclasses.replace(self.law, reference_load=None)
+
     def _maps(self, loads: Sequence[float]) -> list[VectorMap]:
         """Make the map from values to the vector of the model at the load of each log."""
         patch = self.patch
-        base = parameters_of(SIMULATORS["reduced-published"].model(self.fixed_patch, self.law, self.options.surface))
+        surface = self.options.surface
+        base = parameters_of(SIMULATORS["reduced-published"].model(self.fixed_patch, self._per_load, surface))
         self.base = dict(zip(PARAMETERS, base.tolist(), strict=True))
-        maps = [VectorMap(self.names, base, patch, load) for load in loads]
+        maps = [VectorMap(self.names, base, patch, load, self.law.reference_load) for load in loads]
         for each, load in zip(maps, loads, strict=True):
             if patch.depends_on_load and not any(name in known.SOFT_FINGER for name in self.names):
                 x, y = patch.centre_of_pressure(load)
@@ -203,7 +208,7 @@ class LogProblem(Problem):
         """
         if self.options.refine is not None or self.steps >= FINEST:
             return False
-        residual, jacobian = self.linearised(values, sigma)
+        jacobian, residual = self.linearised(values, sigma)[1], self.distances(values, sigma)
         twice = self._scaled(self.shown(values, self._predictions(2 * self.steps)), sigma)
         count = len(self.names)
         pull = np.diag(1.0 / self.rig.widths)
@@ -256,7 +261,22 @@ class LogProblem(Problem):
         both = zip(self._slopes[1], self.logs, self.used, sigma, strict=True)
         rows = [(slope * (log.channels / each)[..., None])[used] for slope, log, used, each in both]
         jacobian = np.concatenate([each.reshape(-1, each.shape[-1]) for each in rows])
-        return self._scaled(self.shown(values), sigma), jacobian
+        residual = self.distances(values, sigma)
+        if self.options.loss == "linear":
+            return residual, jacobian
+        residual, slopes = softened(residual)
+        return residual, slopes[:, None] * jacobian
+
+    def slopes_of(
+        self, names: Sequence[str], held: np.ndarray, values: np.ndarray, sigma: Sequence[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Compute the residuals `[M]` at `values`, and derivatives `[M, H]` by `names` of the law, `held` at these."""
+        wide = copy.copy(self)
+        wide.names, wide._slopes, wide._shown = (*self.names, *names), None, None
+        wide.maps = wide._maps([each.load for each in self.maps])
+        count = len(self.names)
+        residual, slopes = wide.linearised(np.concatenate([values[:count], held, values[count:]]), sigma)
+        return residual, slopes[:, count : count + len(names)]
 
     def _near(self, values: np.ndarray, others: np.ndarray) -> bool:
         """Return True if no value differs by more than `NEARBY` from another one, as a share of its size."""
@@ -283,15 +303,18 @@ class LogProblem(Problem):
         self._shown, self._slopes = (values.copy(), [*shown]), (values.copy(), [*slopes])
 
     def residual(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> np.ndarray:
-        """Compute the residuals over `sigma`, `[M]`."""
+        """Compute the residuals over `sigma`, `[M]`, as the loss counts them."""
+        residual = self.distances(values, sigma)
+        return residual if self.options.loss == "linear" else softened(residual)[0]
+
+    def distances(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> np.ndarray:
+        """Compute the residuals over `sigma`, `[M]`, whatever the loss."""
         return self._scaled(self.shown(values), sigma)
 
     def _scaled(self, wrenches: Sequence[np.ndarray], sigma: Sequence[np.ndarray]) -> np.ndarray:
         """Subtract the measured wrenches and divide by `sigma`; returns all used samples flat."""
-        both = zip(wrenches, self.logs, self.used, sigma, strict=True)
-        return np.concatenate(
-            [((wrench - log.wrench) * (log.channels / each))[used].ravel() for wrench, log, used, each in both]
-        )
+        rows = zip(self._apart(wrenches, sigma), self.used, strict=True)
+        return np.concatenate([each[used].ravel() for each, used in rows])
 
     def even_sigma(self, noise: np.ndarray) -> list[np.ndarray]:
         return [np.broadcast_to(noise, log.wrench.shape) for log in self.logs]
@@ -301,7 +324,17 @@ class LogProblem(Problem):
         if self.options.noise is None:
             both = zip(self.shown(values), self.logs, strict=True)
             noise = wrench_noise(self.logs, [shown - log.wrench for shown, log in both])
-        return noise, self.sigma(values, noise)
+        sigma = self.sigma(values, noise)
+        if self.options.loss != "linear":
+            spoiled = [np.abs(each) > SPOILED for each in self._apart(self.shown(values), sigma)]
+            if sum(each.sum() for each in spoiled) < FEW * self.numbers:
+                sigma = [np.where(out, np.inf, each) for out, each in zip(spoiled, sigma, strict=True)]
+        return noise, sigma
+
+    def _apart(self, wrenches: Sequence[np.ndarray], sigma: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Subtract the measured wrenches and divide by `sigma`, `[T, 3]` of each log."""
+        both = zip(wrenches, self.logs, sigma, strict=True)
+        return [(wrench - log.wrench) * (log.channels / each) for wrench, log, each in both]
 
     def sigma(self, values: np.ndarray, noise: np.ndarray) -> list[np.ndarray]:
         """Compute the standard deviation `[T, 3]` of each log's residuals from the noise `[3]` and that of the twist.
@@ -361,28 +394,3 @@ class LogProblem(Problem):
             scaled = twist.values @ scaling(centre, vector["contact_radius"]).T
             result.append((np.linalg.norm(scaled, axis=1), np.abs(scaled[:, 2])))
         return result
-
-
-def mean_load(log: Log) -> float:
-    """Return the mean of the loads > 0 of a log [N], or raise InvalidValueError."""
-    loaded = log.normal_force[log.normal_force > 0.0]
-    if not len(loaded):
-        raise InvalidValueError(f"normal_force of {log.name}", "be > 0 somewhere", "0 everywhere")
-    return float(loaded.mean())
-
-
-def _check(logs: Sequence[Log], loads: Sequence[float], patch: ContactPatch, names: Sequence[str]) -> None:
-    """Check that a fit can take the logs and their mean loads on a patch, and estimate `names` of a soft finger."""
-    if names and not isinstance(patch.pressure, SoftFinger):
-        raise InvalidValueError("patch", f"have a SoftFinger pressure to estimate {', '.join(names)}", patch.name)
-    for name in ("k", "k_per_newton"):
-        if name in names and getattr(patch.pressure, name) is None:
-            raise InvalidValueError("parameters", f"contain {name} only if the SoftFinger has it", name)
-    for log in logs:
-        if not log.wrench.any():
-            raise InvalidValueError(f"wrench of {log.name}", "not be 0 throughout", "0 in every sample")
-    for log, load in zip(logs, loads, strict=True):
-        if patch.depends_on_load and np.abs(log.normal_force / load - 1.0).max() > CONSTANT:
-            rule = "stay within 10 % of its mean if the patch changes with the load (make one log for each load)"
-            found = f"{log.normal_force.min():g} .. {log.normal_force.max():g} N"
-            raise InvalidValueError(f"normal_force of {log.name}", rule, found)

@@ -59,7 +59,7 @@ class Identification(ByValue):
     rig: tuple[Nuisance, ...] = ()
     """Estimated disturbances of the rig: delay, zeros, drift of the load cell, noise of the twist."""
     scores: tuple[ModelScore, ...] = ()
-    """The models that were fitted."""
+    """The models and kinds of bristles that were fitted; the chosen one first."""
     chosen: str = ""
     """Name of the model that explains the data best."""
     samples: tuple[int, int] = (0, 0)
@@ -143,37 +143,30 @@ class Identification(ByValue):
         lines += [f"{_sentence(each.reason)}" for each in self.verdicts if each.parameter == "fit"]
         return "\n".join(textwrap.fill(line, WIDTH) for line in lines)
 
-    def rows(self) -> list[list[str]]:
-        """Return a row of text for each parameter: name, estimate, standard error, 95 % interval, unit, verdict."""
-        rows, intervals = [], self.intervals()
-        for name, value, error in zip(self.names, self.values, self.standard_errors, strict=True):
-            low, high = intervals[name]
-            known = np.isfinite(error) and error < 1e3 * max(abs(value), 1e-12)
-            shown, remark = f"{low:.4g} .. {high:.4g}", self._remark(name)
-            shown, remark = (shown, remark) if self.identifiable(name) else ("", f"not identifiable, {remark}")
-            rows.append([name, f"{value:.5g}", f"{error:.2g}" if known else "unknown", shown, ALL[name].unit, remark])
-        return rows
-
     def _remark(self, name: str) -> str:
         return "; ".join(each.reason for each in self.verdicts if each.parameter == name)
 
     def table(self) -> str:
-        """Return the summary and a table in 80 columns: estimates, 95 % intervals, cautions, and the rig."""
+        """Return a table in 80 columns: estimates with errors and 95 % intervals, then the verdicts and the rig."""
         lines, remarks, intervals = [], [], self.intervals()
-        for name, value in zip(self.names, self.values, strict=True):
+        for name, value, error in zip(self.names, self.values, self.standard_errors, strict=True):
             low, high = intervals[name]
             shown = f"{low:.4g} .. {high:.4g}" if self.identifiable(name) else "not identifiable"
-            lines.append(f"{name:<16}{value:>11.5g}   {shown:<26}{ALL[name].unit}".rstrip())
+            spread = f"{error:.2g}" if error < 1e3 * max(abs(value), 1e-12) else "unknown"
+            lines.append(f"{name:<15}{value:>10.5g} +/- {spread:<10}{shown:<25}{ALL[name].unit}".rstrip())
             if reasons := self._remark(name):
                 remarks.append(textwrap.fill(f"{name}: {reasons}", WIDTH, subsequent_indent="  "))
-        heading = f"{'parameter':<16}{'estimate':>11}   {'95 % interval':<26}unit"
+        heading = f"{'parameter':<15}{'estimate':>10} +/- {'error':<10}{'95 % interval':<25}unit"
+        if self.scores:
+            samples = f"{self.samples[0]:,} samples, {len(self.names)} parameters"
+            lines.append(f"reduced chi-square {self.scores[0].reduced_chi2:.4g} ({samples})")
         rig = [
             f"{_short(each):<27}{each.value:>11.3g}   {each.interval[0]:.3g} .. {each.interval[1]:.3g} {each.unit}"
             for each in self.rig
         ]
         blocks = [
-            self.summary(),
             "\n".join([heading, *lines]),
+            self.summary(),
             "\n".join(remarks),
             "\n".join(["Disturbances of the rig:", *rig]),
         ]

@@ -27,7 +27,7 @@ DELAY, LONGEST = 0.01, 0.05
 
 BIAS, ZERO_DRIFT, LEAST_FORCE = 0.1, 0.05, 1e-3
 """Standard deviations of the zeros and of their drift a priori, as shares of the largest value of the channel, and
-least value that a force channel counts as, also if it stays at 0, as a share of the largest force."""
+least value that a force channel counts as, as a share of the largest force."""
 
 SCALE, DRIFT = 0.005, (0.05, 0.02, 0.02)
 """Standard deviations of the scale of a calibrated load cell [-], and of its drift by degree [-]; the first of these is
@@ -150,9 +150,12 @@ class Rig:
         drift = max(0.5 * float(np.ptp(self._effects(i)[0] @ values)) for i in range(len(self.logs)))
         return np.where(self._scale, np.hypot(SCALE, drift / EDGE), self.widths)
 
-    def strain(self, values: np.ndarray) -> float:
-        """Compute the scale of the load cell over its width: friction does not show this scale."""
-        return float(np.abs(values / self.with_drift(values))[self._scale].max(initial=0.0))
+    def strains(self, values: np.ndarray) -> list[tuple[float, str]]:
+        """Return the size of each value `[K]` over its width and in words, the largest first."""
+        sizes, words = np.abs(values / self.with_drift(values)), []
+        for column, value in zip(self.columns, values, strict=True):
+            words.append(f"{column.name} {value:.2g} {column.unit}".removesuffix(" -"))
+        return sorted(zip(sizes.tolist(), words, strict=True), reverse=True)
 
     def found(self, values: np.ndarray, errors: np.ndarray) -> tuple[Nuisance, ...]:
         """Return the estimates `[K]` with their standard errors `[K]` as records."""

@@ -22,8 +22,11 @@ EXCESS = 1.25
 """Largest reduced chi-square that is still put down to the estimate of the noise."""
 
 CHANCE = 4.0
-"""Standard deviations of the reduced chi-square, for independent residuals, that are put down to chance; and of the
-scale of the load cell."""
+"""Standard deviations of the reduced chi-square, for independent residuals, that are put down to chance."""
+
+STRAIN, HELD_OUT = 3.0, 3.0
+"""Standard deviations a priori of a disturbance of the rig, and root mean square of held-out residuals over the noise,
+above which a fit is rejected."""
 
 BLOCKS, FOLDS = 20, 5
 """Number of blocks that each log is cut into, every fifth of which is held out in turn."""
@@ -47,12 +50,14 @@ class Uncertainty:
     """Covariance of the values of contact and rig, `[F + K, F + K]`."""
     jacobian: np.ndarray
     """Derivatives of the scaled residuals with respect to the values, `[M, F + K]`."""
+    pull: np.ndarray
+    """Derivatives of the pulls to the starts with respect to the values, `[F + K, F + K]`."""
     reduced_chi2: float
     """Mean square of the residuals over that of the noise [-]."""
     limit: float
     """Largest reduced chi-square for which the fit is not rejected."""
-    strain: float
-    """Scale of the load cell over its standard deviation a priori [-]."""
+    strains: list[tuple[float, str]]
+    """Disturbances of the rig over their standard deviations a priori [-], and in words; the largest first."""
     neighbours: float
     """Correlation of residuals one sample apart [-]."""
     held_out: np.ndarray
@@ -62,8 +67,13 @@ class Uncertainty:
 
     @property
     def rejected(self) -> bool:
-        """True if the fit leaves more than the noise, or avoids that only by a load cell that no rig has."""
-        return bool(self.reduced_chi2 > self.limit or self.strain > CHANCE)
+        """True if the fit leaves more than the noise, here or in held-out parts, or asks for a rig that nobody has."""
+        return bool(self.reduced_chi2 > self.limit or self.score > HELD_OUT or self.strain > STRAIN)
+
+    @property
+    def strain(self) -> float:
+        """Largest disturbance of the rig over its standard deviation a priori [-]."""
+        return self.strains[0][0] if self.strains else 0.0
 
     @property
     def score(self) -> float:
@@ -91,9 +101,10 @@ def uncertainty(fit: Fit) -> Uncertainty:
     return Uncertainty(
         whole * ALLOWANCE**2,
         jacobian,
+        pull,
         reduced_chi2,
         EXCESS + CHANCE * np.sqrt(2.0 / measured),
-        problem.rig.strain(fit.values[count:]),
+        problem.rig.strains(fit.values[count:]),
         neighbours,
         *_held_out(fit, residual, jacobian, pull),
     )

@@ -6,17 +6,20 @@ Each rule names the parameter and what is missing in the data.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from planarfriction.described import described
 from planarfriction.identify.decimation import samples_of
+from planarfriction.identify.held import Pull
 from planarfriction.identify.logs import Log
-from planarfriction.identify.parameters import ALL, SOFT_FINGER
+from planarfriction.identify.loss import SPOILED
+from planarfriction.identify.parameters import ALL, SOFT_FINGER, bristles_of
+from planarfriction.identify.rig import CHANNELS
 from planarfriction.identify.search import Fit
-from planarfriction.identify.uncertainty import Uncertainty
+from planarfriction.identify.uncertainty import HELD_OUT, STRAIN, Uncertainty
 
 TWO_SIDED = 1.96
 """Standard errors on either side of the estimate that hold 95 % of a normal distribution."""
@@ -44,6 +47,13 @@ load below which there is one load only."""
 
 SLIPPED = 12.0
 """Growth of the cost (half the sum of squares) without slip below which the data hold none: 5 standard errors."""
+
+LEANING, MOVED = 2.0, 2.0
+"""Standard deviations a priori of a disturbance above which a fit leans on it, and standard errors by which a held
+parameter that the residuals deny may move an estimate."""
+
+SAME = 1.001
+"""Ratio of mu_s to mu_c below which they are the same."""
 
 CORRELATED = 0.3
 """Correlation of neighbouring residuals above which they are no noise."""
@@ -104,16 +114,19 @@ class ModelScore:
 
     model: str
     """Name of the model, as `identify_lugre` takes it."""
+    bristles: str
+    """Its kind of bristles, in words."""
     held_out: float
     """Root mean square of the residuals of held-out parts over the noise [-]; 1 is noise alone."""
-    held_out_error: float
-    """Standard error of `held_out`, from part to part [-]."""
     reduced_chi2: float
     """Mean square of the residuals over that of the noise [-]."""
     rejected: bool
     """True if the fit leaves more than noise."""
     estimates: dict[str, float]
     """Estimates of the parameters by name [SI]."""
+
+    def __str__(self) -> str:
+        return f"{self.model} with {self.bristles}"
 
 
 @dataclass(frozen=True)
@@ -126,19 +139,37 @@ class Candidate:
     @property
     def score(self) -> ModelScore:
         """Measures of how well the model explains the data."""
-        problem = self.fit.problem
-        u = self.uncertainty
-        error = float(np.std(u.held_out) / np.sqrt(max(len(u.held_out) - 1, 1)))
-        return ModelScore(problem.model, u.score, error, u.reduced_chi2, u.rejected, problem.by_name(self.fit.values))
+        problem, u = self.fit.problem, self.uncertainty
+        scores = u.score, u.reduced_chi2, u.rejected
+        return ModelScore(
+            problem.model, bristles_of(problem.law, problem.names), *scores, problem.by_name(self.fit.values)
+        )
+
+    def cost(self, sigma: list[np.ndarray]) -> float:
+        """Compute half the sum of the squared residuals over `sigma` `[T, 3]` of each log, and of the pulls."""
+        fit = self.fit
+        pull = fit.coordinates.prior(fit.x)[0]
+        return 0.5 * float((fit.problem.residual(fit.values, sigma) ** 2).sum() + (pull**2).sum())
 
 
-def dependence(name: str, interval: tuple[float, float], chosen: ModelScore, others: Sequence[ModelScore]) -> str:
-    """Return a text if another model that is not rejected has an estimate outside the interval, or nothing."""
+def dependence(name: str, interval: tuple[float, float], others: Sequence[ModelScore]) -> str:
+    """Return a text if one of the `others`, which also fit, has an estimate outside the interval, or nothing."""
     low, high = interval
     for other in others:
-        if other.model != chosen.model and not other.rejected and not low <= other.estimates[name] <= high:
-            return f"depends on the model: {other.model}, which also fits, gives {other.estimates[name]:.3g}"
+        if not low <= other.estimates[name] <= high:
+            return f"depends on the model: {other}, which also fits, gives {other.estimates[name]:.3g}"
     return ""
+
+
+def rivals(best: Candidate, candidates: Sequence[Candidate]) -> list[ModelScore]:
+    """Return the other models that fit: none is rejected, and bristles of another kind come close to the best ones."""
+    least = best.cost(best.fit.sigma)
+    return [
+        each.score
+        for each in candidates
+        if each is not best and not each.uncertainty.rejected
+        and (each.score.model != best.score.model or each.cost(best.fit.sigma) < least + SLIPPED)
+    ]  # fmt: skip
 
 
 # ---------------------------------------------------------------------- rules
@@ -166,12 +197,21 @@ class Evidence:
     """Part of the sliding speeds that comes from spin, `r |omega|` [m/s]."""
     loads: np.ndarray
     """Normal force of each log [N]."""
-    torque: bool = True
-    """True if any log has measured torques."""
+    measured: np.ndarray = field(default_factory=lambda: np.full(3, True))
+    """Mask of the measured ones of fx, fy, tau, `[3]`."""
+    spoiled: int = 0
+    """Number of samples that no noise explains."""
+    robust: bool = False
+    """True if these count little."""
     without_slip: float = np.inf
     """Growth of the cost if the contact may not slip at all."""
     largest_coefficient: float = np.inf
     """Largest friction over load that was fitted [-]."""
+
+    @property
+    def torque(self) -> bool:
+        """True if any log has measured torques."""
+        return bool(self.measured[2])
 
     def value(self, name: str, otherwise: float) -> float:
         """Return the estimate of a parameter, or `otherwise` if it was not estimated."""
@@ -185,28 +225,28 @@ class Evidence:
 
 
 def judge(
-    evidence: Evidence, best: Candidate, candidates: Sequence[Candidate], skipped: Sequence[str]
+    evidence: Evidence, best: Candidate, candidates: Sequence[Candidate], skipped: Sequence[str], held: Sequence[Pull]
 ) -> tuple[Verdict, ...]:
     """Return the verdicts on the fit, then on all parameters: if it is rejected, none of them is identifiable."""
-    u, chosen, scores = best.uncertainty, best.score, [each.score for each in candidates]
+    u, chosen, others = best.uncertainty, best.score, rivals(best, candidates)
     verdicts = [Verdict("fit", not u.rejected, _on_fit(u, chosen))]
-    if len(scores) > 1:
-        others = sorted((each for each in scores if each.model != chosen.model), key=lambda each: each.held_out)
-        rest = ", ".join(f"{o.model} {o.held_out:.3g} ({o.held_out - chosen.held_out:+.2g})" for o in others)
-        text = f"{chosen.model} predicts held-out parts best, to {chosen.held_out:.3g} times the noise; {rest}"
+    if len(candidates) > 1:
+        scores = sorted((each.score for each in candidates if each is not best), key=lambda each: each.held_out)
+        rest = ", ".join(f"{each} {each.held_out:.3g}" for each in scores)
+        text = f"it predicts held-out parts to {chosen.held_out:.3g} times the noise; {rest}"
         verdicts.append(Verdict("fit", True, text))
+    verdicts += _on_data(evidence, u) + [Verdict("fit", each.agrees, str(each)) for each in held]
     if skipped:
         text = f"{', '.join(skipped)}: not tried, would take minutes (choose it as model)"
-        verdicts.append(Verdict("fit", True, text))
-    if not evidence.torque:
-        text = "tau is 0 throughout, as without a torque sensor: the estimates use the force alone"
         verdicts.append(Verdict("fit", True, text))
     for i, name in enumerate(evidence.names):
         verdict = judge_parameter(evidence, i)
         if verdict is None or verdict.identifiable:
             low, high = interval(name, evidence.values[i], evidence.errors[i])
             meaningless = f"{chosen.model} does not explain the data, so this value has no meaning"
-            if reason := meaningless if u.rejected else dependence(name, (low, high), chosen, scores):
+            denied = [each for each in held if not each.agrees and abs(each.moves[i]) > MOVED * evidence.errors[i]]
+            resting = f"{denied[0].name}, held, would move it by {denied[0].moves[i]:+.2g}" if denied else ""
+            if reason := meaningless if u.rejected else resting or dependence(name, (low, high), others):
                 verdict = Verdict(name, False, reason)
         if verdict is not None:
             verdicts.append(verdict)
@@ -217,15 +257,41 @@ def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
     """Put the test of the fit into words."""
     size = np.sqrt(u.reduced_chi2)
     if not u.rejected:
-        return f"{chosen.model} explains the data: its residuals are {size:.2f} times the noise of the sensors"
-    text = f"it fits only with a load cell that is off by {u.strain:.0f} times the usual error"
+        return f"{chosen} explains the data: its residuals are {size:.2f} times the noise of the sensors"
+    text = []
     if u.reduced_chi2 > u.limit:
-        text = f"its residuals are {size:.2f} times the noise of the sensors, and "
-        text += f"chance explains at most {np.sqrt(u.limit):.2f}"
+        most = f"chance explains at most {np.sqrt(u.limit):.2f}"
+        text.append(f"its residuals are {size:.2f} times the noise of the sensors, and {most}")
+    if u.score > HELD_OUT:
+        text.append(f"it misses parts that it did not see by {u.score:.1f} times the noise")
+    if u.strain > STRAIN:
+        text.append(f"it needs {u.strains[0][1]}, {u.strain:.1f} times the usual error of a rig")
     if u.neighbours > CORRELATED:
-        text += f", and neighbouring residuals are correlated ({u.neighbours:.2f})"
+        text.append(f"neighbouring residuals are correlated ({u.neighbours:.2f})")
     cause = "the patch, the kind of bristles or the measurement is wrong"
-    return f"{chosen.model} is rejected: {text}; {cause}, and the intervals are only a rough guide"
+    return f"{chosen} is rejected: {', and '.join(text)}; {cause}, and the intervals are only a rough guide"
+
+
+def _on_data(evidence: Evidence, u: Uncertainty) -> list[Verdict]:
+    """Return cautions: disturbances that a fit leans on, channels that were not measured, spoiled samples, one load."""
+    found = []
+    if leaning := [f"{words} ({size:.1f})" for size, words in u.strains if size > LEANING]:
+        text = f"the fit needs large disturbances of the rig: {', '.join(leaning)} (times the usual error)"
+        found.append(Verdict("fit", True, text))
+    if not evidence.measured.all():
+        missing = [name for (name, _), seen in zip(CHANNELS, evidence.measured, strict=True) if not seen]
+        text = f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} 0 throughout"
+        text += ", as without a sensor: the estimates use the other channels alone"
+        found.append(Verdict("fit", True, text))
+    if evidence.spoiled:
+        text = f"{evidence.spoiled} values are off by more than {SPOILED:g} times the noise"
+        end = "they were left out" if evidence.robust else 'the loss "soft_l1" would leave them out'
+        found.append(Verdict("fit", True, f"{text}: {end}"))
+    if "sigma_0" in evidence.names and evidence.loads.max() < ONE_LOAD * evidence.loads.min():
+        stiffness = evidence.value("sigma_0", 0.0) * float(np.median(evidence.loads))
+        text = f"one load only: sigma_0 f_N = {stiffness:.3g} N/m is known, not if the stiffness grows with the load"
+        found.append(Verdict("fit", True, text))
+    return found
 
 
 def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
@@ -235,6 +301,11 @@ def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
     if name in ("mu_c", "mu_s", "v_s", "gamma") and evidence.without_slip < SLIPPED:
         text = f"the contact never slips, friction reaches {evidence.largest_coefficient:.2g} of the load"
         return Verdict(name, False, text)
+    if name == "mu_s" and "mu_c" in evidence.names:
+        c = evidence.names.index("mu_c")
+        if not evidence.errors[c] < VAGUE * evidence.values[c] and not evidence.at_bound[c]:
+            text = "mu_c is unknown, as no sample is much faster than v_s, so that this may be mu_c"
+            return Verdict(name, False, text)
     rests_on_zero = kind.low == 0.0 and value <= 1e-6 and not kind.logarithmic
     if evidence.at_bound[i] and not rests_on_zero:
         return _on_bound(evidence, i)
@@ -295,7 +366,7 @@ def _no_stribeck(evidence: Evidence) -> str:
 
 def _on_bound(evidence: Evidence, i: int) -> Verdict:
     name = evidence.names[i]
-    if name == "mu_s":
+    if name == "mu_s" and evidence.values[i] <= SAME * evidence.value("mu_c", float(evidence.values[i])):
         reason = speed_gap(evidence.speeds, evidence.value("v_s", 1e-3)) or "no friction above mu_c was seen"
         return Verdict(name, False, f"{reason}: equal to mu_c")
     return Verdict(name, False, f"the fit ran into the bound {evidence.values[i]:.3g} {ALL[name].unit}")

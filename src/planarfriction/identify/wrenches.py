@@ -14,10 +14,13 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
 from planarfriction.identify.checks import check_logs, size_of, with_findings
 from planarfriction.identify.decimation import decimated, samples_of
-from planarfriction.identify.logs import Log, as_logs
+from planarfriction.identify.held import pulls_of_held
+from planarfriction.identify.loads import mean_load, steady_loads
+from planarfriction.identify.logs import Log, as_logs, one_coordinate
+from planarfriction.identify.loss import SPOILED
 from planarfriction.identify.options import FitOptions
 from planarfriction.identify.parameters import fitted_law, scaled_patch
-from planarfriction.identify.problem import LogProblem, mean_load
+from planarfriction.identify.problem import LogProblem
 from planarfriction.identify.result import Identification
 from planarfriction.identify.rig import CHANNELS, Nuisance, first_noise
 from planarfriction.identify.search import guess_starts, interruptible, multistart, refine, warm_start
@@ -32,8 +35,19 @@ from planarfriction.patch.metric import refuse_anisotropy
 START_MU_S = 1.2
 """Static coefficient that a search starts with by default: above `mu_c`, free to move."""
 
-USUAL_EVALUATIONS, PATIENCE = 60, 120.0
-"""Number of evaluations of a search, and the time [s] that "auto" has for one of its models."""
+USUAL_EVALUATIONS, PATIENCE, SOON = 60, 120.0, 20.0
+"""Number of evaluations of a search, the time [s] that "auto" has for one of its models, and that from which on a model
+that was chosen takes windows of its logs."""
+
+LEAD = next(iter(SIMULATORS))
+"""Name of the quickest model, which finds where the others begin."""
+
+TWO_LOADS, WORSE = 1.2, 2.0
+"""Ratio of the loads of logs above which they show if the stiffness grows with the load, and ratio of the costs of two
+kinds of bristles above which other models do without the worse one."""
+
+USUAL_BRISTLES = ElastoPlastic(0.9)
+"""Bristles that "auto" compares with plain ones."""
 
 NO_SLIP = 50.0
 """Factor on the friction coefficients that keeps any contact from slipping."""
@@ -64,7 +78,8 @@ def identify_lugre(
         load of each log must be constant.
     parameters
         Names of what to estimate: fields of `LuGre`, `breakaway_ratio`, `contact_radius`, `centre_x`, `centre_y`, and
-        `c`, `n`, `k` or `k_per_newton` of a `SoftFinger`. All others keep the values of `start`.
+        `c`, `n`, `k` or `k_per_newton` of a `SoftFinger`. All others keep the values of `start`. Of the usual ones,
+        logs of one coordinate leave out the contact radius, which they do not show.
     model
         "reduced-published", "reduced", "distributed", or "auto": the one of them that predicts held-out parts best;
         models whose fit would take minutes are left out.
@@ -84,37 +99,57 @@ def identify_lugre(
         Ctrl-C, with the best values so far.
     """
     logs, names = as_logs("log", log), known.check_names(parameters)
+    if names == known.USUAL and one_coordinate(logs):
+        names = tuple(name for name in names if name != "contact_radius")
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
     refuse_anisotropy(patch, "identify_lugre")
     models = _models_to_fit(validation.choice("model", model, ("auto", *SIMULATORS)), patch, names)
     validation.instance("options", options, FitOptions, "a FitOptions record")
-    law, given = _start_law(start, options.elasto_plastic)
+    kinds, given = _start_laws(start, options.elasto_plastic, names)
     findings = check_logs(logs, patch, names)
     whole, logs = logs, decimated(logs, size_of(logs[0], patch), options.samples)
     noise = first_noise(logs) if options.noise is None else np.array(options.noise)
-    # The quickest model leads: it finds where the others begin.
-    guesses, candidates, skipped, lead = [], [], [], None
-    in_turn = dict.fromkeys((next(iter(SIMULATORS)), *models))
-    problems = [LogProblem(logs, patch, names, law, options, each, progress) for each in in_turn]
+    if given is not None and not patch.depends_on_load and models != (LEAD,):
+        kinds += _of_fixed_stiffness(kinds, logs)
+    problems: list[LogProblem] = []
+    guesses, leads, candidates, skipped = [], [], [], []
     with interruptible(problems):
-        for problem in problems:
-            if lead is None:
-                problem.report("looking for starts")
-                guesses = guess_starts(problem, given, starts=options.starts, seed=options.seed, noise=noise)
-                fit = multistart(problem, guesses, noise=noise)
-            elif model == "auto" and problem.work * USUAL_EVALUATIONS > PATIENCE:
-                skipped.append(problem.model)
-                continue
-            else:
-                fit = warm_start(problem, lead, guesses, noise=noise)
-            if problem.model in models:
-                fit = refine(fit)
-                candidates.append(Candidate(fit, uncertainty(fit)))
-            lead = fit if lead is None else lead
-        assert lead is not None
+        for name in dict.fromkeys((LEAD, *models)):
+            lead = min(leads, key=lambda fit: fit.cost, default=None)
+            for law in kinds if lead is None else [fit.problem.law for fit in leads if fit.cost < WORSE * lead.cost]:
+                problems.append(LogProblem(logs, patch, names, law, options, name, progress))
+                late = problems[-1].work * USUAL_EVALUATIONS
+                if model == "auto" and name != LEAD and late > PATIENCE:
+                    skipped += [] if name in skipped else [name]
+                    continue
+                if late > SOON and model != "auto":
+                    fewer = decimated(whole, size_of(whole[0], patch), int(samples_of(logs)[0] * SOON / late))
+                    problems[-1] = LogProblem(fewer, patch, names, law, options, name, progress)
+                if not leads:
+                    problems[-1].report("looking for starts")
+                    guesses = guess_starts(problems[-1], given, starts=options.starts, seed=options.seed, noise=noise)
+                    fit = multistart(problems[-1], guesses, noise=noise)
+                    values = ", ".join(f"{key} {value:.3g}" for key, value in fit.problem.by_name(fit.values).items())
+                    problems[-1].report(f"a first answer: {values}")
+                else:
+                    fit = warm_start(problems[-1], lead or leads[0], guesses, noise=noise)
+                leads += [fit] if name == LEAD else []
+                if name in models and (name != LEAD or law.reference_load is None):
+                    fit = refine(fit)
+                    candidates.append(Candidate(fit, uncertainty(fit)))
         best = min(candidates, key=lambda each: each.uncertainty.score)
-        found = _identification(best, candidates, skipped, lead.starts)
+        alike = [each for each in candidates if each.score.model == best.score.model]
+        best = min(alike, key=lambda each: each.cost(best.fit.sigma))
+        found = _identification(best, candidates, skipped, leads[0].starts)
     return with_findings(found, whole, findings)
+
+
+def _of_fixed_stiffness(laws: Sequence[LuGre], logs: Sequence[Log]) -> list[LuGre]:
+    """Return the laws with a stiffness that does not grow with the load, if logs at clearly different loads tell it."""
+    loads = [mean_load(log) for log in logs]
+    if not steady_loads(logs) or max(loads) < TWO_LOADS * min(loads):
+        return []
+    return [dataclasses.replace(law, reference_load=float(np.median(loads))) for law in laws]
 
 
 def _models_to_fit(model: str, patch: ContactPatch, names: Sequence[str]) -> tuple[str, ...]:
@@ -130,30 +165,31 @@ def _models_to_fit(model: str, patch: ContactPatch, names: Sequence[str]) -> tup
 
 def guessed_law(values: Mapping[str, float]) -> LuGre:
     """Return the law with which a search without data would begin: the `values` by name, usual ones for the others."""
-    return _start_law(values, ElastoPlastic(0.9))[0]
+    return _start_laws(values, USUAL_BRISTLES, ())[0][0]
 
 
-def _start_law(start: Any, elasto_plastic: ElastoPlastic | float | None) -> tuple[LuGre, dict[str, float] | None]:
-    """Return the law that holds the parameters that are not estimated, and the values given by name.
+def _start_laws(start: Any, bristles: Any, names: Sequence[str]) -> tuple[list[LuGre], dict[str, float] | None]:
+    """Return laws that hold the parameters that are not estimated, one for each kind of bristles, and values by name.
 
     The values are None if a whole law was given.
     """
     if type(start) is LuGre:
-        return start, None
+        return [start], None
     if not isinstance(start, Mapping | None):
         raise InvalidValueError("start", "be a LuGre law or a table of its parameters", start)
     given = {} if start is None else dict(start)
     for name, value in given.items():
         validation.choice("start", name, known.LAW)
         given[name] = validation.number(f"start[{name!r}]", value)
-    if "breakaway_ratio" in given:
-        elasto_plastic = ElastoPlastic(given["breakaway_ratio"])
+    kinds = [USUAL_BRISTLES, None] if bristles == "auto" else [bristles]
+    if "breakaway_ratio" in given or "breakaway_ratio" in names:
+        kinds = [ElastoPlastic(given["breakaway_ratio"]) if "breakaway_ratio" in given else kinds[0] or USUAL_BRISTLES]
     fields = {name: value for name, value in given.items() if name != "breakaway_ratio"}
     if "mu_s" not in fields:
         fields["mu_s"] = max(START_MU_S, fields.get("mu_c", LuGre.mu_c))
     if "mu_s" in fields and "mu_c" not in fields:
         fields["mu_c"] = min(LuGre.mu_c, fields["mu_s"])
-    return LuGre(**fields, elasto_plastic=elasto_plastic), given
+    return [LuGre(**fields, elasto_plastic=kind) for kind in kinds], given
 
 
 # ---------------------------------------------------------------------- from the best fit to the result
@@ -176,7 +212,11 @@ def _identification(
         values=values,
         standard_errors=errors[:count],
         correlations=evidence.correlations,
-        verdicts=(*judge(evidence, best, candidates, skipped), *verdicts_on_samples(logs), *verdicts_on_turns(logs)),
+        verdicts=(
+            *judge(evidence, best, candidates, skipped, pulls_of_held(fit, u)),
+            *verdicts_on_samples(logs),
+            *verdicts_on_turns(logs),
+        ),
         noise=fit.noise,
         channels=CHANNELS,
         histories=tuple(histories),
@@ -184,7 +224,7 @@ def _identification(
         model=_fitted_model(problem, values, law),
         starts=starts,
         rig=(*problem.rig.found(rig, errors[count:]), *_noise_of_twists(problem)),
-        scores=tuple(each.score for each in candidates),
+        scores=(best.score, *(each.score for each in candidates if each is not best)),
         chosen=problem.model,
         samples=samples_of(logs),
     )
@@ -200,6 +240,9 @@ def _evidence(best: Candidate, errors: np.ndarray, histories: Sequence[Mapping[s
     still[:count] *= np.where(np.isin(problem.names, ("mu_c", "mu_s")), NO_SLIP, 1.0)
     costs = [0.5 * float((problem.residual(each, fit.sigma) ** 2).sum()) for each in (fit.values, still)]
     sliding = problem.sliding(values)
+    left_out = sum(
+        int(np.isinf(sigma[:, log.channels]).sum()) for sigma, log in zip(fit.sigma, problem.logs, strict=True)
+    )
     return Evidence(
         names=problem.names,
         values=values,
@@ -210,7 +253,9 @@ def _evidence(best: Candidate, errors: np.ndarray, histories: Sequence[Mapping[s
         speeds=np.concatenate([each[0] for each in sliding]),
         spins=np.concatenate([each[1] for each in sliding]),
         loads=np.array([mean_load(log) for log in problem.logs]),
-        torque=any(log.channels[2] for log in problem.logs),
+        measured=np.any([log.channels for log in problem.logs], axis=0),
+        spoiled=int((np.abs(problem.distances(fit.values, fit.sigma)) > SPOILED).sum()) + left_out,
+        robust=problem.options.loss != "linear",
         without_slip=costs[1] - costs[0],
         largest_coefficient=max(float(np.nanquantile(each["coefficient"], 0.99)) for each in histories),
     )
@@ -226,9 +271,10 @@ def _histories(best: Candidate) -> list[dict[str, Any]]:
     histories = []
     for i, (log, used, sigma, rows) in enumerate(zip(problem.logs, problem.used, fit.sigma, unseen, strict=True)):
         held_out = np.full_like(log.wrench, np.nan)
-        held_out[used] = log.wrench[used] + rows[:, :, 0] * np.where(log.channels, sigma[used], np.nan)
+        known_noise = np.where(log.channels & np.isfinite(sigma), sigma, np.nan)
+        held_out[used] = log.wrench[used] + rows[:, :, 0] * known_noise[used]
         measured, more = np.where(log.channels, log.wrench, np.nan), {"speed": sliding[i][0], "held_out": held_out}
-        each = {"name": log.name, "time": log.time, "measured": measured, "predicted": shown[i]}
+        each = {"name": log.name, "time": log.time, "measured": measured, "predicted": shown[i], "twist": log.twist}
         histories.append({**each, **more, "coefficient": coefficients[i]})
     return histories
 

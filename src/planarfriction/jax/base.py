@@ -25,7 +25,9 @@ class FrictionPytree(TensorModel):
 
     xp = xp
     leaves: ClassVar[tuple[str, ...]]
-    """Attributes that JAX maps over and differentiates; `elasto_plastic` is fixed when a function is compiled."""
+    """Attributes that JAX maps over and differentiates.
+
+    `elasto_plastic` and `reference_load` are fixed when a function is compiled."""
     parameters: Any
     """Physical parameters by name, scalars."""
 
@@ -35,24 +37,30 @@ class FrictionPytree(TensorModel):
 
     def __init__(self, patch: ContactPatch, law: FrictionLaw) -> None:
         self.refuse(patch, law, f"jax.{type(self).__name__}")
-        self.elasto_plastic = law.numbers.elasto_plastic > 0.0
+        self.elasto_plastic, self.reference_load = law.numbers.elasto_plastic > 0.0, law.reference_load
 
     def replace(self, **leaves: Any) -> Self:
         """Return a model with other `parameters`, or other leaves by name."""
         for name in leaves:
             if name not in self.leaves:
                 raise InvalidValueError("leaf", f"be one of {', '.join(self.leaves)}", repr(name))
-        return self._unflatten(self.elasto_plastic, [leaves.get(name, getattr(self, name)) for name in self.leaves])
+        return self._unflatten(self._flatten()[1], [leaves.get(name, getattr(self, name)) for name in self.leaves])
 
     def _flatten(self):
         keys = map(jax.tree_util.GetAttrKey, self.leaves)
-        return [(key, getattr(self, key.name)) for key in keys], self.elasto_plastic
+        return [(key, getattr(self, key.name)) for key in keys], (self.elasto_plastic, self.reference_load)
 
     @classmethod
-    def _unflatten(cls, elasto_plastic: bool, leaves) -> Self:
+    def _unflatten(cls, fixed: tuple[bool, float | None], leaves) -> Self:
         model = object.__new__(cls)  # JAX also puts in what a model cannot be made of
-        vars(model).update(zip(cls.leaves, leaves, strict=True), elasto_plastic=elasto_plastic)
+        names = *cls.leaves, "elasto_plastic", "reference_load"
+        vars(model).update(zip(names, (*leaves, *fixed), strict=True))
         return model
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the physical parameters, in the order of their vector."""
+        return self.parameters._fields
 
     def rest(self, batch: int | Sequence[int] = ()) -> jax.Array:
         """Return the state of a contact at rest, or of a `batch`: `[*batch, *state_shape]`."""
@@ -75,8 +83,13 @@ class FrictionPytree(TensorModel):
         raise NotImplementedError
 
     def _values(self, parameters: Any) -> dict[str, jax.Array]:
-        record = self.parameters if parameters is None else type(self.parameters)(*parameters)
-        return {name: jnp.asarray(value) for name, value in record._asdict().items()}
+        return {name: jnp.asarray(value) for name, value in self._record(parameters)._asdict().items()}
+
+    def _record(self, parameters: Any) -> Any:
+        """Return parameters as a record, the model's own if they are None."""
+        if parameters is None:
+            return self.parameters
+        return type(self.parameters)(*self._counted(parameters, len(parameters), (len(parameters),)))
 
 
 def record_of(kind: Any, values: dict[str, float]) -> Any:

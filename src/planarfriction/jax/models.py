@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 from collections import namedtuple
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,12 +13,12 @@ import jax.numpy as jnp
 from planarfriction.derivatives.parameters import PARAMETERS, Packed, pack_cells, pack_surface
 from planarfriction.equality import ByValue, by_parts
 from planarfriction.jax.base import FrictionPytree, record_of
-from planarfriction.jax.namespace import xp
 from planarfriction.laws import FrictionLaw
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models import ReducedModel as Reference
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import distributed, published
+from planarfriction.tensors.models import CellsModel, PublishedModel, few_discs
 from planarfriction.tensors.steps import LAW
 
 
@@ -28,7 +27,7 @@ class LawParameters(namedtuple("LawParameters", LAW)):
     """Parameters of a friction law as scalars; names and units as in `LuGre`."""
 
 
-class DistributedModel(FrictionPytree):
+class DistributedModel(FrictionPytree, CellsModel):
     """The distributed model (`planarfriction.DistributedModel`) as a pytree, for small patches.
 
     `W = sum w_i f_N [t_i ; rho_i x t_i]`. State: deflections `[2, N]` [m]. Leaves: the law's parameters, the cells'
@@ -37,13 +36,8 @@ class DistributedModel(FrictionPytree):
     Raises InvalidValueError for a parameter that breaks its rule.
     """
 
-    equations = distributed
     leaves = ("parameters", "positions", "weights")
     parameters: LawParameters
-    positions: jax.Array
-    """Cells, x then y [m], `[2, N]`; with a friction metric their levers (see `tensors.distributed.Cells`)."""
-    weights: jax.Array
-    """Share of the load that each cell carries [-], `[N]`."""
 
     def __init__(self, patch: ContactPatch, law: FrictionLaw, normal_force: float | None = None) -> None:
         super().__init__(patch, law)
@@ -51,22 +45,9 @@ class DistributedModel(FrictionPytree):
         self.parameters = record_of(LawParameters, law.numbers._asdict())
         self.positions, self.weights = map(jnp.asarray, cells)
 
-    @property
-    def state_shape(self) -> tuple[int, ...]:
-        """Shape of the state of one contact, `(2, N)` of points, `(3, N)` of discs."""
-        return distributed.KINDS[len(self.positions)].bristles, self.positions.shape[1]
-
-    @property
-    def obstacle(self) -> str:
-        """Reason why compiled rollouts do not take the model, or an empty text."""
-        return distributed.obstacle(self.positions)
-
     def compiled(self) -> Packed:
         """Return the model as compiled rollouts take it."""
         return pack_cells(self.elasto_plastic, self.positions, self.weights)  # pyright: ignore[reportArgumentType]
-
-    def _shape(self, values: Mapping[str, jax.Array]) -> distributed.Cells:
-        return distributed.Cells(self.positions, self.weights)
 
 
 @by_parts
@@ -89,7 +70,7 @@ class Surface(ByValue):
     """Symmetric root of the friction metric `[2, 2]`, if the patch has one."""
 
 
-class ReducedModelPublished(FrictionPytree):
+class ReducedModelPublished(FrictionPytree, PublishedModel):
     """The published reduced model (`planarfriction.ReducedModelPublished`) as a pytree.
 
     `zdot = S h v_n - k z`, `W = -(sigma_0 z + sigma_1 zdot + sigma_2 U V) f_N`. State `(z_x, z_y, z_tau)` [m, m, m^2].
@@ -101,10 +82,10 @@ class ReducedModelPublished(FrictionPytree):
     Raises InvalidValueError for a parameter that breaks its rule.
     """
 
-    equations = published
     leaves = ("parameters", "surface")
     parameters: PublishedParameters
     surface: Surface
+    root = property(lambda self: self.surface.root, doc="Symmetric root of the friction metric `[2, 2]`, or None.")
 
     def __init__(self, patch: ContactPatch, law: FrictionLaw, surface: LimitSurface | None = None) -> None:
         super().__init__(patch, law)
@@ -117,9 +98,6 @@ class ReducedModelPublished(FrictionPytree):
         """Return the model as compiled rollouts take it."""
         s = self.surface
         return pack_surface(self.elasto_plastic, s.kind, s.size, s.data, s.root)  # pyright: ignore[reportArgumentType]
-
-    def _shape(self, values: Mapping[str, jax.Array]) -> published.PublishedNumbers:
-        return published.numbers_of(xp, values, self.surface, self.surface.root)
 
 
 class ReducedModel(DistributedModel):
@@ -139,7 +117,4 @@ class ReducedModel(DistributedModel):
         cells: int = Reference.cells,
         **options: Any,
     ) -> None:
-        self.refuse(patch, law, "jax.ReducedModel")
-        replaced = {name: options.pop(name) for name in Reference.REPLACED if name in options}
-        discs = Reference(patch, law, cells=cells, **replaced).reduction.patch
-        super().__init__(discs, law, normal_force, **options)
+        super().__init__(few_discs("jax.ReducedModel", patch, law, cells, options), law, normal_force, **options)

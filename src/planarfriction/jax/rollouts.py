@@ -67,7 +67,7 @@ def rollout(
     front = "planarfriction.jax"
     state, twist, load, dt = rollout_inputs(model, FrictionPytree, front, state, twist, normal_force, dt, method)
     if parameters is not None:
-        model = model.replace(parameters=type(model.parameters)(*parameters))
+        model = model.replace(parameters=model._record(parameters))
     inner = model.state_shape
     shape = jnp.broadcast_shapes(twist.shape[:-1], load.shape, (*state.shape[: state.ndim - len(inner)], 1))
     state = jnp.broadcast_to(state, (*shape[:-1], *inner))

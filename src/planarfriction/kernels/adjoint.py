@@ -27,7 +27,6 @@ from planarfriction.kernels.body import (
     maps_of,
     read,
     record_of,
-    seen_by,
     total_load,
 )
 from planarfriction.kernels.contacts import PULL_BACK, ROWS, SOLVE_TRANSPOSED
@@ -48,7 +47,7 @@ from planarfriction.kernels.sdirk import (
 )
 from planarfriction.kernels.small_matrices import applied
 from planarfriction.kernels.step_control import judged, length
-from planarfriction.kernels.tangent import FRICTION, LOAD, MOST, NORMAL_FORCE, SIZE, change_of, partial_of
+from planarfriction.kernels.tangent import MOST, partial_of, wrench_by_input
 from planarfriction.kernels.vectors import applied_back, dot, plus, put, three, times
 
 
@@ -204,24 +203,15 @@ def jump(system, piece, since, seeds, adjoint, drives, moments, workspace):
 
     The held state is in the workspace.
     """
-    own, w, rows = read(system), read_workspace(workspace), arrays_at(ROWS, read(system).work.rows)
-    y, o, none = w.state, own.bristles, (0.0, 0.0, 0.0)
+    own, w = read(system), read_workspace(workspace)
+    y, o = w.state, own.bristles
     call(own.rates, (system, piece, since, y, w.rate))
     call(own.linearise, (system, piece, y))
     for c in range(own.size):
-        load, unit = load_of(own, piece, since, c), three(at(own.work.wrench, 3 * c))
+        load = load_of(own, piece, since, c)
         seed = seeds[c, 0], seeds[c, 1], seeds[c, 2]
-        put(rows.twist, applied(maps_of(own, c)[0], seen_by(own, c, y)))
         for u in range(moments.shape[0]):
-            kind = drives.input_kind[u]
-            put(rows.wrench, unit)
-            put(rows.d_twist, none)
-            put(rows.d_wrench, none)
-            if kind in (FRICTION, SIZE):
-                change_of(own, piece, c, y, w.rate, w.zero, kind, w.forcing)
-            slope = times(load, unit if kind == LOAD else three(rows.d_wrench))
-            if kind == NORMAL_FORCE and drives.input_place[u] == c:
-                slope = unit
+            slope = wrench_by_input(own, piece, since, c, y, w, drives.input_kind[u], drives.input_place[u], w.forcing)
             moments[u, 0] += dot(seed, slope)
             moments[u, 1] += dot(seed, slope) * since
         by_velocity, by_pose = _pulled(own, piece, c, y, w.zero, times(load, seed), w)

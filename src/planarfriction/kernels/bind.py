@@ -9,18 +9,17 @@ from typing import Any
 from planarfriction.kernels.definitions import definition_of
 
 
-def bind(template: Callable, model: Any, name: str, compiled: Callable[[Any], Any]) -> Any:
-    """Return the entry point of a template, a plain function, for one model, `compiled` by `jit` or `entry`.
+def bind(template: Callable, name: str, compiled: Callable[[Any], Any], **constants: Any) -> Any:
+    """Return the entry point of a template for one model, `compiled` by `jit` or `entry`.
 
-    Parameters of the template that are named as fields of `model`, a record, become constants; the entry point takes
-    the others. It is a function with a name and no closure, so that its machine code can be kept on disk: the name is
-    unique in the file of the template.
+    Arguments that the template, a plain function, takes by keyword only become `constants`, of which it may leave some;
+    the entry point takes the others. It is a function with a name and no closure, so that its machine code can be kept
+    on disk: the name is unique in the file of the template.
     """
     definition = definition_of(template)
-    own = {each.arg: getattr(model, each.arg) for each in definition.args.args if each.arg in model._fields}
-    left = [each for each in definition.args.args if each.arg not in own]
-    arguments = ast.arguments(**{**vars(definition.args), "args": left})
-    bound = ast.FunctionDef(**{**vars(definition), "name": name, "args": arguments})
-    space = {**template.__globals__, **own}
-    exec(compile(ast.Module([bound], []), template.__code__.co_filename, "exec"), space)
+    bound = {each.arg: constants[each.arg] for each in definition.args.kwonlyargs}
+    arguments = ast.arguments(**{**vars(definition.args), "kwonlyargs": [], "kw_defaults": []})
+    function = ast.FunctionDef(**{**vars(definition), "name": name, "args": arguments})
+    space = {**template.__globals__, **bound}
+    exec(compile(ast.Module([function], []), template.__code__.co_filename, "exec"), space)
     return compiled(space[name])

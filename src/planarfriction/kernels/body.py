@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import address_of, call
 from planarfriction.compiler.memory import Doubles, Integers, Packed, at, exists, layout, reader
@@ -34,7 +35,7 @@ from planarfriction.kernels.small_matrices import applied, inverse
 from planarfriction.kernels.vectors import applied_back, plus, put, put_all, three
 
 NO_LOAD = 1e-6
-"""Share of the reference load of a fixed stiffness below which bristles cannot follow the load (see `settle_all`)."""
+"""Share of the reference load below which a fixed stiffness is fixed no longer: limits of 1e-12 m are not followed."""
 
 
 class Motion(NamedTuple):
@@ -167,16 +168,21 @@ def record_of(own, piece, c):
 
 
 @kernel
+def hardly_loaded(own, piece, c):
+    """Return True if contact c has a fixed stiffness and starts a piece with hardly any load."""
+    return load_of(own, piece, 0.0, c) < NO_LOAD * own.contacts.reference[c]
+
+
+@kernel
 def settle_all(own, piece, y):
     """Bring bristles back onto their limits where a piece starts with hardly any load.
 
     Elsewhere they return by themselves, too fast to be followed only there.
     """
     for c in range(own.size):
-        reference, load = own.contacts.reference[c], load_of(own, piece, 0.0, c)
-        if load < NO_LOAD * reference:
+        if hardly_loaded(own, piece, c):
             first, size = own.contacts.state[c], own.contacts.bristle[c]
-            count, factor = (own.contacts.state[c + 1] - first) // size, factor_at(reference, load)
+            count, factor = (own.contacts.state[c + 1] - first) // size, 1.0 / NO_LOAD
             bring_back(law_of(record_of(own, piece, c)), size, at(y, first), factor, count)
 
 
@@ -245,7 +251,8 @@ def rates(system, piece, since, y, dy):
         place, seen = place_at(own, piece, since, c, body)
         contact_map(own.contacts.mount[c], place, at(body, 3), a)
         put(work.twist, applied(a, seen))
-        work.factor[c] = factor_at(own.contacts.reference[c], load_of(own, piece, since, c))
+        reference = own.contacts.reference[c]
+        work.factor[c] = factor_at(reference, xp.maximum(load_of(own, piece, since, c), NO_LOAD * reference))
         work.twist[3] = work.factor[c]
         call(function_of(own, c, EVALUATE), (record_of(own, piece, c), at(y, first), work.twist, at(dy, first), w))
         total = plus(total, total_load(own, piece, since, c), applied_back(a, w))

@@ -1,7 +1,7 @@
 """Cells in blocks, so that loops over them are vector code without a remainder.
 
 A block holds up to `LANES` cells, field after field. The cells of a contact are spread evenly over its blocks (see
-`divided`); the last one is filled up with cells without load. See `cell_passes` for what is done to them.
+`divided`); the last one is filled up with cells without load. See `cell_passes` for loops over them.
 """
 
 from __future__ import annotations
@@ -46,16 +46,13 @@ class Block(NamedTuple):
     count: int
 
 
-@kernel
-def pair(block, field, i):
-    """Return two fields of cell i."""
-    return block[field + i], block[field + LANES + i]
+class StepBars(NamedTuple):
+    """Cotangents of a step that add up over the cells."""
 
-
-@kernel
-def put_pair(block, field, i, a):
-    """Write two fields of cell i."""
-    block[field + i], block[field + LANES + i] = a
+    twist: tuple
+    load: float
+    law: tuple
+    """In the order of `cells_rollout.PARAMETERS`."""
 
 
 class Kind(NamedTuple):
@@ -67,7 +64,8 @@ class Kind(NamedTuple):
     advance: Any
     """`(lever, law, w, blocks, lanes, twist, dt)`: step the cells, and return their wrench."""
     retreat: Any
-    """`(lever, law, block, lanes, held, pull, load)`: carry cotangents over a step (see `cell_slopes`)."""
+    """`(lever, law, block, lanes, interval, pull, load)`: carry the cotangent of the state over the step of
+    an interval, its twist and dt; return `StepBars`."""
     pushed: Any
     """`(law, z, u, dt, dz, du, changes of the law)`: step a cell and its change."""
     vector: Any

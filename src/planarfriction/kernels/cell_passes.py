@@ -1,233 +1,223 @@
-"""The step of the cells of a block (see `cell_blocks`), pass by pass, by the equations of `bristle_step`.
+"""Steps, rates and their derivatives of cells in blocks as vector loops, written from the functions of one cell.
 
-A pass does a few operations for all cells, so that the processor has many cells in flight; as one pass, the step of a
-vector of cells is a chain of 400 cycles. What passes hand on stays in fields that all blocks share, and so in the
-nearest cache; derivatives (see `cell_slopes`) go back over the same fields.
+An `Element` is the bristle of a kind of cells (see `points`, `discs`). See `passes` for how loops come out of a trace,
+`cell_steps` and `cell_rollouts` for what runs them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from planarfriction import formulas
-from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import at
-from planarfriction.kernels.bristle_step import bounded, capped, seen
-from planarfriction.kernels.cell_blocks import BLOCK, LANES, WEIGHT, Z, lever_at, pair, put_pair, room
-from planarfriction.kernels.contacts import traction
-from planarfriction.kernels.law import squared
-from planarfriction.kernels.vectors import norm, plus, times
+from planarfriction.compiler.memory import Doubles
+from planarfriction.formulas import LawNumbers
+from planarfriction.kernels import cells, disc_cells, discs, leaning_cells, points
+from planarfriction.kernels.cell_blocks import BAR, BY_LOAD, LANES, WEIGHT, Z
+from planarfriction.kernels.cells import CellsContact, Lever
+from planarfriction.kernels.cells_rollout import BY
+from planarfriction.kernels.derive import derive
+from planarfriction.kernels.leaning_cells import Leaning
+from planarfriction.kernels.passes import Passes, passes
+from planarfriction.kernels.trace import Number, Trace, traced
+from planarfriction.kernels.twins import twin
 
 
-class Step(NamedTuple):
-    """A step of the cells of a block."""
+class Division(NamedTuple):
+    """Division of a function into passes that is fastest for a few dozen cells (see `passes`)."""
 
-    block: Any
-    work: Any
-    """Fields that passes hand on."""
-    twist: tuple
-    dt: float
+    count: int
+    short: int
 
 
-SEEN, AHEAD, END = (LANES * n for n in (0, 5, 10))
-"""Views of a bristle at the start of the step, at its predicted end and at its end, five fields each."""
+class Element(NamedTuple):
+    """Bristle of a kind of cells."""
 
-DEFLECTION, ALONG, SIZE, ALPHA, DECAY = (LANES * n for n in range(5))
-"""These fields."""
-
-U, SPEED, EFFECT, GRIP, DECAY_DT, LEFT, MEAN, FREE, NEW = (LANES * n for n in (15, *range(17, 24), 25))
-"""Fields of the step; those that are vectors have two."""
-
-FIELDS = LANES * 27
-"""First number behind these fields, where others may begin."""
-
-# ---------------------------------------------------------------------- functions of a bristle
-
-
-@kernel
-def power(law, speed):
-    """Return `(v/v_s)^gamma`."""
-    return formulas.stribeck_power(xp, speed, law)
+    name: str
+    size: int
+    """Components d."""
+    evaluate: Any
+    """`(law, z, u)`: return z' and the traction."""
+    step: Any
+    """`(law, z, u, dt)`: return the bristle after dt and its traction."""
+    forward: Division = Division(8, 2)
+    backward: Division = Division(6, 6)
+    rate: Division = Division(5, 0)
+    slopes: Division = Division(4, 2)
 
 
-@kernel
-def grip_at(law, effect):
-    """Return one over the steady deflection, from the Stribeck effect."""
-    return law.sigma_0 / formulas.stribeck_at(effect, law)
+POINT = Element("points", 2, points.evaluate, points.step, slopes=Division(2, 0))
+DISC = Element("discs", 3, discs.evaluate, discs.step)
+LEANING_POINT = Element("leaning points", 2, leaning_cells.evaluate, leaning_cells.step)
+LEANING_DISC = Element("leaning discs", 3, leaning_cells.evaluate_disc, leaning_cells.step_disc)
+"""Their law is a `Leaning`, whose asymmetry stands behind the numbers of the lever."""
 
 
-@kernel
-def decay(law, alpha, along, speed, q):
-    """Return k."""
-    return formulas.decay_at(xp, alpha, along, speed, q, law)
+class CellKind(NamedTuple):
+    """Element of a kind of cells and their lever, which has so many numbers."""
 
-
-@kernel
-def mean_decay(start, end, dt):
-    """Return the mean decay times dt."""
-    return formulas.mean_decay(start, end, dt) * dt
+    name: str
+    element: Element
+    lever: Lever
+    numbers: int
+    leans: bool = False
+    """True for elements whose law is a `Leaning`."""
 
 
 @kernel
-def end_traction(law, new, k, u):
-    """Return the traction of a cell at the end of its step, per unit load."""
-    return traction(law, new, plus(u, -k, new), u)
-
-
-# ---------------------------------------------------------------------- passes
-
-
-def over_cells(body: Any) -> Any:
-    """Return the pass over a block that does `body(lever, law, on, i)` for its cells."""
-
-    @kernel
-    def run(lever, law, on, lanes):
-        for i in range(lanes):  # the body apart: kernel later, it leaves the compiler a loop that it can count
-            body(lever, law, on, i)
-
-    return run
-
-
-def sum_over_cells(count: int) -> Any:
-    """Return the decorator of a pass that returns the sums of so many numbers that its body returns."""
-    none = (0.0,) * count
-
-    def of_cells(body: Any) -> Any:
-        @kernel
-        def run(lever, law, on, lanes):
-            total = none
-            for i in range(lanes):
-                total = plus(total, 1.0, body(lever, law, on, i))
-            return total
-
-        return run
-
-    return of_cells
-
-
-@over_cells
-@kernel
-def _drive(lever, law, on, i):
-    u = lever.seen(lever_at(lever, on.block, i), on.twist)
-    put_pair(on.work, U, i, u)
-    on.work[SPEED + i] = norm(u)
-
-
-@over_cells
-@kernel
-def _fade(lever, law, on, i):
-    on.work[EFFECT + i] = xp.exp(-power(law, on.work[SPEED + i]))
-
-
-@over_cells
-@kernel
-def _hold(lever, law, on, i):
-    on.work[GRIP + i] = grip_at(law, on.work[EFFECT + i])
+def _leaning_point(contact: CellsContact, i: int) -> Leaning:
+    c, n = contact.cells, contact.count
+    return Leaning(contact.law, (c[5 * n + i], c[6 * n + i]))
 
 
 @kernel
-def _look(on, to, z, i):
-    """Write what is seen of a bristle."""
-    work, size = on.work, norm(z)
-    work[to + SIZE + i] = size
-    work[to + DEFLECTION + i], work[to + ALONG + i] = seen(z, size, pair(work, U, i), 1.0, work[GRIP + i])
+def _leaning_disc(contact: CellsContact, i: int) -> Leaning:
+    c, n = contact.cells, contact.count
+    return Leaning(contact.law, (c[6 * n + i], c[7 * n + i]))
 
 
-@over_cells
-@kernel
-def _see(lever, law, on, i):
-    _look(on, SEEN, pair(on.block, Z, i), i)
+KINDS = {
+    (2, False, False): CellKind("isotropic", POINT, cells.POSITIONS, 2),
+    (2, True, False): CellKind("turned", POINT, cells.LEVERS, 5),
+    (3, False, False): CellKind("discs", DISC, disc_cells.POSITIONS, 3),
+    (3, True, False): CellKind("turned_discs", DISC, disc_cells.LEVERS, 6),
+    (2, True, True): CellKind("leaning", LEANING_POINT, cells.LEVERS._replace(law=_leaning_point), 5, True),
+    (3, True, True): CellKind("leaning_discs", LEANING_DISC, disc_cells.LEVERS._replace(law=_leaning_disc), 6, True),
+}
+"""Kinds of cells by the components of a bristle, and whether there are a metric and an asymmetry."""
 
 
-@over_cells
-@kernel
-def _look_ahead(lever, law, on, i):
-    work = on.work
-    _look(on, AHEAD, plus(pair(on.block, Z, i), on.dt, pair(work, U, i)), i)
-    start, deflection = work[SEEN + DECAY + i], work[SEEN + DEFLECTION + i]
-    work[AHEAD + DEFLECTION + i] = bounded(work[AHEAD + DEFLECTION + i], start, on.dt, deflection)
+class Rows(NamedTuple):
+    """Cells of a contact from one on, row by row of n numbers."""
+
+    cells: Doubles
+    z: Doubles
+    weights: Doubles
+    out: Doubles
+    """Rates or new bristles [d, n], or a block of derivatives by state and velocity [2, d, d, LANES]."""
+    n: int
 
 
-def _slip(view: int) -> Any:
-    """Return the pass that writes alpha and the decay of a bristle."""
-
-    @over_cells
-    @kernel
-    def slip(lever, law, on, i):
-        work = on.work
-        alpha = formulas.slip_fraction(xp, work[view + DEFLECTION + i], law.breakaway_ratio)
-        work[view + ALPHA + i] = alpha
-        work[view + DECAY + i] = decay(law, alpha, work[view + ALONG + i], work[SPEED + i], work[GRIP + i])
-
-    return slip
+_LAW = {f"law.{name}": f"law.{name}" for name in LawNumbers._fields}
 
 
-_start, _predict, _finish = map(_slip, (SEEN, AHEAD, END))
+class _Symbols:
+    """Arguments of the functions of a cell in a trace."""
+
+    def __init__(self, trace: Trace, kind: CellKind) -> None:
+        self.trace = trace
+        numbers = self.several("c", kind.numbers + 2 * kind.leans)
+        law = LawNumbers(*(Number(trace, name) for name in _LAW))
+        self.law = Leaning(law, numbers[-2:]) if kind.leans else law
+        self.cell, self.z, self.v = numbers[: kind.numbers], self.several("z", kind.element.size), self.several("v", 3)
+        self.dt, self.weight = Number(trace, "dt"), Number(trace, "weight")
+        self.u = twin(kind.lever.seen)(self.cell, self.v)
+
+    def several(self, letter: str, count: int) -> tuple:
+        """Return a vector of symbols."""
+        return tuple(Number(self.trace, f"{letter}{m}") for m in range(count))
 
 
-@over_cells
-@kernel
-def _mean(lever, law, on, i):
-    on.work[DECAY_DT + i] = mean_decay(on.work[SEEN + DECAY + i], on.work[AHEAD + DECAY + i], on.dt)
+def _fields(letter: str, first: int, count: int) -> dict[str, str]:
+    """Return the sources of a vector of symbols that lies in fields of a block."""
+    return {f"{letter}{m}": f"block[{first + m * LANES} + i]" for m in range(count)}
 
 
-@over_cells
-@kernel
-def _relax(lever, law, on, i):
-    on.work[LEFT + i], on.work[MEAN + i] = formulas.relaxation(xp, on.work[DECAY_DT + i])
+def _rows(letter: str, field: str, count: int) -> dict[str, str]:
+    """Return the sources of a vector of symbols that lies in `Rows`."""
+    return {f"{letter}{m}": f"block.{field}[{m} * block.n + i]" for m in range(count)}
 
 
-@over_cells
-@kernel
-def _settle(lever, law, on, i):
-    work, u = on.work, pair(on.work, U, i)
-    free = plus(times(work[LEFT + i], pair(on.block, Z, i)), on.dt * work[MEAN + i], u)
-    put_pair(work, FREE, i, free)
-    _look(on, END, free, i)
-    new, work[END + DEFLECTION + i] = capped(law, free, work[END + DEFLECTION + i], work[SEEN + DEFLECTION + i])
-    put_pair(work, NEW, i, new)
+_SHARED = {**_LAW, **{f"v{m}": f"v[{m}]" for m in range(3)}, "dt": "shared[0]"}
+"""Sources of the symbols that all cells share."""
 
 
-@kernel
-def step(lever, law, on, lanes):
-    """Write the fields of a step."""
-    _drive(lever, law, on, lanes)
-    if law.gamma == 2.0:
-        _fade(lever, squared(law), on, lanes)
-    else:
-        _fade(lever, law, on, lanes)
-    _hold(lever, law, on, lanes)
-    _see(lever, law, on, lanes)
-    _start(lever, law, on, lanes)
-    _look_ahead(lever, law, on, lanes)
-    _predict(lever, law, on, lanes)
-    _mean(lever, law, on, lanes)
-    _relax(lever, law, on, lanes)
-    _settle(lever, law, on, lanes)
-    _finish(lever, law, on, lanes)
+def _in_block(kind: CellKind) -> dict[str, str]:
+    """Return the sources of the symbols of cells in a block."""
+    vectors = _fields("c", 0, kind.numbers) | _fields("z", Z, kind.element.size)
+    return {**_SHARED, **vectors, "weight": f"block[{WEIGHT} + i]"}
 
 
-@sum_over_cells(3)
-@kernel
-def _pull(lever, law, on, i):
-    """Take the new bristle of a cell, and return its wrench."""
-    work, block, new = on.work, on.block, pair(on.work, NEW, i)
-    put_pair(block, Z, i, new)
-    t = end_traction(law, new, work[END + DECAY + i], pair(work, U, i))
-    return lever.wrench(lever_at(lever, block, i), times(block[WEIGHT + i], t))
+def _in_rows(kind: CellKind) -> dict[str, str]:
+    """Return the sources of the symbols of cells in `Rows`."""
+    vectors = _rows("c", "cells", kind.numbers + 2 * kind.leans) | _rows("z", "z", kind.element.size)
+    return {**_SHARED, **vectors, "weight": "block.weights[0 + i]"}
 
 
-@kernel
-def advance(lever, law, w, blocks, lanes, twist, dt):
-    """Step the cells at a held twist, and return their wrench.
+def _step_of(kind: CellKind) -> Callable[[Trace], Any]:
+    """Return the step of a cell in a trace: its bristle, and its wrench."""
 
-    `lanes` is `LANES` or less, but the compiler must not know it: a loop of constant count it would write out cell by
-    cell.
+    def step(trace: Trace) -> Any:
+        s = _Symbols(trace, kind)
+        new, traction = twin(kind.element.step)(s.law, s.z, s.u, s.dt)
+        return new, twin(kind.lever.wrench)(s.cell, tuple(s.weight * each for each in traction))
+
+    return step
+
+
+def forward_passes(kind: CellKind) -> Passes:
+    """Write the step of the cells of a block, in place."""
+    stores = list(_fields("z", Z, kind.element.size).values())
+    return passes(kind.element.name, traced(_step_of(kind)), _in_block(kind), stores, **kind.element.forward._asdict())
+
+
+def step_passes(kind: CellKind) -> Passes:
+    """Write the step of cells in `Rows`; the new bristles may go where the old ones are, so they are written last."""
+    stores = _rows("new", "out", kind.element.size)
+    sources, division = _in_rows(kind) | stores, kind.element.forward._asdict()
+    return passes(f"steps of {kind.element.name}", traced(_step_of(kind)), sources, list(stores.values()), **division)
+
+
+def backward_passes(kind: CellKind) -> Passes:
+    """Write the adjoint of a step of the cells of a block: the cotangent of the state in place, and sums over cells.
+
+    These are the cotangents of the twist [3], of the load, and of the law in the order of `cells_rollout.PARAMETERS`.
     """
-    work, total = room(FIELDS), (0.0, 0.0, 0.0)
-    for k in range(blocks):
-        on = Step(at(w, k * BLOCK), work, twist, dt)
-        step(lever, law, on, lanes)
-        total = plus(total, 1.0, _pull(lever, law, on, lanes))
-    return total
+    element, lever = kind.element, kind.lever
+    written = derive(element.step, BY, ("z", "u"))
+
+    def adjoint(trace: Trace) -> Any:
+        s = _Symbols(trace, kind)
+        load, keeps, by_load = (Number(trace, name) for name in ("load", "keeps", "by_load"))
+        pulled = twin(lever.seen)(s.cell, s.several("p", 3))
+        (_, traction), tape = twin(written.forth)(s.law, s.z, s.u, s.dt)
+        state_bar = tuple(keeps * each for each in s.several("b", element.size))
+        z_bar, u_bar, *law_bar = twin(written.back)(tape, (state_bar, tuple(load * s.weight * each for each in pulled)))
+        along = sum(a * b for a, b in zip(pulled, traction, strict=True))
+        return z_bar, twin(lever.wrench)(s.cell, u_bar), (s.weight + load * by_load) * along, tuple(law_bar)
+
+    pull = {f"p{m}": f"shared[{m + 3}]" for m in range(3)} | {"load": "shared[1]", "keeps": "shared[2]"}
+    bar = _fields("b", BAR, element.size)
+    sources = _in_block(kind) | pull | bar | {"by_load": f"block[{BY_LOAD} + i]"}
+    name, division = f"{element.name}_back", element.backward._asdict()
+    return passes(name, traced(adjoint), sources, list(bar.values()), **division)
+
+
+def rate_passes(kind: CellKind) -> Passes:
+    """Write the rates of cells in `Rows`, and their wrench."""
+    element = kind.element
+
+    def rate(trace: Trace) -> Any:
+        s = _Symbols(trace, kind)
+        zdot, traction = twin(element.evaluate)(s.law, s.z, s.u)
+        return zdot, twin(kind.lever.wrench)(s.cell, tuple(s.weight * each for each in traction))
+
+    stores, division = list(_rows("rate", "out", element.size).values()), element.rate._asdict()
+    return passes(f"rates of {element.name}", traced(rate), _in_rows(kind), stores, **division)
+
+
+def slope_passes(kind: CellKind) -> Passes:
+    """Write the derivatives of the rates of cells in `Rows`, by state and velocity."""
+    element = kind.element
+    written = derive(element.evaluate, ("z", "u"), ("z", "u"))
+    units = [tuple(float(m == j) for m in range(element.size)) for j in range(element.size)]
+
+    def slopes(trace: Trace) -> Any:
+        s = _Symbols(trace, kind)
+        _, tape = twin(written.forth)(s.law, s.z, s.u)
+        rows = [twin(written.back)(tape, (unit, (0.0,) * element.size)) for unit in units]
+        return tuple(by_z for by_z, _ in rows), tuple(by_u for _, by_u in rows)
+
+    stores = [f"block.out[{m * LANES} + i]" for m in range(2 * element.size**2)]  # of a block: that lies apart
+    name, division = f"slopes of {element.name}", element.slopes._asdict()
+    return passes(name, traced(slopes), _in_rows(kind), stores, **division)

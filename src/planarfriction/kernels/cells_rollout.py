@@ -14,7 +14,6 @@ from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.calls import pointer
 from planarfriction.compiler.memory import at
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, distributed_step
 from planarfriction.kernels.bind import bind
 from planarfriction.kernels.cell_blocks import (
     BAR,
@@ -29,12 +28,12 @@ from planarfriction.kernels.cell_blocks import (
     lever_at,
     totals,
 )
-from planarfriction.kernels.cell_passes import advance
-from planarfriction.kernels.cell_slopes import retreat
+from planarfriction.kernels.derive import derive
 from planarfriction.kernels.forward import forward
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rollouts import row_of
-from planarfriction.kernels.vectors import add, plus, reader_of, scatter, three, times
+from planarfriction.kernels.settle import factor_at, softening, stiffened, within
+from planarfriction.kernels.vectors import add, plus, scatter, three, times
 
 PARAMETERS = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
 """Numbers of the law that derivatives are taken by."""
@@ -104,6 +103,46 @@ def _weigh(w, blocks, lanes, weights, by_load):
             block[WEIGHT + i], block[BY_LOAD + i] = weights[first + i], by_load[first + i]
 
 
+# ---------------------------------------------------------------------- limits of a fixed stiffness
+
+_LIMITED = "z", "law.sigma_0", "law.mu_s"
+_within = derive(within, _LIMITED, ("z",))
+_forth_within, _back_within, _pushed_within = _within.forth, _within.back, forward(within, _LIMITED, ("z",))
+
+
+@kernel
+def _bring_back(kind, law, w, blocks, lanes):
+    """Bring bristles back onto their limits (see `settle`)."""
+    for k in range(blocks):
+        block = at(w, k * BLOCK)
+        for i in range(lanes):
+            scatter(block, Z + i, LANES, within(law, kind.vector(block, Z + i, LANES)))
+
+
+@kernel
+def _bring_back_pull(kind, law, w, blocks, lanes):
+    """Carry the cotangents of bristles back over `_bring_back`; return those of sigma_0 and mu_s."""
+    total = (0.0, 0.0)
+    for k in range(blocks):
+        block = at(w, k * BLOCK)
+        for i in range(lanes):
+            _, tape = _forth_within(law, kind.vector(block, Z + i, LANES))
+            bars = _back_within(tape, (kind.vector(block, BAR + i, LANES),))
+            scatter(block, BAR + i, LANES, bars[0])
+            total = plus(total, 1.0, bars[1:])
+    return total
+
+
+@kernel
+def _bring_back_push(kind, law, by, block, lanes):
+    """Bring bristles back, and their changes for changes `by` of the law, as `BY` has them."""
+    for i in range(lanes):
+        z, change = kind.vector(block, Z + i, LANES), kind.vector(block, BAR + i, LANES)
+        z, change = _pushed_within(law, z, change, by[0], by[4])
+        scatter(block, Z + i, LANES, z)
+        scatter(block, BAR + i, LANES, change)
+
+
 # ---------------------------------------------------------------------- roll-outs
 
 
@@ -122,7 +161,10 @@ def _roll(kind, law, inputs, b, n, w, wrench, states):
         if load == 0.0:
             _forget(w, blocks, Z, kind.size)
         else:
-            add(wrench[t], times(load, kind.advance(kind.lever, law, w, blocks, lanes, twist, dt)))
+            stiff = stiffened(law, inputs.reference, load)
+            if inputs.reference > 0.0:
+                _bring_back(kind, stiff, w, blocks, lanes)
+            add(wrench[t], times(load, kind.advance(kind.lever, stiff, w, blocks, lanes, twist, dt)))
 
 
 @kernel
@@ -137,7 +179,7 @@ def _rollout(kind, inputs, span, z, wrench, states, scratch):
         _read(w, Z, z[b], n, kind.size)
 
 
-def rollout(kind, inputs, span, z, wrench, states):
+def rollout(inputs, span, z, wrench, states, *, kind):
     """Step the contacts `span[0]` to `span[1]`: `z` [B, size n] in place, wrenches added to `wrench` [B, T, 3].
 
     The state before each step goes into `states` [B, T, size n], unless that is empty.
@@ -161,11 +203,20 @@ def _pull(kind, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
             _weigh(w, blocks, lanes, weights[last], inputs.by_load[last])
         _write(w, Z, states[t], n, kind.size)
         load, pull, held = loads[t], three(pulls[t]), (three(twists[t]), inputs.dt[t])
+        stiff, by_stiff = stiffened(law, inputs.reference, load), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        if inputs.reference > 0.0:
+            _bring_back(kind, stiff, w, blocks, lanes)
         for k in range(blocks):
-            bars = kind.retreat(kind.lever, law, at(w, k * BLOCK), lanes, held, pull, load)
+            bars = kind.retreat(kind.lever, stiff, at(w, k * BLOCK), lanes, held, pull, load)
             add(twist_bar[t], bars.twist)
             load_bar[t] += bars.load
-            by_law = plus(by_law, 1.0, bars.law)
+            by_stiff = plus(by_stiff, 1.0, bars.law)
+        if inputs.reference > 0.0:
+            _write(w, Z, states[t], n, kind.size)
+            spring, limit = _bring_back_pull(kind, stiff, w, blocks, lanes)
+            by_stiff = plus(by_stiff, 1.0, (spring, 0.0, 0.0, 0.0, limit, 0.0, 0.0, 0.0))
+            load_bar[t] += by_stiff[0] * softening(stiff, inputs.reference, load)
+        by_law = plus(by_law, 1.0, (by_stiff[0] * factor_at(inputs.reference, load), *by_stiff[1:]))
     return by_law
 
 
@@ -184,7 +235,7 @@ def _gradient(kind, inputs, states, wrench_bar, span, bars, scratch):
             row_bar[COLUMNS[m]] += by_law[m]
 
 
-def gradient(kind, inputs, states, wrench_bar, span, bars):
+def gradient(inputs, states, wrench_bar, span, bars, *, kind):
     """Add the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
     scratch = np.empty(divided(inputs.shapes.shape[1])[0] * BLOCK)
     _gradient(kind, inputs, states, wrench_bar, span, bars, scratch)
@@ -224,7 +275,6 @@ def _tangent(kind, inputs, span, z, changes, wrenches, slopes, scratch):
         turns, pushes = changes.twist[row_of(changes.twist, b)], changes.load[row_of(changes.load, b)]
         law, d_law, which = law_of(rows[row_of(rows, b)]), law_of(changes.rows[row_of(changes.rows, b)]), inputs.which
         which, last = which[row_of(which, b)], -1
-        by = (*d_law[:7], d_law.breakaway_ratio)
         _lay(w, blocks, inputs.data)
         _write(w, Z, z[b], n, kind.size)
         _write(w, BAR, changes.state[b], n, kind.size)
@@ -233,8 +283,13 @@ def _tangent(kind, inputs, span, z, changes, wrenches, slopes, scratch):
                 last = which[t]
                 _weigh(w, blocks, lanes, weights[last], all_by_load[last])
             load, twist, turn, dt = loads[t], three(twists[t]), three(turns[t]), inputs.dt[t]
+            stiff, stiffer = stiffened(law, inputs.reference, load), d_law.sigma_0 * factor_at(inputs.reference, load)
+            stiffer += pushes[t] * softening(stiff, inputs.reference, load)
+            by = (stiffer, *d_law[1:7], d_law.breakaway_ratio)
             for k in range(blocks):
-                _push(kind, law, by, at(w, k * BLOCK), twist, turn, dt, load, pushes[t], lanes)
+                if inputs.reference > 0.0:
+                    _bring_back_push(kind, stiff, by, at(w, k * BLOCK), lanes)
+                _push(kind, stiff, by, at(w, k * BLOCK), twist, turn, dt, load, pushes[t], lanes)
             add(wrenches[b, t], times(load, totals(w, blocks, OUT, lanes)))
             add(slopes[b, t], totals(w, blocks, OUT + 3 * LANES, lanes))
             if load == 0.0:
@@ -244,7 +299,7 @@ def _tangent(kind, inputs, span, z, changes, wrenches, slopes, scratch):
         _read(w, BAR, changes.state[b], n, kind.size)
 
 
-def tangent(kind, inputs, span, z, changes, wrenches, slopes):
+def tangent(inputs, span, z, changes, wrenches, slopes, *, kind):
     """Run roll-outs with their change along given ones of the inputs, added to `wrenches` and `slopes` [B, T, 3].
 
     `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state in place.
@@ -264,17 +319,9 @@ class CellRollouts(NamedTuple):
     tangent: Any
 
 
-class _Model(NamedTuple):
-    kind: Kind
-
-
 def bound(kind: Kind, name: str) -> CellRollouts:
     """Return the entry points of a kind of cells."""
-    return CellRollouts(*(bind(each, _Model(kind), f"{name}_{each.__name__}", jit) for each in TEMPLATES))
+    return CellRollouts(*(bind(each, f"{name}_{each.__name__}", jit, kind=kind) for each in TEMPLATES))
 
 
 TEMPLATES = rollout, gradient, tangent
-POINTS = Kind(cells.POSITIONS, 2, advance, retreat, pushed_of(distributed_step.cell), reader_of(2))
-"""Points without a metric."""
-TURNED_POINTS = POINTS._replace(lever=cells.LEVERS)
-ISOTROPIC, TURNED = bound(POINTS, "isotropic"), bound(TURNED_POINTS, "turned")

@@ -6,20 +6,20 @@ of `sigma_1` and `sigma_2` move no bristle.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.calls import pointer
 from planarfriction.compiler.memory import at
-from planarfriction.kernels import distributed_step
 from planarfriction.kernels.bind import bind
 from planarfriction.kernels.cell_blocks import BLOCK, LANES, WEIGHT, Kind, Z, divided, lever_at
-from planarfriction.kernels.cells_rollout import POINTS, TURNED_POINTS, _lay, _read, _write
+from planarfriction.kernels.cells_rollout import _lay, _read, _write
 from planarfriction.kernels.forward import forwards
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rollouts import row_of
+from planarfriction.kernels.settle import factor_at, stiffened, within
 from planarfriction.kernels.vectors import add, plus, scatter, three
 
 _MOVING = "sigma_0", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
@@ -27,6 +27,10 @@ PARAMETERS = (*_MOVING, "sigma_1", "sigma_2")
 """Numbers of the law, those first that move bristles."""
 
 _BY = tuple((f"law.{name}", "z")[: 1 + (name in _MOVING)] for name in PARAMETERS)
+
+_pushed_within = forwards(
+    within, tuple((f"law.{name}", "z")[name not in ("sigma_0", "mu_s") :] for name in _MOVING), ("z",)
+).pushed
 
 _CHANGE, _PULL = BLOCK, BLOCK + 3 * LANES * len(_MOVING)
 """Fields behind those of a block: changes of the state, and traction with its changes."""
@@ -42,10 +46,23 @@ def _change(kind, block, n, i):
 
 
 @kernel
-def _push_one(kind, pushed, law, block, i, twist, dt):
+def _bring_back(kind, law, block, stiffer, lanes):
+    """Bring bristles back onto their limits (see `settle`), with their changes."""
+    for i in range(lanes):
+        moved = _pushed_within(
+            law, kind.vector(block, Z + i, LANES), stiffer, _change(kind, block, 0, i), _change(kind, block, 1, i), 1.0,
+            _change(kind, block, 2, i), _change(kind, block, 3, i), _change(kind, block, 4, i),
+            _change(kind, block, 5, i),
+        )  # fmt: skip
+        scatter(block, Z + i, LANES, moved[0])
+        scatter(block, _CHANGE + i, LANES, moved[1:])
+
+
+@kernel
+def _push_one(kind, pushed, law, block, i, twist, dt, stiffer):
     z, u = kind.vector(block, Z + i, LANES), kind.lever.seen(lever_at(kind.lever, block, i), twist)
     found = pushed(
-        law, z, u, dt, 1.0, _change(kind, block, 0, i), 1.0, _change(kind, block, 1, i), 1.0,
+        law, z, u, dt, stiffer, _change(kind, block, 0, i), 1.0, _change(kind, block, 1, i), 1.0,
         _change(kind, block, 2, i), 1.0, _change(kind, block, 3, i), 1.0, _change(kind, block, 4, i), 1.0,
         _change(kind, block, 5, i), 1.0, 1.0
     )  # fmt: skip
@@ -55,9 +72,9 @@ def _push_one(kind, pushed, law, block, i, twist, dt):
 
 
 @kernel
-def _push(kind, pushed, law, block, twist, dt, lanes):
+def _push(kind, pushed, law, block, twist, dt, stiffer, lanes):
     for i in range(lanes):
-        _push_one(kind, pushed, law, block, i, twist, dt)
+        _push_one(kind, pushed, law, block, i, twist, dt, stiffer)
 
 
 @kernel
@@ -95,7 +112,10 @@ def _follow(kind, pushed, law, block, inputs, b, k, lanes, wanted, wrench, slope
         if load == 0.0:
             _forget(block)
             continue
-        _push(kind, pushed, law, block, three(twists[t]), inputs.dt[t], lanes)
+        stiff, stiffer = stiffened(law, inputs.reference, load), factor_at(inputs.reference, load)
+        if inputs.reference > 0.0:
+            _bring_back(kind, stiff, block, stiffer, lanes)
+        _push(kind, pushed, stiff, block, three(twists[t]), inputs.dt[t], stiffer, lanes)
         add(wrench[t], _total(kind, block, lanes, load, 0))
         for d in range(wanted.shape[0]):
             change = _total(kind, block, lanes, load, 1 + wanted[d])
@@ -116,7 +136,7 @@ def _sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes, scra
         _read(w, Z, z[b], n, kind.size, _SIZE)
 
 
-def sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes):
+def sensitivities(inputs, span, z, wanted, wrenches, slopes, *, kind, pushed):
     """Run roll-outs with their derivatives by the numbers `wanted` of `PARAMETERS`.
 
     They are added to `wrenches` [B, T, 3] and `slopes` [B, T, 3, len(wanted)]; `z` [B, size n] in place.
@@ -125,17 +145,7 @@ def sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes):
     _sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes, scratch)
 
 
-class _Model(NamedTuple):
-    kind: Kind
-    pushed: Any
-    """`(law, z, u, dt, changes)`: step a cell and its changes by each number of the law."""
-
-
 def bound(kind: Kind, step: Any, name: str) -> Any:
-    """Return the entry point of a kind of cells, with the step of one."""
+    """Return the entry point of a kind of cells, with the step of one and its changes by each number of the law."""
     pushed = forwards(step, _BY, ("z", "u")).pushed
-    return bind(sensitivities, _Model(kind, pushed), f"{name}_sensitivities", jit)
-
-
-ISOTROPIC = bound(POINTS, distributed_step.cell, "isotropic")
-TURNED = bound(TURNED_POINTS, distributed_step.cell, "turned")
+    return bind(sensitivities, f"{name}_sensitivities", jit, kind=kind, pushed=pushed)

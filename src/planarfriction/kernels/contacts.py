@@ -8,7 +8,6 @@ body needs to know of a contact; what is behind its wrench is called by address 
 from __future__ import annotations
 
 import math
-from collections import namedtuple
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -79,8 +78,7 @@ WORDS = ("pdddd", "pddd", "pdfdd", "pdfddd", "pddddd", "pddddddff", "pdddd", "pd
 
 def functions_of(name: str, templates: tuple, **model: Any) -> ModelFunctions:
     """Return the functions of a model, entry points `<name>_<template>`: templates that are bound to its argument."""
-    own = namedtuple("Own", model)(**model)
-    return ModelFunctions(*(bind(each, own, f"{name}_{each.__name__}", entry) for each in templates))
+    return ModelFunctions(*(bind(each, f"{name}_{each.__name__}", entry, **model) for each in templates))
 
 
 def calls_of(functions: ModelFunctions, *, change: bool = False) -> np.ndarray:

@@ -8,6 +8,12 @@ from planarfriction.compiler.memory import Doubles, Integers, Layout, offsets_of
 from planarfriction.kernels.following import Followers
 from planarfriction.kernels.steps import SLOPES
 
+ALONG = 1e-12
+"""Square of the sine of the angle between a frame's x axis and the normal below which its y axis takes its place."""
+
+FLAT = 0.25
+"""Square of that sine below which a patch that was in contact before keeps its x axis, carried along with its body."""
+
 
 class Problem(NamedTuple):
     """A problem of k patches."""

@@ -39,7 +39,7 @@ def evaluate_disc(law, z, u):
     return plus(rate, -k, z), plus(pull, law.sigma_1 * k, z)
 
 
-def evaluate(lever, bristle, read, contact, z, v, zdot, w):
+def evaluate(contact, z, v, zdot, w, *, lever, bristle, read):
     """Write `z'`, and `W`; l comes behind the twist, `v` [4]."""
     own, twist, factor, total = read(contact), three(v), v[3], (0.0, 0.0, 0.0)
     n = own.count
@@ -52,7 +52,7 @@ def evaluate(lever, bristle, read, contact, z, v, zdot, w):
     put(w, total)
 
 
-def linearise(lever, bristle, read, contact, z, v, lin):
+def linearise(contact, z, v, lin, *, lever, bristle, read):
     """Write A, F, C and E of each cell, and l in a row [n] behind all; `v` as in `evaluate`."""
     own, twist, factor = read(contact), three(v), v[3]
     n = own.count
@@ -65,7 +65,7 @@ def linearise(lever, bristle, read, contact, z, v, lin):
     lin[MATRICES * bristle.size * bristle.size * n] = factor
 
 
-def change(lever, bristle, read, contact, z, zdot, lin, dz, dzdot, rows, friction, size):
+def change(contact, z, zdot, lin, dz, dzdot, rows, friction, size, *, lever, bristle, read):
     """Write the changes of `z'` and of the wrench, as `general_cells.change` does."""
     own, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
     n, twist = own.count, (rows.d_twist[0], rows.d_twist[1], rows.d_twist[2] + size * rows.twist[2])

@@ -89,8 +89,8 @@ def slopes_of(function: Any, size: int) -> Any:
 
     @kernel
     def slopes(*arguments):
-        found, tape = forth(*arguments)
-        return CellSlopes(found[0], found[1], *rows_of(tape))
+        results, tape = forth(*arguments)
+        return CellSlopes(results[0], results[1], *rows_of(tape))
 
     return slopes
 
@@ -155,108 +155,109 @@ def _matrix(bristle, lin, which, i, n):
     return bristle.matrix(lin, which * bristle.size * bristle.size * n + i, n)
 
 
-def evaluate(lever, bristle, read, contact, z, v, zdot, w):
+def evaluate(contact, z, v, zdot, w, *, lever, bristle, read):
     """Write `z'`, and `W`."""
-    own, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
-    n = own.count
+    record, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
+    n = record.count
     for i in range(n):
-        cell = lever.of(own, i)
-        rate, t = bristle.evaluate(lever.law(own, i), bristle.vector(z, i, n), lever.seen(cell, twist))
+        cell = lever.of(record, i)
+        rate, t = bristle.evaluate(lever.law(record, i), bristle.vector(z, i, n), lever.seen(cell, twist))
         scatter(zdot, i, n, rate)
-        total = plus(total, own.weights[i], lever.wrench(cell, t))
+        total = plus(total, record.weights[i], lever.wrench(cell, t))
     put(w, total)
 
 
-def linearise(lever, bristle, read, contact, z, v, lin):
+def linearise(contact, z, v, lin, *, lever, bristle, read):
     """Write A, F, C and E of each cell."""
-    own, twist = read(contact), three(v)
-    n = own.count
+    record, twist = read(contact), three(v)
+    n = record.count
     for i in range(n):
-        u = lever.seen(lever.of(own, i), twist)
-        found = bristle.linearise(lever.law(own, i), bristle.vector(z, i, n), u)
-        scatter(lin, i, n, (found.new_z, found.new_u))
+        u = lever.seen(lever.of(record, i), twist)
+        linear = bristle.linearise(lever.law(record, i), bristle.vector(z, i, n), u)
+        scatter(lin, i, n, (linear.new_z, linear.new_u))
         if not bristle.linear:
             place = C * bristle.size * bristle.size * n + i
-            scatter(lin, place, n, (found.traction_z, found.traction_u))
+            scatter(lin, place, n, (linear.traction_z, linear.traction_u))
 
 
-def factor(lever, bristle, read, contact, z, shift, lin, stiffness):
+def factor(contact, z, shift, lin, stiffness, *, lever, bristle, read):
     """Invert D, write `sum w B' (C D^-1 F + E) B`."""
-    own, total = read(contact), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    n = own.count
+    record, total = read(contact), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    n = record.count
     for i in range(n):
         inverse = bristle.inverse(shift, _matrix(bristle, lin, A, i, n))
         scatter(lin, INVERSE * bristle.size * bristle.size * n + i, n, inverse)
         driven = matrix_product(inverse, _matrix(bristle, lin, F, i, n))
         if bristle.linear:
-            p = bristle.add_diagonal(times(-own.law.sigma_0 - own.law.sigma_1 * shift, driven), -own.law.sigma_2)
+            pull = record.law.sigma_0 + record.law.sigma_1 * shift
+            p = bristle.add_diagonal(times(-pull, driven), -record.law.sigma_2)
         else:
             p = plus(matrix_product(_matrix(bristle, lin, C, i, n), driven), 1.0, _matrix(bristle, lin, E, i, n))
-        total = plus(total, own.weights[i], lever.around(lever.of(own, i), p))
+        total = plus(total, record.weights[i], lever.around(lever.of(record, i), p))
     put_all(stiffness, total)
 
 
-def eliminate(lever, bristle, read, contact, z, shift, r, lin, w):
+def eliminate(contact, z, shift, r, lin, w, *, lever, bristle, read):
     """Write `sum w B' C D^-1 r`."""
-    own, total = read(contact), (0.0, 0.0, 0.0)
-    n = own.count
+    record, total = read(contact), (0.0, 0.0, 0.0)
+    n = record.count
     for i in range(n):
         residual = bristle.vector(r, i, n)
-        moved = matrix_applied(_matrix(bristle, lin, INVERSE, i, n), residual)
+        solved = matrix_applied(_matrix(bristle, lin, INVERSE, i, n), residual)
         if bristle.linear:
-            t = plus(times(own.law.sigma_1, residual), -own.law.sigma_0 - own.law.sigma_1 * shift, moved)
+            t = plus(times(record.law.sigma_1, residual), -record.law.sigma_0 - record.law.sigma_1 * shift, solved)
         else:
-            t = matrix_applied(_matrix(bristle, lin, C, i, n), moved)
-        total = plus(total, own.weights[i], lever.wrench(lever.of(own, i), t))
+            t = matrix_applied(_matrix(bristle, lin, C, i, n), solved)
+        total = plus(total, record.weights[i], lever.wrench(lever.of(record, i), t))
     put(w, total)
 
 
-def back_substitute(lever, bristle, read, contact, z, r, dv, lin, out):
+def back_substitute(contact, z, r, dv, lin, out, *, lever, bristle, read):
     """Solve `D out = r + F B dV`."""
-    own, twist = read(contact), three(dv)
-    n = own.count
+    record, twist = read(contact), three(dv)
+    n = record.count
     for i in range(n):
-        driven = matrix_applied(_matrix(bristle, lin, F, i, n), lever.seen(lever.of(own, i), twist))
+        driven = matrix_applied(_matrix(bristle, lin, F, i, n), lever.seen(lever.of(record, i), twist))
         driven = plus(driven, 1.0, bristle.vector(r, i, n))
         scatter(out, i, n, matrix_applied(_matrix(bristle, lin, INVERSE, i, n), driven))
 
 
-def change(lever, bristle, read, contact, z, zdot, lin, dz, dzdot, rows, friction, size):
+def change(contact, z, zdot, lin, dz, dzdot, rows, friction, size, *, lever, bristle, read):
     """Write the changes of `z'` and of the wrench; bristles grow with friction, and with them what they tend to."""
-    own, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
-    n, twist = own.count, (rows.d_twist[0], rows.d_twist[1], rows.d_twist[2] + size * rows.twist[2])
+    record, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
+    n, twist = record.count, (rows.d_twist[0], rows.d_twist[1], rows.d_twist[2] + size * rows.twist[2])
     for i in range(n):
-        cell, b = lever.of(own, i), bristle.vector(z, i, n)
+        cell, b = lever.of(record, i), bristle.vector(z, i, n)
         u, a = lever.seen(cell, twist), plus(bristle.vector(dz, i, n), -friction, b)
         rate = matrix_applied(_matrix(bristle, lin, A, i, n), a)
         rate = plus(rate, 1.0, matrix_applied(_matrix(bristle, lin, F, i, n), u))
         scatter(dzdot, i, n, rate)
         if bristle.linear:
-            t = traction(own.law, a, rate, u)
+            t = traction(record.law, a, rate, u)
         else:
             t = matrix_applied(_matrix(bristle, lin, C, i, n), a)
             t = plus(t, 1.0, matrix_applied(_matrix(bristle, lin, E, i, n), u))
-        total = plus(total, own.weights[i], lever.wrench(cell, plus(t, -friction * own.law.sigma_0, b)))
+        total = plus(total, record.weights[i], lever.wrench(cell, plus(t, -friction * record.law.sigma_0, b)))
     put(rows.d_wrench, plus(total, size * rows.wrench[2], (0.0, 0.0, 1.0)))
 
 
-def solve_transposed(bristle, read, contact, z, r, lin, out):
+def solve_transposed(contact, z, r, lin, out, *, bristle, read):
     """Solve `D' out = r`."""
     n = read(contact).count
     for i in range(n):
         scatter(out, i, n, matrix_applied_back(_matrix(bristle, lin, INVERSE, i, n), bristle.vector(r, i, n)))
 
 
-def pull_back(lever, bristle, read, contact, z, lin, dzdot, rows, out):
+def pull_back(contact, z, lin, dzdot, rows, out, *, lever, bristle, read):
     """Write the transpose of `change`."""
-    own, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
-    n, wrench = own.count, three(rows.d_wrench)
+    record, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
+    n, wrench = record.count, three(rows.d_wrench)
     for i in range(n):
-        cell, rate = lever.of(own, i), bristle.vector(dzdot, i, n)
-        t = times(own.weights[i], lever.seen(cell, wrench))
+        cell, rate = lever.of(record, i), bristle.vector(dzdot, i, n)
+        t = times(record.weights[i], lever.seen(cell, wrench))
         if bristle.linear:
-            rate = plus(rate, -own.law.sigma_1, t)
-            by_z, by_u = times(-own.law.sigma_0, t), times(-own.law.sigma_2, t)
+            rate = plus(rate, -record.law.sigma_1, t)
+            by_z, by_u = times(-record.law.sigma_0, t), times(-record.law.sigma_2, t)
         else:
             by_z = matrix_applied_back(_matrix(bristle, lin, C, i, n), t)
             by_u = matrix_applied_back(_matrix(bristle, lin, E, i, n), t)
@@ -266,42 +267,42 @@ def pull_back(lever, bristle, read, contact, z, lin, dzdot, rows, out):
     put(rows.d_twist, total)
 
 
-def step(lever, bristle, read, contact, z, v, dt, new, out):
+def step(contact, z, v, dt, new, out, *, lever, bristle, read):
     """Advance the bristles by `dt` at a held twist, and write the wrench at the end."""
-    own, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
-    n = own.count
+    record, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
+    n = record.count
     for i in range(n):
-        cell = lever.of(own, i)
-        moved, t = bristle.step(lever.law(own, i), bristle.vector(z, i, n), lever.seen(cell, twist), dt)
-        scatter(new, i, n, moved)
-        total = plus(total, own.weights[i], lever.wrench(cell, t))
+        cell = lever.of(record, i)
+        end, t = bristle.step(lever.law(record, i), bristle.vector(z, i, n), lever.seen(cell, twist), dt)
+        scatter(new, i, n, end)
+        total = plus(total, record.weights[i], lever.wrench(cell, t))
     put(out, total)
 
 
 @kernel
-def _put_cell(lever, bristle, cell, weight, found, i, n, out):
+def _put_cell(lever, bristle, cell, weight, linear, i, n, out):
     """Write the derivatives of cell i to its places in d new/dV [d, n, 3], dW/dz [3, d, n] and d new/dz [d, d, n]."""
     d = bristle.size
     for j in range(3):
         unit = (1.0 if j == 0 else 0.0), (1.0 if j == 1 else 0.0), (1.0 if j == 2 else 0.0)
         u = lever.seen(cell, unit)
-        scatter(out, 3 * i + j, 3 * n, matrix_applied(found.new_u, u))
-        scatter(out, (3 + j) * d * n + i, n, times(weight, matrix_applied_back(found.traction_z, u)))
-    scatter(out, 6 * d * n + i, n, found.new_z)
+        scatter(out, 3 * i + j, 3 * n, matrix_applied(linear.new_u, u))
+        scatter(out, (3 + j) * d * n + i, n, times(weight, matrix_applied_back(linear.traction_z, u)))
+    scatter(out, 6 * d * n + i, n, linear.new_z)
 
 
-def slopes(lever, bristle, read, whole, contact, z, v, dt, new, out):
+def slopes(contact, z, v, dt, new, out, *, lever, bristle, read, whole):
     """Step with the slopes of the wrench, or with all derivatives."""
-    own, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
-    n, by_twist = own.count, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    record, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
+    n, by_twist = record.count, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for i in range(n):
-        cell = lever.of(own, i)
-        found = bristle.linearise_step(lever.law(own, i), bristle.vector(z, i, n), lever.seen(cell, twist), dt)
-        scatter(new, i, n, found.new)
-        total = plus(total, own.weights[i], lever.wrench(cell, found.traction))
-        by_twist = plus(by_twist, own.weights[i], lever.around(cell, found.traction_u))
+        cell = lever.of(record, i)
+        linear = bristle.linearise_step(lever.law(record, i), bristle.vector(z, i, n), lever.seen(cell, twist), dt)
+        scatter(new, i, n, linear.new)
+        total = plus(total, record.weights[i], lever.wrench(cell, linear.traction))
+        by_twist = plus(by_twist, record.weights[i], lever.around(cell, linear.traction_u))
         if whole:
-            _put_cell(lever, bristle, cell, own.weights[i], found, i, n, at(out, SLOPES))
+            _put_cell(lever, bristle, cell, record.weights[i], linear, i, n, at(out, SLOPES))
     put(out, total)
     put_all(at(out, 3), by_twist)
 

@@ -1,56 +1,62 @@
 """Cells whose friction forwards and backwards is not the same: bristles that decay towards `c = a g(|u|)/sigma_0`.
 
-A twist that is held holds c, so `z - c` steps as the bristle of a cell without c does, and the traction is that of one
-less `sigma_0 c` (docs/anisotropy.md, "Asymmetric friction").
+A twist that is held holds c, so `z - c` moves as the bristle of a cell without c does, and the traction is that of one
+less `sigma_0 c` (docs/anisotropy.md, "Asymmetric friction"). The speed of a disc is its mean; spin does not lean.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.kernels import cells, distributed_step
-from planarfriction.kernels.contacts import functions_of, traction
-from planarfriction.kernels.general_cells import RATES, STEPS, bristle
-from planarfriction.kernels.rules import ratio
-from planarfriction.kernels.steps import step_functions
-from planarfriction.kernels.vectors import dot, norm, plus, times
+from planarfriction.formulas import LawNumbers
+from planarfriction.kernels import discs, points
+from planarfriction.kernels.vectors import Vector, norm, plus, times
 
 
 class Leaning(NamedTuple):
     """A law, and the asymmetry a of a cell."""
 
-    law: Any
-    a: tuple
+    law: LawNumbers
+    a: Vector
 
 
 @kernel
-def _law(own, i):
-    return Leaning(own.law, (own.cells[5 * own.count + i], own.cells[6 * own.count + i]))
+def _disc_centre(lean: Leaning, u: Vector) -> Vector:
+    """Compute c of a disc."""
+    size = formulas.stribeck(xp, discs.mean_speed(u), lean.law) / lean.law.sigma_0
+    return size * lean.a[0], size * lean.a[1], 0.0
 
 
 @kernel
-def evaluate(lean, z, u):
-    """Return z' and the traction of a cell that moves at u."""
-    speed = norm(u)
-    q = lean.law.sigma_0 / formulas.stribeck(xp, speed, lean.law)
-    h = plus(z, -1.0 / q, lean.a)
-    size = norm(h)
-    along = ratio(dot(h, u), size)
-    rate = plus(u, -formulas.bristle_decay(xp, size * q, along, speed, q, lean.law), h)
-    return rate, traction(lean.law, z, rate, u)
-
-
-@kernel
-def step(lean, z, u, dt):
-    """Return the new bristle and the traction of a cell that moves at u."""
+def evaluate(lean: Leaning, z: Vector, u: Vector) -> tuple[Vector, Vector]:
+    """Compute z' and the traction of a point that moves at u."""
     c = times(formulas.stribeck(xp, norm(u), lean.law) / lean.law.sigma_0, lean.a)
-    new, pull = distributed_step.cell(lean.law, plus(z, -1.0, c), u, dt)
+    rate, pull = points.evaluate(lean.law, plus(z, -1.0, c), u)
+    return rate, plus(pull, -lean.law.sigma_0, c)
+
+
+@kernel
+def step(lean: Leaning, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
+    """Compute the bristle after dt and the traction of a point that moves at u."""
+    c = times(formulas.stribeck(xp, norm(u), lean.law) / lean.law.sigma_0, lean.a)
+    new, pull = points.step(lean.law, plus(z, -1.0, c), u, dt)
     return plus(new, 1.0, c), plus(pull, -lean.law.sigma_0, c)
 
 
-_MODEL = {"lever": cells.LEVERS._replace(law=_law), "bristle": bristle(evaluate, step, linear=True), "read": cells.read}
-RATES_OF_LEANING = functions_of("leaning", RATES, **_MODEL)
-STEPS_OF_LEANING = step_functions("leaning", STEPS, **_MODEL)
+@kernel
+def evaluate_disc(lean: Leaning, z: Vector, u: Vector) -> tuple[Vector, Vector]:
+    """Compute z' and the traction of a disc that moves at u."""
+    c = _disc_centre(lean, u)
+    rate, pull = discs.evaluate(lean.law, plus(z, -1.0, c), u)
+    return rate, plus(pull, -lean.law.sigma_0, c)
+
+
+@kernel
+def step_disc(lean: Leaning, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
+    """Compute the bristle after dt and the traction of a disc that moves at u."""
+    c = _disc_centre(lean, u)
+    new, pull = discs.step(lean.law, plus(z, -1.0, c), u, dt)
+    return plus(new, 1.0, c), plus(pull, -lean.law.sigma_0, c)

@@ -58,7 +58,7 @@ class Framed(NamedTuple):
     """`(own)`: return 1; 0 of a point, whose third state has no effect and keeps its value."""
 
 
-def step(frame, hold, taped_step, contact, z, v, dt, new, out):
+def step(contact, z, v, dt, new, out, *, frame, hold, taped_step):
     """Step a contact (see `steps.StepFunctions`)."""
     (own, framed), z = frame.read(contact), three(z)
     spins = frame.spins(own)
@@ -67,7 +67,7 @@ def step(frame, hold, taped_step, contact, z, v, dt, new, out):
     put(out, frame.wrench(own, done.wrench))
 
 
-def slopes(frame, hold_slopes, taped_step, pull_back, whole, contact, z, v, dt, new, out):
+def slopes(contact, z, v, dt, new, out, *, frame, hold_slopes, taped_step, pull_back, whole):
     """Step a contact with the slopes of the wrench, or with all derivatives, the rows of the wrench first."""
     (own, framed), z = frame.read(contact), three(z)
     spins = frame.spins(own)

@@ -26,14 +26,14 @@ from planarfriction.kernels.vectors import plus
 COSTS = {"exp(": 16, "sin(": 14, "cos(": 14, "log(": 16, "pow(": 30, "sqrt(": 8, " / ": 8}
 """Costs of operations, in sums and products."""
 
-ARGUMENTS = "law, v, given, block, work"
+ARGUMENTS = "law, v, shared, block, work"
 
 
 class Passes(NamedTuple):
     """Loops over the cells of a block, as one function."""
 
     run: Any
-    """`(law, v, given, block, work, lanes)`: run the passes, and return the sums over the cells."""
+    """`(law, v, shared, block, work, lanes)`: run the passes, and return the sums over the cells."""
     rows: int
     """Rows [LANES] of scratch `work`."""
     source: str

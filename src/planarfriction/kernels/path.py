@@ -9,7 +9,7 @@ import numpy as np
 from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.calls import call
 from planarfriction.compiler.memory import at, exists
-from planarfriction.kernels.body import read
+from planarfriction.kernels.body import read, settle_all
 from planarfriction.kernels.integration import read_run
 from planarfriction.kernels.rosenbrock import PAUSED, PIECE, SINCE, STEPS, advance
 from planarfriction.kernels.vectors import put, three
@@ -45,6 +45,8 @@ def follow(run, path):
         if starting:
             if since == 0.0 and exists(own.motion.velocity):
                 put(at(progress.y, n - 6), three(at(own.motion.velocity, 3 * piece)))
+            if since == 0.0:
+                settle_all(own, piece, progress.y)
             path.piece[count], path.since[count] = piece, since
             for i in range(n):
                 path.state[count, i] = progress.y[i]

@@ -34,6 +34,8 @@ class Inputs(NamedTuple):
     """Weights of cells, [L, M]."""
     by_load: np.ndarray
     """Slopes of these by the load, [L, M] [1/N]."""
+    reference: float = 0.0
+    """Reference load [N] of a law whose stiffness does not grow with the load; 0 of others."""
 
 
 class Bars(NamedTuple):

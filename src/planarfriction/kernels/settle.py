@@ -17,6 +17,7 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call
 from planarfriction.compiler.memory import at
+from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.bristle_step import ROUNDING, cap
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.vectors import norm, scatter, times
@@ -30,6 +31,22 @@ def factor_at(reference, load):
     """Return l; 1 of a published law, whose `reference` is 0."""
     fixed = reference > 0.0
     return xp.where(fixed, reference, 1.0) / xp.where(fixed, xp.maximum(load, formulas.LIGHTEST * reference), 1.0)
+
+
+@kernel
+def stiffened(law, reference, load):
+    """Return a law with the stiffness that it has at a load, per unit load."""
+    return LawNumbers(
+        law.sigma_0 * factor_at(reference, load), law.sigma_1, law.sigma_2, law.mu_c, law.mu_s, law.v_s, law.gamma,
+        law.elasto_plastic, law.breakaway_ratio, law.creep_speed,
+    )  # fmt: skip
+
+
+@kernel
+def softening(law, reference, load):
+    """Return the derivative by the load of the `sigma_0` of a `stiffened` law; 0 of a published one, and at no load."""
+    moves = load > formulas.LIGHTEST * reference and reference > 0.0
+    return xp.where(moves, -law.sigma_0, 0.0) / xp.where(moves, load, 1.0)
 
 
 @kernel

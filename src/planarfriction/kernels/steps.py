@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import functools
 import threading
-from collections import namedtuple
 from typing import Any, NamedTuple
 
 from numba import types
@@ -21,6 +20,7 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import call, pointer
 from planarfriction.compiler.memory import at, reader
+from planarfriction.formulas import LIGHTEST
 from planarfriction.kernels.bind import bind
 from planarfriction.kernels.settle import factor_at, stepped, unscale
 from planarfriction.kernels.vectors import plus, put, three, times
@@ -33,7 +33,7 @@ SLOPES = 12
 
 
 NUDGE = 1e-5
-"""Share of the load over which wrenches of a fixed stiffness are compared for their slope."""
+"""Share of the load over which steps of a fixed stiffness are compared for their slopes."""
 
 
 class StepFunctions(NamedTuple):
@@ -57,12 +57,10 @@ def step_functions(name: str, templates: tuple, **model: Any) -> StepFunctions:
     Those of slopes and of the Jacobian are one template, whose argument `whole` tells them apart.
     """
     step, slopes = templates
-    record = namedtuple("Own", [*model, "whole"])
-    one, whole = (record(**model, whole=each) for each in (False, True))
     return StepFunctions(
-        bind(step, one, f"{name}_step", entry),
-        bind(slopes, one, f"{name}_slopes", entry),
-        bind(slopes, whole, f"{name}_jacobian", entry),
+        bind(step, f"{name}_step", entry, **model),
+        bind(slopes, f"{name}_slopes", entry, **model, whole=False),
+        bind(slopes, f"{name}_jacobian", entry, **model, whole=True),
     )
 
 
@@ -164,20 +162,24 @@ def step_many(stepped, z, twist, load, dt, new, wrench, scratch):
 
 
 @kernel
-def _step_fixed(own, b, z, given, new, wrench_twist):
-    """Step contact b with a fixed stiffness: slopes behind `new` as others have them, and that of the wrench by load.
+def _step_fixed(own, b, z, given, new, by_load, wrench_load):
+    """Step contact b with a fixed stiffness: slopes behind `new` as others have them, and those by the load.
 
-    That one is a central difference.
+    These are central differences.
     """
     s, load, dt, record = own.states, given[3], given[4], _record(own, b)
     found, more, less = at(new, s), factor_at(own.reference, load * (1.0 + NUDGE)), load * (1.0 - NUDGE)
     stepped(own.function, record, own.size, s, more, z, given, dt, new, found)
     above = three(found)
+    for i in range(s):
+        by_load[i] = new[i]
     stepped(own.function, record, own.size, s, factor_at(own.reference, less), z, given, dt, new, found)
     change = times(0.5 / NUDGE, plus(above, -1.0, three(found)))
+    for i in range(s):
+        by_load[i] = (by_load[i] - new[i]) * (0.5 / NUDGE) / xp.maximum(load, own.reference * LIGHTEST)
     factor = factor_at(own.reference, load)
     stepped(own.function, record, own.size, s, factor, z, given, dt, new, found)
-    put(at(wrench_twist, 9), plus(three(found), 1.0, change))
+    put(wrench_load, plus(three(found), 1.0, change))
     by_twist = at(found, SLOPES)
     unscale(record, own.size, z, factor, s // own.size, by_twist, at(by_twist, 3 * s), at(by_twist, 6 * s))
 
@@ -187,11 +189,13 @@ def _jacobians(own, b, z, given, out, new):
     """Write the derivatives of a step of contact b to `out`; `new` [S] and all behind it are scratch."""
     s, load, dt = own.states, given[3], given[4]
     found, loaded, by_twist = at(new, s), 1.0 if load > 0.0 else 0.0, at(out, own.square)
-    of_wrench, wrench_twist = at(by_twist, 3 * s), at(by_twist, 6 * s)
+    by_load, of_wrench, wrench_twist = at(by_twist, 3 * s), at(by_twist, 4 * s), at(by_twist, 7 * s)
     if own.reference > 0.0:
-        _step_fixed(own, b, z, given, new, wrench_twist)
+        _step_fixed(own, b, z, given, new, by_load, at(wrench_twist, 9))
     else:
         call(own.function, (_record(own, b), z, given, dt, new, found))
+        for i in range(s):
+            by_load[i] = 0.0
         for m in range(3):
             wrench_twist[9 + m] = found[m]
     for m in range(9):
@@ -207,8 +211,8 @@ def _jacobians(own, b, z, given, out, new):
 def jacobians(stepped, z, given, result):
     """Write derivatives of steps of B contacts: `z` [B S]; `given` [B 5]: twist, load and dt; all arrays are flat.
 
-    Into `result` go, for one contact after the other: new state by state [square] and by twist [S, 3], wrench by state
-    [3, S], by twist [3, 3] and by load [3]. Behind all of them lies scratch for one contact.
+    Into `result` go, for one contact after the other: new state by state [square], by twist [S, 3] and by load [S],
+    wrench by state [3, S], by twist [3, 3] and by load [3]. Behind all of them lies scratch for one contact.
     """
     own, states, inputs, out = _read(stepped), pointer(z), pointer(given), pointer(result)
     n, count = own.states, given.shape[0] // 5
@@ -217,7 +221,7 @@ def jacobians(stepped, z, given, result):
     for b in range(count):
         if not (given[5 * b + 3] >= 0.0 and given[5 * b + 4] >= 0.0):
             return False
-    size = own.square + 6 * n + 12
+    size = own.square + 7 * n + 12
     for b in range(count):
         _jacobians(own, b, at(states, n * b), at(inputs, 5 * b), at(out, size * b), at(out, size * count))
     return True

@@ -9,8 +9,9 @@ stage is one `factor` and, for each parameter, one `solve` of `body`,
 with `J_i` at the cubic Hermite interpolant between the accepted steps of the motion. Derivatives need fewer digits than
 the motion, so that one step of theirs goes over several of it; the embedded method of order 3 tells how many.
 
-Friction and size enter by scaling: with all coefficients `g` times m, a bristle behaves as `z/m` did,
-`zdot(z; m) = zdot(z/m; 1)`; a patch `l` times as large sees `l omega` and gives `l tau`.
+Friction and size enter by scaling: with all coefficients `g` times m, a bristle behaves as `z/m` did, `zdot(z; m) =
+zdot(z/m; 1)`; a patch `l` times as large sees `l omega` and gives `l tau`. So does the load of a fixed stiffness, whose
+rates and wrenches per unit load are functions of `z/f`.
 """
 
 from __future__ import annotations
@@ -24,14 +25,15 @@ from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.calls import call, pointer
 from planarfriction.compiler.memory import arrays_at, at
 from planarfriction.kernels.body import (
+    NO_LOAD,
     function_of,
+    hardly_loaded,
     linearisation_of,
     load_of,
     maps_of,
     read,
     record_of,
     seen_by,
-    total_load,
 )
 from planarfriction.kernels.contacts import CHANGE, ROWS
 from planarfriction.kernels.path import hold, node_after
@@ -92,6 +94,23 @@ def change_of(own, piece, c, y, dy, dz, parameter, dzdot):
 
 
 @kernel
+def gained_load(parameter, place, c, load):
+    """Return the change of the load of contact c per change of an input."""
+    if parameter == NORMAL_FORCE:
+        return 1.0 if c == place else 0.0
+    return load if parameter == LOAD else 0.0
+
+
+@kernel
+def follow_load(own, c, y, load, more, dy):
+    """Add to the change `dy` of the bristles of contact c, if their stiffness is fixed, that by `more` load."""
+    reference = own.contacts.reference[c]
+    if reference > 0.0 and load > NO_LOAD * reference:
+        for m in range(own.contacts.state[c], own.contacts.state[c + 1]):
+            dy[m] -= more / load * y[m]
+
+
+@kernel
 def partial_of(own, piece, since, w, parameter, place, out):
     """Write `df/dp` of an input at the held state, linearised last; of a prescribed velocity that by its slope."""
     o, inverse_mass = own.bristles, own.motion.inverse_mass
@@ -111,21 +130,33 @@ def partial_of(own, piece, since, w, parameter, place, out):
 
 @kernel
 def _partial_of_contacts(own, piece, since, w, parameter, place, out):
-    rows, total = arrays_at(ROWS, own.work.rows), (0.0, 0.0, 0.0)
+    total = (0.0, 0.0, 0.0)
     for c in range(own.size):
-        if parameter == NORMAL_FORCE and c != place:
-            continue
-        a, wrench = maps_of(own, c)[0], three(at(own.work.wrench, 3 * c))
-        put(rows.d_wrench, wrench)
-        if parameter in (FRICTION, SIZE):
-            put(rows.twist, applied(a, seen_by(own, c, w.state)))
-            put(rows.wrench, wrench)
-            put(rows.d_twist, (0.0, 0.0, 0.0))
-            change_of(own, piece, c, w.state, w.rate, w.zero, parameter, out)
-        load = own.contacts.count[c] if parameter == NORMAL_FORCE else total_load(own, piece, since, c)
-        total = plus(total, load, applied_back(a, rows.d_wrench))
+        if parameter != NORMAL_FORCE or c == place:
+            change = wrench_by_input(own, piece, since, c, w.state, w, parameter, place, out)
+            total = plus(total, own.contacts.count[c], applied_back(maps_of(own, c)[0], change))
     for i in range(3):
         out[own.bristles + i] = own.motion.inverse_mass[i] * total[i]
+
+
+@kernel
+def wrench_by_input(own, piece, since, c, y, w, parameter, place, out):
+    """Return the change of the wrench of contact c by an input that scales it, and write those of bristle rates.
+
+    The state is held, and linearised last; `w.right` is scratch.
+    """
+    rows, load, unit = arrays_at(ROWS, own.work.rows), load_of(own, piece, since, c), three(at(own.work.wrench, 3 * c))
+    more = gained_load(parameter, place, c, load)
+    put(rows.d_wrench, (0.0, 0.0, 0.0))
+    if parameter in (FRICTION, SIZE) or (more > 0.0 and own.contacts.reference[c] > 0.0):
+        put(rows.twist, applied(maps_of(own, c)[0], seen_by(own, c, y)))
+        put(rows.wrench, unit)
+        put(rows.d_twist, (0.0, 0.0, 0.0))
+        for m in range(own.contacts.state[c], own.contacts.state[c + 1]):
+            w.right[m] = 0.0
+        follow_load(own, c, y, load, more, w.right)
+        change_of(own, piece, c, y, w.rate, w.right, parameter, out)
+    return plus(times(load, three(rows.d_wrench)), more, unit)
 
 
 @kernel
@@ -194,10 +225,21 @@ def forget(system, piece, slope):
 
 
 @jit
+def settle(system, piece, slope):
+    """Clear the slopes [P, n] of contacts that start a piece with hardly any load (see `body.settle_all`)."""
+    own = read(system)
+    for c in range(own.size):
+        if hardly_loaded(own, piece, c):
+            for p in range(slope.shape[0]):
+                for m in range(own.contacts.state[c], own.contacts.state[c + 1]):
+                    slope[p, m] = 0.0
+
+
+@jit
 def wrench_slopes(system, piece, since, y, drives, slope, wrench, out, scratch):
     """Write wrenches [C, 3] of one of the identical contacts, and from the slopes [P, n] of y theirs, `out` [C, 3, P].
 
-    `scratch` [2, n] needs no values.
+    `scratch` [3, n] needs no values.
     """
     own, n, y, slope = read(system), y.shape[0], pointer(y), pointer(slope)
     rate, rows = pointer(scratch), arrays_at(ROWS, own.work.rows)
@@ -209,11 +251,13 @@ def wrench_slopes(system, piece, since, y, drives, slope, wrench, out, scratch):
         put(rows.wrench, unit)
         wrench[c, 0], wrench[c, 1], wrench[c, 2] = times(load, unit)
         for p in range(drives.kind.shape[0]):
-            own_slope = at(slope, p * n)
-            body = at(own_slope, own.bristles)
+            body, dz = at(slope, p * n + own.bristles), at(rate, 2 * n)
             put(rows.d_twist, plus(applied(a, body), 1.0, applied(g, at(body, 3))))
-            change_of(own, piece, c, y, rate, own_slope, drives.kind[p], at(rate, n))
-            more = load if drives.kind[p] == LOAD else 0.0
-            if drives.kind[p] == NORMAL_FORCE and drives.place[p] == c:
-                more = drives.weight[p, 0] + drives.weight[p, 1] * since
+            more = gained_load(drives.kind[p], drives.place[p], c, load)
+            if drives.kind[p] == NORMAL_FORCE:
+                more *= drives.weight[p, 0] + drives.weight[p, 1] * since
+            for m in range(own.contacts.state[c], own.contacts.state[c + 1]):
+                dz[m] = slope[p * n + m]
+            follow_load(own, c, y, load, more, dz)
+            change_of(own, piece, c, y, rate, dz, drives.kind[p], at(rate, n))
             out[c, 0, p], out[c, 1, p], out[c, 2, p] = plus(times(load, three(rows.d_wrench)), more, unit)

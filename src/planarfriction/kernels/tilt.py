@@ -112,8 +112,8 @@ def _slopes(x, y, w, n, total, s, plane, step):
     rise = SOFTNESS * (step.x * step.x + step.y * step.y)
     for i in range(n):
         here, along = _at(plane, s, x[i], y[i]), _at(step, s, x[i], y[i])
-        share = w[i] / total * along if here > 0.0 else 0.0
-        found, rise = found + share * here, rise + share * along
+        carried = w[i] / total * along if here > 0.0 else 0.0
+        found, rise = found + carried * here, rise + carried * along
     return found, rise
 
 

@@ -145,10 +145,11 @@ def _is(value: Any, constant: float) -> bool:
 
 
 def kind_of(arguments: tuple) -> str:
-    """Return the kind of a result: an index if all arguments are."""
+    """Return the kind of a result: an index if all arguments are indices or truths."""
     if any(isinstance(each, Number) and each.kind == "wide" for each in arguments):
         return "wide"
-    whole = all(each.kind == "index" if isinstance(each, Number) else isinstance(each, int) for each in arguments)
+    wholes = ("index", "bool")
+    whole = all(each.kind in wholes if isinstance(each, Number) else isinstance(each, int) for each in arguments)
     return "index" if whole else "real"
 
 
@@ -172,6 +173,9 @@ class Trace:
         key = text, *((type(each), each) for each in names)
         if key not in self._known:
             self._known[key] = self._new(kind)
+            if kind == "real" and "[" not in text:  # indices of tables stay whole
+                kinds = [getattr(each, "kind", "") for each in arguments]
+                text = text.format(*(f"(real){{{i}}}" if one == "index" else f"{{{i}}}" for i, one in enumerate(kinds)))
             self.operations.append(Operation(self._known[key].name, kind, text, names))
         return self._known[key]
 

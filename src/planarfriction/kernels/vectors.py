@@ -10,6 +10,9 @@ from numba.extending import intrinsic
 
 from planarfriction.compiler import kernel
 
+Vector = tuple[float, ...]
+"""Vector in compiled code, or a matrix row by row."""
+
 _FLAGS = ("reassoc", "contract", "nsz", "arcp")
 
 

@@ -17,6 +17,12 @@ KINDS = {"N": "force", "N m": "torque", "m": "length", "rad": "angle"}
 MOST_NOISE = 5.0
 """Largest residual over the noise that is drawn where it is [-]; the rest stand at the rim."""
 
+STILL = 1e-5
+"""Speed below which nothing slides, over the largest one."""
+
+LOADED = 5.0
+"""Displacement that is drawn after a reversal, over the deflection of a bristle at the static friction [-]."""
+
 MOST_POINTS = 4000
 """Samples that are drawn; of more, evenly chosen ones."""
 
@@ -28,17 +34,21 @@ def plot_identification(result: pf.identify.Identification) -> style.PlotFigure:
     for larger ones. With wrenches, the friction coefficient over the sliding speed is drawn below with the fitted
     Stribeck curve: where it has no samples, the data say nothing. Beside it the correlation of the residuals over time,
     which that of noise leaves at zero. At the bottom predictions of fits that did not see a sample or its block, over
-    what was measured.
+    what was measured; of a log of one coordinate also the friction over its velocity, and over the displacement since
+    the last reversal, as long as bristles still load.
     """
     with_speed = "speed" in result.histories[0]
-    rows = len(result.channels)
+    shown = [
+        i for i in range(len(result.channels)) if any(np.isfinite(h["measured"][:, i]).any() for h in result.histories)
+    ]
+    rows = len(shown)
     figure = style.new_figure(9.6, 1.75 * rows + (5.8 if with_speed else 0.6))
     grid = figure.add_gridspec(rows + 2 * with_speed, 2, height_ratios=[1.0] * rows + [1.5, 1.6] * with_speed)
     place = _places(result)
     left = right = None
-    for i in range(rows):
-        left = figure.add_subplot(grid[i, 0], sharex=left)
-        right = figure.add_subplot(grid[i, 1], sharex=left, sharey=right)
+    for row, i in enumerate(shown):
+        left = figure.add_subplot(grid[row, 0], sharex=left)
+        right = figure.add_subplot(grid[row, 1], sharex=left, sharey=right)
         _draw_channel(left, right, result, i, place)
     assert left is not None and right is not None
     several = len(result.histories) > 1
@@ -48,9 +58,11 @@ def plot_identification(result: pf.identify.Identification) -> style.PlotFigure:
     if with_speed:
         _draw_speeds(figure.add_subplot(grid[rows, 0]), result)
         _draw_correlations(figure.add_subplot(grid[rows, 1]), result)
-        below = grid[rows + 1, :].subgridspec(1, rows)
-        for i in range(rows):
-            _draw_held_out(figure.add_subplot(below[0, i]), result, i)
+        below = grid[rows + 1, :].subgridspec(1, rows if rows > 1 else 3)
+        for column, i in enumerate(shown):
+            _draw_held_out(figure.add_subplot(below[0, column]), result, i)
+        if rows == 1:
+            _draw_loops(*(figure.add_subplot(below[0, column]) for column in (1, 2)), result, shown[0])
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=2, frameon=False, fontsize="small")
     return figure
@@ -96,7 +108,7 @@ def _draw_speeds(axes: Any, result: pf.identify.Identification) -> None:
     """Draw measured friction over load against the sliding speed, beside the fitted steady friction of pure sliding."""
     speed = np.concatenate([each["speed"] for each in result.histories])
     coefficient = np.concatenate([each["coefficient"] for each in result.histories])
-    usable = (speed > 0.0) & np.isfinite(coefficient)
+    usable = (speed > STILL * speed.max()) & np.isfinite(coefficient)
     speed, coefficient = speed[usable], coefficient[usable]
     if not len(speed):
         return
@@ -131,9 +143,6 @@ def _draw_held_out(axes: Any, result: pf.identify.Identification, i: int) -> Non
     both = ([each[key][:, i] for each in result.histories] for key in ("measured", "held_out"))
     measured, held_out = map(np.concatenate, both)
     seen = np.isfinite(measured) & np.isfinite(held_out)
-    if not seen.any():
-        axes.text(0.5, 0.5, f"{name} was not measured", ha="center", transform=axes.transAxes)
-        return
     measured, held_out = measured[seen], held_out[seen]
     shown = unit_for(KINDS[unit], measured)
     every = max(1, len(measured) // MOST_POINTS)
@@ -142,3 +151,29 @@ def _draw_held_out(axes: Any, result: pf.identify.Identification, i: int) -> Non
     axes.plot(edges, edges, color=style.PALETTE[1], linewidth=0.9, zorder=1)
     axes.set(xlabel=f"measured {name} [{shown.label}]", ylabel=f"held-out prediction [{shown.label}]")
     style.tidy(axes)
+
+
+def _draw_loops(over_speed: Any, over_way: Any, result: pf.identify.Identification, i: int) -> None:
+    """Draw a channel over the velocity along it, and over the displacement since the last reversal."""
+    name, unit = result.channels[i]
+    turning = unit == "N m"
+    force = unit_for(KINDS[unit], *(np.nan_to_num(each["measured"][:, i]) for each in result.histories))
+    size = float(result.model.patch.contact_radius()) if turning else 1.0
+    longest = LOADED * result.law.mu_s / result.law.sigma_0 / size
+    way = unit_for("angle" if turning else "length", np.array([longest]))
+    for number, each in enumerate(result.histories):
+        speed, time = each["twist"][:, i], each["time"]
+        step = np.concatenate([[0.0], 0.5 * (speed[1:] + speed[:-1]) * np.diff(time)])
+        since = np.cumsum(step)
+        turned = np.concatenate([[True], np.sign(step[1:]) * np.sign(step[:-1]) < 0.0])
+        last = np.maximum.accumulate(np.where(turned, np.arange(len(time)), 0))
+        since = since - since[np.maximum(last - 1, 0)]
+        near = np.where(np.abs(since) <= longest, since, np.nan)
+        for key, colour, style_of in (("measured", "0.6", "."), ("predicted", style.PALETTE[0], "-")):
+            for axes, place in ((over_speed, speed), (over_way, way.factor * near)):
+                label = {"measured": "measured", "predicted": "fitted"}[key] if number == 0 else None
+                axes.plot(place, force.factor * each[key][:, i], style_of, color=colour, ms=2.0, lw=0.8, label=label)
+    over_speed.set(xlabel="velocity [rad/s]" if turning else "velocity [m/s]", ylabel=f"{name} [{force.label}]")
+    over_way.set(xlabel=f"displacement since reversal [{way.label}]", ylabel=f"{name} [{force.label}]")
+    for axes in (over_speed, over_way):
+        style.tidy(axes)

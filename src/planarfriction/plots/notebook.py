@@ -179,10 +179,8 @@ def _beside(figure: style.PlotFigure | None, title: str, rows: dict[str, str]) -
         figure.savefig(buffer, format="png", dpi=96, bbox_inches="tight")
         data = base64.b64encode(buffer.getvalue()).decode()
         picture = f'<img alt="" src="data:image/png;base64,{data}">'
-    lines = "".join(
-        f'<tr><td style="text-align:left">{name}</td><td style="text-align:left">{html.escape(value)}</td></tr>'
-        for name, value in rows.items()
-    )
+    cells = ([f'<td style="text-align:left">{html.escape(each)}</td>' for each in row] for row in rows.items())
+    lines = "".join(f"<tr>{''.join(each)}</tr>" for each in cells)
     look = 'style="color:inherit;font:inherit"'
     table = f"<div><b>{html.escape(title)}</b><table {look}>{lines}</table></div>"
     return f'<div style="display:flex;align-items:center;gap:1em">{picture}{table}</div>'

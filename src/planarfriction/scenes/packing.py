@@ -187,9 +187,6 @@ class SegmentBatches:
         self._ahead = self._most
         self._pieces, self._done = Segments(scene, t_end, marks), 0
         contacts = scene.contacts
-        if sensitivities:
-            for contact in contacts:
-                refuse_fixed_stiffness(contact.model.law, "derivatives of scenes")
         follows = [contact.model.patch.depends_on_load for contact in contacts]
         self._between = [self._pieces.between(c) if follows[c] else None for c in range(len(contacts))]
         self.models: list[PackedModel] = []

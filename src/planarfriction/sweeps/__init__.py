@@ -1,8 +1,8 @@
 """Sweeps: many runs of a scene with varying quantities, resumable, in threads, processes or on several machines."""
 
-from planarfriction.sweeps.running import Progress, sweep
+from planarfriction.sweeps.running import Progress, finished_runs, sweep
 
-__all__ = ["Progress", "sweep"]
+__all__ = ["Progress", "finished_runs", "sweep"]
 
 
 def __dir__() -> list[str]:

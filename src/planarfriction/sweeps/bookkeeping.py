@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,8 +37,8 @@ OWN = {
 }
 """Variables of every sweep, with their descriptions."""
 
-_TEXTS = "UT"
-"""Kinds of dtypes that hold texts: of fixed width, and of any width as stores return them."""
+BETWEEN, SHARE = 0.5, 0.02
+"""Time between two files of runs: some seconds [s], and a share of the time since the sweep began."""
 
 Index = tuple[int, ...]
 """Place of a run in the grid."""
@@ -73,9 +75,6 @@ class Bookkeeper:
 
     def flush(self, at_once: bool = False) -> None:
         """Write what is in memory, if it is time or `at_once`."""
-
-    def close(self) -> None:
-        """Close what is open on disk."""
 
     def dataset(self) -> xr.Dataset:
         """Return the whole as one dataset; if the axis is the time, runs may have gone along it differently far."""
@@ -133,7 +132,7 @@ class Bookkeeper:
         values = np.asarray(example.values)
         shape = (*self.grid.shape, *values.shape)
         if self.grid.size * values.size > MOST_NUMBERS:
-            rule = f"need at most {MOST_NUMBERS} numbers in memory (use a .zarr store as out, or measure less)"
+            rule = f"need at most {MOST_NUMBERS} numbers in memory (measure less)"
             raise InvalidValueError("values", rule, f"{self.grid.size} runs of {values.size}")
         if values.dtype.kind == "U":
             return np.full(shape, "", dtype=object)
@@ -157,52 +156,60 @@ class Bookkeeper:
 
 
 class FolderBookkeeper(Bookkeeper):
-    """Bookkeeper with a folder: one file for each run that is done, one of scene and reason for each that failed."""
+    """Bookkeeper with a folder: files of many runs that are done, and one of scene and reason for each that failed.
+
+    A file is named by the digest of its content, so that any number of sweeps write to one folder, and damage is seen.
+    """
 
     def __init__(self, grid: Grid, timed: bool, path: str | Path) -> None:
         super().__init__(grid, timed)
-        self._begin = f"{make_folder(path)}{os.sep}"
+        self._folder = make_folder(path)
+        self._begin = self._written = monotonic()
+        self._kept: dict[str, Record] = {}
+        """Records of earlier sweeps by their keys."""
+        self._open: dict[str, Record] = {}
+        """Records that are in no file yet."""
+        for file in sorted(self._folder.glob("runs-*.npz")):
+            with contextlib.suppress(OSError):
+                content = file.read_bytes()
+                if file.name == _name(content):
+                    self._kept |= unpack(content)
+                    continue
+                file.unlink()
+            self.damaged += 1
 
     def _find(self, index: Index, key: str) -> Record | None:
-        """Read the file of a run; one that is not whole does not count."""
-        try:
-            with open(f"{self._begin}{key}.npz", "rb", buffering=0) as file:
-                content = file.read()
-        except OSError:
-            return None
-        try:
-            return unpack(content)
-        except Exception:  # whatever a damaged file does, the run is done again
-            self.damaged += 1
-            return None
+        """Return the record of a run that a file has."""
+        return self._kept.get(key)
 
     def _store(self, index: Index, key: str, record: Record, scene: Scene | None) -> Record:
-        """Write the file of a run, which a kill leaves out or whole."""
-        if not key:  # no scene was made
-            return record
-        failed = f"{self._begin}{key}.failed.json"
-        if record.status == FAILED:
-            _put(failed, failure(record.reason, scene).encode())
-            return record
-        if reason := _put(f"{self._begin}{key}.npz", pack(record)):
-            return Record(FAILED, reason, {})
-        with contextlib.suppress(OSError):
-            os.unlink(failed)
+        """Keep the record of a run for the next file, or write the file of a failure."""
+        failed = f"{self._folder}{os.sep}{key}.failed.json"
+        if record.status != FAILED:
+            self._open[key] = record
+            with contextlib.suppress(OSError):
+                os.unlink(failed)
+        elif key:  # there is a scene
+            try:
+                put(failed, failure(record.reason, scene).encode())
+            except FileError:
+                if not os.path.isdir(failed):
+                    raise
         return record
 
+    def flush(self, at_once: bool = False) -> None:
+        """Write the open records as one file, whole or not at all, so seldom that a long sweep has few files."""
+        now = monotonic()
+        if self._open and (at_once or now - self._written > BETWEEN + SHARE * (now - self._begin)):
+            content = pack(self._open)
+            put(f"{self._folder}{os.sep}{_name(content)}", content)
+            self._open.clear()
+            self._written = now
 
-def _put(path: str, content: bytes) -> str:
-    """Write the file of a run; returns the reason if a folder has its name, which concerns this run alone, or nothing.
 
-    Raises FileError if the file cannot be written for another reason, such as a full disk.
-    """
-    try:
-        put(path, content)
-    except FileError as error:
-        if not os.path.isdir(path):
-            raise
-        return str(error)
-    return ""
+def _name(content: bytes) -> str:
+    """Return the name of a file of runs."""
+    return f"runs-{hashlib.sha256(content).hexdigest()[:32]}.npz"
 
 
 # ---------------------------------------------------------------------- variables of a run in those of all
@@ -258,7 +265,7 @@ def difference(found: Mapping[str, History], first: Mapping[str, History]) -> st
         mine, other = np.asarray(each.values), np.asarray(first[name].values)
         if mine.shape != other.shape:
             return f"{name} has shape {list(mine.shape)} where the first run has {list(other.shape)}"
-        if (mine.dtype.kind in _TEXTS) != (other.dtype.kind in _TEXTS):
+        if (mine.dtype.kind == "U") != (other.dtype.kind == "U"):
             return f"{name} is {mine.dtype} where the first run has {other.dtype}"
         if each.dims == (name,) and not np.array_equal(mine, other):
             return f"the axis {name} differs from that of the first run: measure what has the same axes in all runs"

@@ -22,7 +22,7 @@ from planarfriction.scenes.signal import Signal
 if TYPE_CHECKING:
     from planarfriction.scenes import Scene
 
-LAYOUT = 2
+LAYOUT = 3
 """Number of the layout of stored runs: files of another layout do not count."""
 
 _JSON = json.JSONEncoder(sort_keys=True)

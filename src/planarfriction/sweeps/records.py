@@ -1,14 +1,12 @@
-"""Results of runs: simulating and measuring a scene, and the bytes of the file that keeps a result."""
+"""Results of runs: simulating and measuring a scene, and the bytes of the files that keep results."""
 
 from __future__ import annotations
 
 import contextlib
 import io
 import json
-import re
 import secrets
 import time
-import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -26,9 +24,6 @@ FAILED = "failed"
 
 TURN = 0.25
 """Time after which a worker hands back what it has [s]: short to whoever waits, long beside handing over."""
-
-_META = "planarfriction"
-"""Entry of a file that describes the others; no variable may have this name."""
 
 
 class Record(NamedTuple):
@@ -115,7 +110,7 @@ def _name_of(measure: Any) -> str:
 
 
 def _checked_name(name: Any) -> str:
-    if not (isinstance(name, str) and name and name != _META):
+    if not (isinstance(name, str) and name):
         raise InvalidValueError("measure", "use texts as names of what it returns", name)
     return name
 
@@ -135,40 +130,42 @@ def _variable(name: str, value: Any) -> History:
     return History(dims, values, attrs)
 
 
-def pack(record: Record) -> bytes:
-    """Convert a record to the bytes of an NPZ file with a checksum of each entry; equal records give equal bytes.
+def pack(runs: Mapping[str, Record]) -> bytes:
+    """Convert the records of runs, by their keys, to the bytes of an NPZ file; equal records give equal bytes.
 
-    Single numbers and texts are in the entry that describes the others, as JSON.
+    Variables of the same names, axes, types and shapes are stacked into one array each.
     """
-    about, arrays = {}, {}
-    for name, each in record.variables.items():
-        values = np.asarray(each.values)
-        single = values.ndim == 0 and values.dtype.kind in "biufU"
-        about[name] = [each.dims, each.attrs, values.dtype.str, values.item() if single else None]
-        if not single:
-            arrays[_entry(name)] = values
-    meta = json.dumps({"status": record.status, "reason": record.reason, "end": record.end, "variables": about})
+    groups: dict[Any, list[tuple[str, Record]]] = {}
+    for key, record in runs.items():
+        groups.setdefault(tuple(map(_layout, record.variables.items())), []).append((key, record))
+    meta, arrays = [], {}
+    for number, group in enumerate(groups.values()):
+        first = group[0][1].variables
+        outcomes = [[key, record.status, record.reason, record.end] for key, record in group]
+        meta.append([[[name, each.dims, each.attrs] for name, each in first.items()], outcomes])
+        for place, name in enumerate(first):
+            arrays[f"{number}.{place}"] = np.stack([record.variables[name].values for _, record in group])
     buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w") as file:  # np.savez has names of its own that no variable may have
-        for name, array in {_META: np.frombuffer(meta.encode(), np.uint8), **arrays}.items():
-            with file.open(f"{name}.npy", "w") as entry:
-                np.lib.format.write_array(entry, array, allow_pickle=False)
+    np.savez(buffer, meta=np.frombuffer(json.dumps(meta).encode(), np.uint8), **arrays)
     return buffer.getvalue()
 
 
-def unpack(content: bytes) -> Record:
-    """Convert the bytes of a file to its record; raises any exception if they are damaged."""
+def _layout(item: tuple[str, History]) -> tuple[Any, ...]:
+    name, each = item
+    values = np.asarray(each.values)
+    return name, each.dims, tuple(each.attrs.items()), values.dtype, values.shape
+
+
+def unpack(content: bytes) -> dict[str, Record]:
+    """Convert the bytes of a file to the records of its runs, by their keys."""
+    runs = {}
     with np.load(io.BytesIO(content), allow_pickle=False) as file:
-        meta, found = json.loads(file[_META].tobytes()), {}
-        for name, (dims, attrs, kind, value) in meta["variables"].items():
-            values = file[_entry(name)] if value is None else np.array(value, np.dtype(kind))
-            found[name] = History(tuple(dims), values, attrs)
-    return Record(meta["status"], meta["reason"], found, meta["end"])
-
-
-def _entry(name: str) -> str:
-    """Return the name of a variable in a file: characters of paths are replaced, letters of any alphabet stay."""
-    return re.sub(r"[^\w.+-]", lambda match: f"%{ord(match[0]):X}", name)
+        for number, (variables, outcomes) in enumerate(json.loads(file["meta"].tobytes())):
+            stacks = [(each, file[f"{number}.{place}"]) for place, each in enumerate(variables)]
+            for row, (key, status, reason, end) in enumerate(outcomes):
+                found = {name: History(tuple(dims), stack[row, ...], attrs) for (name, dims, attrs), stack in stacks}
+                runs[key] = Record(status, reason, found, end)
+    return runs
 
 
 def failure(reason: str, scene: Scene | None) -> str:

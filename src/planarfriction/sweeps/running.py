@@ -25,7 +25,7 @@ from planarfriction.compiler import threads
 from planarfriction.described import described
 from planarfriction.errors import InvalidValueError, SweepError, SweepInterrupted
 from planarfriction.scenes import Scene
-from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, FolderBookkeeper, Index, instants
+from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, FolderBookkeeper, Index
 from planarfriction.sweeps.keys import Keys
 from planarfriction.sweeps.quantities import Grid, check_takes, grid_of
 from planarfriction.sweeps.records import FAILED, TURN, Batch, Record, reason_of, run_all
@@ -97,8 +97,8 @@ def sweep(
 
     Runs that are already in `out` are not repeated: a run is identified by its scene, the name and source of its
     measurement, and the library, whatever code makes the scene. If the process is killed, only the runs in progress and
-    those of the last half second are lost. Equal scenes give equal bits, in any order and with any executor on the same
-    kind of processor.
+    those of the last half second, and of a fiftieth of the time so far, are lost. Equal scenes give equal bits, in any
+    order and with any executor on the same kind of processor.
 
     A failed run does not end the sweep: `status` says how each run ended ("success", "at rest", "failed"), `failure`
     why it failed, and `out` has its scene in `<run>.failed.json`. The next call tries it again. `run` names each run.
@@ -112,8 +112,7 @@ def sweep(
         For the name of each quantity, a list of numbers, texts or booleans, or a mapping from labels to values of any
         kind.
     out
-        Folder that keeps each run as a file, or the path of a store that ends in .zarr (the extra [sweep]), whose
-        results need not fit into memory; None to keep nothing.
+        Folder that keeps the runs in files; None to keep nothing.
     executor
         Any `concurrent.futures.Executor`; by default threads, one for each processor.
     measure
@@ -129,12 +128,48 @@ def sweep(
     InvalidValueError
         A parameter breaks its rule.
     FileError
-        The folder or store cannot be written, or another sweep is writing to the store.
+        The folder cannot be written.
     SweepError
         All runs failed, or the executor did.
     SweepInterrupted
         Ctrl-C; carries the dataset so far. Finished runs stay in `out`.
     """
+    if executor is not None and not isinstance(executor, Executor):
+        raise InvalidValueError("executor", "be a concurrent.futures.Executor, or None", executor)
+    sweeping = _sweeping(make_scene, values, out, measure, progress)
+    if isinstance(executor, ProcessPoolExecutor):
+        _check_travels(measure)
+    book = sweeping.book
+    try:
+        sweeping.go(executor)
+    except KeyboardInterrupt:
+        raise SweepInterrupted(str(sweeping.progress()), book.dataset()) from None
+    if book.failed == sweeping.grid.size:  # the mistake is in what all runs share
+        raise SweepError(f"all {book.failed} runs failed; the first: {book.first_failure}")
+    return book.dataset()
+
+
+def finished_runs(
+    make_scene: Callable[..., Scene] | Scene | str | Path,
+    values: Mapping[str, Any],
+    *,
+    out: str | Path,
+    measure: Callable[[Solution], Any] | None = None,
+) -> xr.Dataset:
+    """Return the dataset of the runs that are in the folder of a `sweep` by now; `status` is "missing" for the others.
+
+    The arguments are those of the sweep, which may be killed, or go on meanwhile.
+
+    Raises InvalidValueError for an argument that breaks its rule, and FileError for a folder that cannot be written.
+    """
+    sweeping = _sweeping(make_scene, values, out, measure, None)
+    for _ in sweeping.jobs():
+        pass
+    return sweeping.book.dataset()
+
+
+def _sweeping(make_scene: Any, values: Any, out: Any, measure: Any, progress: Any) -> Sweeping:
+    """Check the arguments of a sweep, and prepare it."""
     grid = grid_of(values)
     make = _maker(make_scene, grid)
     for name in OWN:
@@ -143,48 +178,20 @@ def sweep(
     for name, given, of in (("measure", measure, "Solution"), ("progress", progress, "Progress")):
         if not (given is None or callable(given)):
             raise InvalidValueError(name, f"be a function of a {of}, or None", given)
-    if executor is not None and not isinstance(executor, Executor):
-        raise InvalidValueError("executor", "be a concurrent.futures.Executor, or None", executor)
-    if isinstance(executor, ProcessPoolExecutor):
-        _check_travels(measure)
     keys = Keys(measure, kept=out is not None)
-    book = _bookkeeper(out, make, grid, timed=measure is None)
-    sweeping = Sweeping(make, grid, keys, measure, book, progress)
-    try:
-        try:
-            sweeping.go(executor)
-        except KeyboardInterrupt:
-            raise SweepInterrupted(str(sweeping.progress()), book.dataset()) from None
-        if book.failed == grid.size:  # the mistake is in what all runs share
-            raise SweepError(f"all {book.failed} runs failed; the first: {book.first_failure}")
-        return book.dataset()
-    finally:
-        book.close()
+    return Sweeping(make, grid, keys, measure, _bookkeeper(out, grid, timed=measure is None), progress)
 
 
-def _bookkeeper(out: str | Path | None, make: Callable[..., Scene], grid: Grid, timed: bool) -> Bookkeeper:
-    """Make the bookkeeper for a folder, for a store, or for the memory."""
+def _bookkeeper(out: str | Path | None, grid: Grid, timed: bool) -> Bookkeeper:
+    """Make the bookkeeper for a folder, or for the memory."""
     if out is None:
         return Bookkeeper(grid, timed)
     if not str(validation.path("out", out)).isprintable():
         raise InvalidValueError("out", "be a path of printable characters", ascii(str(out)))
-    if Path(out).suffix != ".zarr":
-        return FolderBookkeeper(grid, timed, out)
-    from planarfriction.sweeps.zarr_store import ZarrBookkeeper
-
-    # The instants of a store must be known before the first run.
-    return ZarrBookkeeper(grid, instants(_ends(make, grid)) if timed else None, Path(out))
-
-
-def _ends(make: Callable[..., Scene], grid: Grid) -> Iterator[tuple[float, float]]:
-    """Yield end and sampling interval [s] of all scenes that can be made."""
-    for _, values in grid.points():
-        try:
-            scene = make(**values)
-        except Exception:  # the run fails again, and is recorded, when its turn comes
-            continue
-        if isinstance(scene, Scene):
-            yield scene.t_end, scene.save_every
+    if Path(out).suffix == ".zarr":
+        rule = "be a folder (the dataset becomes a zarr store by its own method: data.to_zarr(path, zarr_format=2))"
+        raise InvalidValueError("out", rule, str(out))
+    return FolderBookkeeper(grid, timed, out)
 
 
 def _maker(make_scene: Any, grid: Grid) -> Callable[..., Scene]:
@@ -218,15 +225,15 @@ class Sweeping:
         book: Bookkeeper,
         report: Callable[[Progress], object] | None,
     ) -> None:
-        self._make_scene, self._grid, self._keys, self._measure = make_scene, grid, keys, measure
-        self._book, self._report = book, report
+        self._make_scene, self.grid, self._keys, self._measure = make_scene, grid, keys, measure
+        self.book, self._report = book, report
         self._ended, self._size = "", 1
         self._begin = self._reported = time.monotonic()
         self._stopped = threading.Event()
 
     def progress(self) -> Progress:
         """Return the progress so far."""
-        book, runs = self._book, self._grid.size
+        book, runs = self.book, self.grid.size
         done = book.found + book.new
         spent = time.monotonic() - self._begin
         left = spent / book.new * (runs - done) if book.new else None
@@ -242,17 +249,17 @@ class Sweeping:
             with ThreadPoolExecutor(workers, "sweep") as own:
                 self._go(own, workers, self._stopped.is_set)
         finally:
-            self._book.flush(at_once=True)
+            self.book.flush(at_once=True)
 
     def _go(self, executor: Executor, workers: int | None, stopped: Callable[[], bool] | None) -> None:
         pending: dict[Future, list[_Job]] = {}
         most = workers or _WORKERS
         done: queue.SimpleQueue[Future] = queue.SimpleQueue()
-        jobs, again = self._jobs(), []
+        jobs, again = self.jobs(), []
         try:
             while True:
                 batch = []
-                if len(pending) < most * (_AHEAD if self._book.new else 1):
+                if len(pending) < most * (_AHEAD if self.book.new else 1):
                     batch = again.pop() if again else list(itertools.islice(jobs, self._share(workers, pending)))
                 if batch:
                     try:
@@ -281,22 +288,22 @@ class Sweeping:
         """Return how many runs to hand out together: fewer towards the end, where workers are to end together."""
         if workers is None:
             return self._size
-        left = self._grid.size - self._book.found - self._book.new - sum(map(len, pending.values()))
+        left = self.grid.size - self.book.found - self.book.new - sum(map(len, pending.values()))
         return min(self._size, 1 + left // (_AHEAD * workers))
 
-    def _jobs(self) -> Iterator[_Job]:
+    def jobs(self) -> Iterator[_Job]:
         """Yield the runs that are to be done, after noting those that are found, or have no scene, on the way."""
-        for index, values in self._grid.points():
+        for index, values in self.grid.points():
             try:
                 scene = self._make_scene(**values)
             except Exception as error:
-                self._book.add(index, "", Record(FAILED, f"make_scene: {reason_of(error)}", {}), None)
+                self.book.add(index, "", Record(FAILED, f"make_scene: {reason_of(error)}", {}), None)
                 continue
             if not isinstance(scene, Scene):
                 raise InvalidValueError("make_scene", "return a Scene", type(scene).__name__)
             scene = self._keys.shared(scene)
             key = self._keys.key(scene)
-            if self._book.look_up(index, key, scene):
+            if self.book.look_up(index, key, scene):
                 self._tell()
             else:
                 yield index, key, scene
@@ -333,10 +340,10 @@ class Sweeping:
                 records, spent = future.result()
                 self._size = size = max(1, min(int(len(records) * TURN / (spent + 1e-9)), _BATCH))
             for (index, key, scene), record in zip(jobs, records, strict=False):
-                self._book.add(index, key, record, scene)
+                self.book.add(index, key, record, scene)
             left = jobs[len(records) :]
             again += [left[first : first + size] for first in range(0, len(left), size)]
-        self._book.flush()
+        self.book.flush()
         if self._ended:
             raise SweepError(self._ended)
         return again

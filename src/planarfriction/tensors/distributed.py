@@ -9,19 +9,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, disc_cells, discs, distributed_step, leaning_cells
-from planarfriction.kernels.contacts import traction
+from planarfriction.kernels import cells, disc_cells, discs, leaning_cells, points
 from planarfriction.kernels.leaning_cells import Leaning
-from planarfriction.kernels.vectors import plus
 from planarfriction.models import DistributedModel
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors.elements import Vector, joined, over, split
-
-
-def _point(law, z, u):
-    """Return z' and the traction of a point that moves at u."""
-    rate = plus(u, -cells._decay(law, z, u), z)
-    return rate, traction(law, z, rate, u)
 
 
 class Kind(NamedTuple):
@@ -34,12 +26,12 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    2: Kind(2, cells.POSITIONS, _point, distributed_step.cell),
+    2: Kind(2, cells.POSITIONS, points.evaluate, points.step),
     3: Kind(3, disc_cells.POSITIONS, discs.evaluate, discs.step),
-    5: Kind(2, cells.LEVERS, _point, distributed_step.cell),
+    5: Kind(2, cells.LEVERS, points.evaluate, points.step),
     6: Kind(3, disc_cells.LEVERS, discs.evaluate, discs.step),
     7: Kind(2, cells.LEVERS, leaning_cells.evaluate, leaning_cells.step),
-    8: Kind(3, disc_cells.LEVERS, disc_cells.evaluate_leaning, disc_cells.step_leaning),
+    8: Kind(3, disc_cells.LEVERS, leaning_cells.evaluate_disc, leaning_cells.step_disc),
 }
 """Kinds of cells by how many numbers each has: points, discs, both with a friction metric, and with asymmetry too.
 

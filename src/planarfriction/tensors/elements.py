@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator
-from types import FunctionType, ModuleType, SimpleNamespace
+from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math
-from planarfriction.kernels import bristle_step, rules, vectors
+from planarfriction.kernels import bristle_step, published_contact, rules, surfaces, vectors
+from planarfriction.kernels.rewriting import Rewriting
 
 ROUNDING = 256.0
 """Excess of a deflection over its cap, in units of the rounding error, that counts as rounding: see `bristle_step`."""
@@ -45,39 +46,36 @@ def joined(xp: Any, vector: Any) -> Any:
     return vector.array if isinstance(vector, Vector) else xp.concatenate(xp.broadcast_arrays(*vector), -2)
 
 
-class _OverArrays(SimpleNamespace):
-    """A module, or the functions that a function names, over arrays."""
+class Placed(int):
+    """Size of a table, with places in it that are known: cells about which numbers were read count as the first."""
 
-    def __init__(self, module: ModuleType, of: Callable[[Any], Any]) -> None:
-        super().__init__(module=module, of=of)
+    cell: tuple[Any, Any]
+    place: tuple[Any, ...]
 
-    def __getattr__(self, name: str) -> Any:
-        return self.of(getattr(self.module, name))
+    def __new__(cls, size: int, place: tuple[Any, ...]) -> Placed:
+        made = super().__new__(cls, size)
+        made.cell, made.place = place[:2], (0, 0, *place[2:])
+        return made
+
+
+def _place(xp: Any, size: int, x: Any, y: Any, s: Any) -> tuple[Any, ...]:
+    """Return `surfaces.place`; on the spin axis the azimuth is 0."""
+    if isinstance(size, Placed):
+        return size.place
+    across = xp.root(x * x + y * y)
+    on_axis = across == 0.0
+    polar = xp.arctan2(across, s)
+    azimuth = xp.arctan2(xp.where(on_axis, 0.0, y), xp.where(on_axis, 1.0, x))
+    azimuth = xp.where(azimuth < 0.0, azimuth + 2.0 * math.pi, azimuth)
+    a, b = (size / (0.5 * math.pi) * each for each in (polar, azimuth))
+    i, j = xp.whole(a, size - 1), xp.whole(b, 4 * size - 1)
+    return i, j, a - i, b - j, polar, azimuth
 
 
 @functools.cache
-def over(xp: Any) -> Callable[[Any], Any]:
+def over(xp: Any) -> Rewriting:
     """Return `of(function)`, which returns a function of numbers and tuples as one of arrays of `xp`."""
-    known = {id(value): twin for value, twin in _twins(xp)}
-
-    @functools.cache
-    def of(value: Any) -> Any:
-        if id(value) in known:
-            return known[id(value)]
-        if isinstance(value, ModuleType):
-            return _OverArrays(value, of)
-        own = getattr(value, "py_func", value)
-        if not isinstance(own, FunctionType) or own.__closure__:
-            return value
-        names = {"__builtins__": own.__globals__["__builtins__"]}
-        found = known[id(value)] = FunctionType(own.__code__, names, own.__name__, own.__defaults__)
-        for name in own.__code__.co_names:
-            if name in own.__globals__:
-                given = own.__globals__[name]
-                names[name] = of(given) if callable(given) or isinstance(given, ModuleType) else given
-        return found
-
-    return of
+    return Rewriting(_twins(xp))
 
 
 def _twins(xp: Any) -> list[tuple[Any, Any]]:
@@ -109,6 +107,10 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
         """Return the deflection where it is larger by more than rounding, else 0."""
         return xp.where(deflection > (1.0 + ROUNDING * xp.epsilon(deflection)) * largest, deflection, 0.0)
 
+    def through(root: Any, x: Any, y: Any) -> tuple[Any, Any]:
+        """Return `published_contact.through`, without a metric if there is none."""
+        return (x, y) if root is None else (root.xx * x + root.xy * y, root.xy * x + root.yy * y)
+
     def disc_friction(_: Any, slide: Any, spin: Any) -> Any:
         """Return `formulas.disc_friction` in a unit of speed that keeps squares and their slopes in range."""
         rest = formulas.DISC_REST
@@ -117,12 +119,14 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
 
     return [
         (compiled_math, xp),
-        (math, SimpleNamespace(sqrt=xp.root, inf=math.inf, pi=math.pi)),
+        (math, SimpleNamespace(sqrt=xp.root, sin=xp.sin, cos=xp.cos, inf=math.inf, pi=math.pi)),
         (vectors.plus, plus),
         (vectors.times, times),
         (vectors.dot, dot),
         (vectors.square, lambda a: dot(a, a)),
         (formulas.disc_friction, disc_friction),
+        (surfaces.place, functools.partial(_place, xp)),
+        (published_contact.through, through),
         (rules.per, per),
         (rules.ratio, ratio),
         (bristle_step.cap, lambda deflection, most: formulas.cap(xp, beyond(deflection, most), most)),

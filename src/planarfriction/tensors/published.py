@@ -12,8 +12,10 @@ from typing import Any, NamedTuple
 from planarfriction import formulas, models
 from planarfriction.compiler import compiled_math
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import bristle_step
+from planarfriction.kernels import bristle_step, published_contact
 from planarfriction.kernels.bristle_step import seen
+from planarfriction.kernels.law import grip
+from planarfriction.kernels.published_contact import PublishedPatch, Root
 from planarfriction.kernels.vectors import norm, plus
 from planarfriction.laws import FrictionLaw
 from planarfriction.limit_surface import LimitSurface
@@ -26,17 +28,11 @@ from planarfriction.tensors.elements import Vector, joined, over, split
 class PublishedNumbers(NamedTuple):
     """A `PublishedShape` as arrays."""
 
-    contact_radius: Any
-    """r [m]"""
-    second_moment: Any
-    """<rho^2> [m^2]"""
-    centre_x: Any
-    """Centre of pressure [m]."""
-    centre_y: Any
+    shape: PublishedPatch
     surface: Callable[..., Any]
     """`u = h(V) |V_S|` of the scaled twist `[..., 3]` and its norm `[..., 1]`."""
     root: Any = None
-    """Symmetric root of the friction metric `[2, 2]`, or None: velocities go in through it, forces come out."""
+    """Symmetric root of the friction metric (`Root`), or None: velocities go in through it, forces come out."""
 
 
 class Drive(NamedTuple):
@@ -51,7 +47,7 @@ class Drive(NamedTuple):
     grip: Any
     """`sigma_0/g(v_n)` [1/m]"""
     viscous: Any
-    """`U V`: velocity that viscous friction opposes."""
+    """Velocity that viscous friction opposes [m/s]."""
 
 
 def shape_of(patch: ContactPatch, law: FrictionLaw, surface: LimitSurface | None) -> PublishedShape:
@@ -69,29 +65,19 @@ def values_of(law: FrictionLaw, shape: PublishedShape) -> dict[str, float]:
 
 def numbers_of(xp, values: Mapping[str, Any], surface: Any, root: Any) -> PublishedNumbers:
     """Return a shape at values of its parameters `[..., 1, 1]`; `surface` has its `kind`, `size` and `data`."""
-    own = {name: values[name] for name in PublishedNumbers._fields[:4]}
+    shape = PublishedPatch(*(values[name] for name in PublishedPatch._fields))
     sliding = functools.partial(surfaces.sliding, xp, surface.kind, surface.size, surface.data)
-    return PublishedNumbers(**own, surface=sliding, root=root)
+    return PublishedNumbers(shape, sliding, None if root is None else Root(root[0, 0], root[0, 1], root[1, 1]))
 
 
-def _through(root, x, y):
-    return (x, y) if root is None else (root[0, 0] * x + root[0, 1] * y, root[0, 1] * x + root[1, 1] * y)
-
-
-def centre(shape: PublishedNumbers) -> tuple[Any, Any]:
+def centre(own: PublishedNumbers) -> tuple[Any, Any]:
     """Return the centre of pressure [m]."""
-    x, y = shape.centre_x[..., 0, 0], shape.centre_y[..., 0, 0]
-    if shape.root is None:
+    x, y = own.shape.centre_x[..., 0, 0], own.shape.centre_y[..., 0, 0]
+    if own.root is None:
         return x, y
-    (a, b), (_, d) = shape.root
+    a, b, d = own.root
     one = a * d - b * b
     return (a * x + b * y) / one, (b * x + d * y) / one
-
-
-def scale(xp, shape: PublishedNumbers):
-    """Return `S = diag(1, 1, r)` as a vector `[..., 3, 1]`: bristles are scaled by 1/S for a step, their rates by S."""
-    one = xp.ones_like(shape.contact_radius)
-    return joined(xp, (one, one, shape.contact_radius))
 
 
 # ---------------------------------------------------------------------- steps
@@ -107,19 +93,32 @@ def narrow(z):
     return z[..., 0]
 
 
-def drive(xp, law: LawNumbers, shape: PublishedNumbers, twist) -> Drive:
+def _mapped(xp, function, own: PublishedNumbers, vector):
+    """Return a function of a contact and a vector, at a vector `[..., 3, 1]`."""
+    return joined(xp, over(xp)(function)(own, split(vector)))
+
+
+def raw(xp, own: PublishedNumbers, z):
+    """Return a scaled bristle as states have it, times `S = diag(1, 1, r)`."""
+    return _mapped(xp, published_contact._raw, own, z)
+
+
+def scaled(xp, own: PublishedNumbers, z):
+    """Return a bristle as it steps, over S."""
+    return _mapped(xp, published_contact._scaled, own, z)
+
+
+def drive(xp, law: LawNumbers, own: PublishedNumbers, twist) -> Drive:
     """Return the drive of the bristle at a twist."""
-    vx, vy, omega = split(wide(twist))
-    vx, vy = _through(shape.root, vx, vy)
-    vx, vy = vx - omega * shape.centre_y, vy + omega * shape.centre_x
-    scaled = joined(xp, (vx, vy, shape.contact_radius * omega))
-    speed = xp.norm(scaled, -2)
-    u = wide(shape.surface(narrow(scaled), narrow(speed)))
+    twist, viscous = (
+        _mapped(xp, each, own, wide(twist)) for each in (published_contact._seen, published_contact._viscous)
+    )
+    speed = xp.norm(twist, -2)
+    u = wide(own.surface(narrow(twist), narrow(speed)))
     u_norm = xp.norm(u, -2)
     slides = u_norm > 0.0
     per_h = xp.where(slides, speed, 1.0) / xp.where(slides, u_norm, 1.0)
-    viscous = joined(xp, (vx, vy, shape.second_moment * omega))
-    return Drive(u, speed, per_h, law.sigma_0 / formulas.stribeck(xp, speed, law), viscous)
+    return Drive(u, speed, per_h, over(xp)(grip)(law, speed), viscous)
 
 
 def _rate(law, z, u, speed, per_h, grip):
@@ -128,27 +127,21 @@ def _rate(law, z, u, speed, per_h, grip):
     return plus(u, -formulas.bristle_decay(compiled_math, deflection, along, speed, grip, law), z)
 
 
-def evaluate(xp, law: LawNumbers, shape: PublishedNumbers, z, by: Drive):
-    """Return the rate of the bristle, and its pull (see `pull`)."""
-    s = scale(xp, shape)
-    rate = s * over(xp)(_rate)(law, Vector(z / s), Vector(by.velocity), *by[1:4]).array
-    return rate, pull(law, z, rate, by)
+def evaluate(xp, law: LawNumbers, own: PublishedNumbers, z, by: Drive):
+    """Return the rate of the bristle, and its pull (see `wrench`)."""
+    z = scaled(xp, own, z)
+    rate = over(xp)(_rate)(law, Vector(z), Vector(by.velocity), *by[1:4]).array
+    return raw(xp, own, rate), formulas.traction(z, rate, by.viscous, law)
 
 
-def advance(xp, law: LawNumbers, shape: PublishedNumbers, z, by: Drive, dt):
-    """Return the bristle after `dt` of a constant twist, and its pull (see `pull`)."""
-    s = scale(xp, shape)
-    new, k = over(xp)(bristle_step.step)(law, Vector(z / s), Vector(by.velocity), *by[1:4], dt)
-    rate = by.velocity - k * new.array
-    return s * new.array, pull(law, s * new.array, s * rate, by)
+def advance(xp, law: LawNumbers, own: PublishedNumbers, z, by: Drive, dt):
+    """Return the bristle after `dt` of a constant twist, and its pull (see `wrench`)."""
+    z = scaled(xp, own, z)
+    new, k = over(xp)(bristle_step.step)(law, Vector(z), Vector(by.velocity), *by[1:4], dt)
+    new = new.array
+    return raw(xp, own, new), formulas.traction(new, by.velocity - k * new, by.viscous, law)
 
 
-def pull(law: LawNumbers, z, rate, by: Drive):
-    """Return the wrench per unit load about the centre of pressure, in the axes of the metric, `[..., 3, 1]`."""
-    return formulas.traction(z, rate, by.viscous, law)
-
-
-def wrench(xp, shape: PublishedNumbers, pull):
-    """Return the wrench about the origin per unit load `[..., 3]`."""
-    fx, fy, tau = split(pull)
-    return narrow(joined(xp, (*_through(shape.root, fx, fy), tau + shape.centre_x * fy - shape.centre_y * fx)))
+def wrench(xp, own: PublishedNumbers, pull):
+    """Return the wrench about the origin per unit load `[..., 3]`, of a scaled one `[..., 3, 1]` (its pull)."""
+    return narrow(_mapped(xp, published_contact._wrench, own, pull))

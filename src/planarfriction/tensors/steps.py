@@ -8,10 +8,13 @@ from typing import Any, ClassVar, NamedTuple
 
 from planarfriction import validation
 from planarfriction.derivatives.parameters import PARAMETERS
+from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
+from planarfriction.kernels import settle
 from planarfriction.laws import FrictionLaw
-from planarfriction.laws.base import refuse_creep, refuse_fixed_stiffness, refuse_rate_law
+from planarfriction.laws.base import refuse_creep, refuse_rate_law
 from planarfriction.patch import ContactPatch
+from planarfriction.tensors.elements import Vector, over
 from planarfriction.tensors.namespace import Namespace, broadcast, finite, non_negative, shaped
 from planarfriction.tensors.pressure import Pressed, centre_of, follow
 
@@ -26,27 +29,48 @@ class Contact(NamedTuple):
     """Broadcasts with the components of bristles."""
     shape: Any
     """Numbers of the patch as the model's equations know them."""
+    reference_load: Any = None
+    """Load [N] of a stiffness that does not grow with the load, or None."""
 
 
 def evaluate(xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, load: Any) -> tuple[Any, Any]:
     """Return the rate of the state, and the wrench `[..., 3]`."""
-    by = equations.drive(xp, *contact, twist)
-    rate, pull = equations.evaluate(xp, *contact, equations.wide(state), by)
-    return equations.narrow(rate), load[..., None] * equations.wrench(xp, contact.shape, pull)
+    by = equations.drive(xp, *contact[:2], twist)
+    law, shape, reference = contact
+    z = equations.wide(state)
+    if reference is None:
+        rate, pull = equations.evaluate(xp, law, shape, z, by)
+    else:
+        z = over(xp)(settle.factor_at)(reference, inner(load)) * z
+        rate, pull = equations.evaluate(xp, law, shape, z, by)
+        back = over(xp)(settle.recovery)(law, Vector(z), xp.norm(by[0], -2)) * z
+        rate, pull = rate - back, pull + law.sigma_1 * back
+    return equations.narrow(rate), load[..., None] * equations.wrench(xp, shape, pull)
 
 
 def step(xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, load: Any, dt: Any) -> tuple[Any, Any]:
     """Return the state after `dt` [s] of a constant twist, and the wrench at the end; without load bristles relax."""
     given, z = (contact.law.sigma_0, state, twist), equations.wide(xp.widened(state))
-    by = equations.drive(xp, *contact, xp.widened(twist))
-    new, pull = equations.advance(xp, *contact, z, by, inner(dt))
-    new, wrench = relaxed(xp, new, load), load[..., None] * equations.wrench(xp, contact.shape, pull)
+    by = equations.drive(xp, *contact[:2], xp.widened(twist))
+    new, pull = advance(xp, equations, contact, z, by, load, dt)
+    wrench = load[..., None] * equations.wrench(xp, contact.shape, pull)
     return xp.narrowed(equations.narrow(new), *given), xp.narrowed(wrench, *given)
 
 
-def relaxed(xp: Any, z: Any, load: Any) -> Any:
-    """Return the bristles `[..., d, N]` of contacts with load, and zeros for those without."""
-    return xp.where(inner(load > 0.0), z, 0.0)
+def advance(xp: Any, equations: Any, contact: Contact, z: Any, by: Any, load: Any, dt: Any) -> tuple[Any, Any]:
+    """Return the bristles `[..., d, N]` after `dt`, zeros of contacts without load, and the tractions per unit load.
+
+    With a fixed stiffness the step is the published one of another deflection and time (see `kernels.settle`).
+    """
+    (law, shape, reference), loaded, dt = contact, inner(load > 0.0), inner(dt)
+    if reference is None:
+        new, pull = equations.advance(xp, law, shape, z, by, dt)
+    else:
+        factor = over(xp)(settle.factor_at)(reference, xp.where(loaded, inner(load), reference))
+        z = over(xp)(settle.within)(law, Vector(factor * z)).array
+        new, pull = equations.advance(xp, law, shape, z, by, factor * dt)
+        new = new / factor
+    return xp.where(loaded, new, 0.0), pull
 
 
 def inner(value: Any) -> Any:
@@ -70,6 +94,8 @@ class TensorModel:
     equations: ClassVar[ModuleType]
     """Module of the model's `drive`, `evaluate`, `advance` and `wrench`."""
     elasto_plastic: bool
+    reference_load: Any
+    """Load [N] of a stiffness that does not grow with the load (`LuGre.reference_load`), or None."""
 
     @staticmethod
     def refuse(patch: ContactPatch, law: FrictionLaw, name: str) -> None:
@@ -77,7 +103,6 @@ class TensorModel:
         validation.instance("patch", patch, ContactPatch, "a ContactPatch")
         refuse_rate_law(law, name)
         refuse_creep(law, name)
-        refuse_fixed_stiffness(law, name)
 
     @property
     def state_shape(self) -> tuple[int, ...]:
@@ -87,7 +112,7 @@ class TensorModel:
     @property
     def obstacle(self) -> str:
         """Reason why compiled rollouts do not take the model, or an empty text."""
-        return ""
+        return "" if self.reference_load is None else "for a law with a reference_load"
 
     def rest(self, batch: int | Sequence[int] = ()) -> Any:
         """Return the state of a contact at rest, or of a `batch`: `[*batch, *state_shape]`."""
@@ -136,6 +161,18 @@ class TensorModel:
         """Return the numbers of the patch; physical values broadcast with the components of bristles."""
         raise NotImplementedError
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the physical parameters, in the order of their vector."""
+        raise NotImplementedError
+
+    def _counted(self, parameters: Any, count: int, shape: Sequence[int]) -> Any:
+        """Return `parameters`; raise InvalidValueError unless there are as many as names."""
+        if count != len(self.names):
+            rule = f"have shape [..., {len(self.names)}] ({', '.join(self.names)})"
+            raise InvalidValueError("parameters", rule, f"shape {list(shape)}")
+        return parameters
+
     def _number(self, name: str, value: Any) -> Any:
         return self.xp.real(name, value)
 
@@ -146,7 +183,7 @@ class TensorModel:
         """Return the model at physical values `[...]`."""
         wide = {name: inner(value) for name, value in values.items()}
         law = LawNumbers(**{name: wide[name] for name in LAW}, elasto_plastic=float(self.elasto_plastic))
-        return Contact(law, self._shape(wide))
+        return Contact(law, self._shape(wide), self.reference_load)
 
     def _evaluated(
         self, state: Any, twist: Any, normal_force: Any, parameters: Any, moments: Any = None
@@ -162,6 +199,8 @@ class TensorModel:
         z, v, load = self._inputs(state, twist, normal_force)
         if moments is None:
             return (z, v, load), Pressed(self._contact_at(parameters), None)
+        if self.reference_load is not None:
+            raise InvalidValueError("moments", "be None for a law with a reference_load", "moments")
         held = finite(self.xp, "moments", shaped("moments", self._number("moments", moments), (2,)))
         shapes = {"twist": v.shape[:-1], "normal_force": load.shape, "moments": held.shape[:-1]}
         batch = broadcast(self.xp, "batch axes", "broadcast", shapes)

@@ -47,12 +47,14 @@ class FrictionModule(TensorModel, nn.Module):
     """1 for elasto-plastic bristles, else 0; a state dict of the other kind is refused."""
     lever: Tensor
     """Lever arm [m]: the ratio of torques to forces."""
+    reference_load: Tensor | None
 
     def __init__(self, patch: ContactPatch, law: FrictionLaw) -> None:
         nn.Module.__init__(self)
         self.refuse(patch, law, f"torch.{type(self).__name__}")
         self.patch = patch
         self.elasto_plastic = bool(law.numbers.elasto_plastic)
+        self.register_buffer("reference_load", None)
 
     def _adopt(self, values: dict[str, float], trainable: Iterable[str], lever: float, **kind: Any) -> None:
         """Add the physical parameters, and the other entries of every model's state dict."""
@@ -90,7 +92,8 @@ class FrictionModule(TensorModel, nn.Module):
         """Return the law with the present values."""
         now = self._law_values()
         breakaway = ElastoPlastic(now.pop("breakaway_ratio"))
-        return LuGre(**now, elasto_plastic=breakaway if self.elasto_plastic else None)
+        fixed = None if self.reference_load is None else self.reference_load.item()
+        return LuGre(**now, elasto_plastic=breakaway if self.elasto_plastic else None, reference_load=fixed)
 
     def _law_values(self) -> dict[str, float]:
         now = dict(zip(self.names, self.physical().tolist(), strict=True))
@@ -128,13 +131,12 @@ class FrictionModule(TensorModel, nn.Module):
         """
         equations, vector = self.equations, self._vector(parameters)
         of_step, contact = (self._prepared(self._named(values)) for values in (vector, vector[..., None, :]))
-        z, dt = equations.wide(xp.widened(state)), steps.inner(dt)
-        by = equations.drive(xp, *contact, xp.widened(twist))
+        z = equations.wide(xp.widened(state))
+        by = equations.drive(xp, *contact[:2], xp.widened(twist))
         drives, pulls = zip(*(value.unbind(-3) for value in by), strict=True), []
         for drive, now in zip(drives, normal_force.unbind(-1), strict=True):
-            new, pull = equations.advance(xp, *of_step, z, _like(by, drive), dt)
+            z, pull = steps.advance(xp, equations, of_step, z, _like(by, drive), now, dt)
             pulls.append(pull)
-            z = steps.relaxed(xp, new, now)
         wrenches = normal_force[..., None] * equations.wrench(xp, contact.shape, torch.stack(pulls, -3))
         given = vector, state, twist
         return xp.narrowed(equations.narrow(z), *given), xp.narrowed(wrenches, *given)
@@ -153,10 +155,7 @@ class FrictionModule(TensorModel, nn.Module):
     def _vector(self, parameters: Tensor | None) -> Tensor:
         if parameters is None:
             return self.physical()
-        if parameters.shape[-1:] != (len(self.names),):
-            rule = f"have shape [..., {len(self.names)}] ({', '.join(self.names)})"
-            raise InvalidValueError("parameters", rule, f"shape {list(parameters.shape)}")
-        return parameters
+        return self._counted(parameters, parameters.shape[-1] if parameters.ndim else 0, parameters.shape)
 
 
 def _like(by: Any, values: Any) -> Any:

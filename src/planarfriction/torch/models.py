@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 import torch
@@ -16,12 +16,12 @@ from planarfriction.limit_surface import LimitSurface
 from planarfriction.models import ReducedModel as Reference
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import distributed, published
+from planarfriction.tensors.models import CellsModel, PublishedModel, few_discs
 from planarfriction.tensors.steps import LAW
 from planarfriction.torch.base import TRAINABLE, Compiled, FrictionModule
-from planarfriction.torch.namespace import xp
 
 
-class DistributedModel(FrictionModule):
+class DistributedModel(FrictionModule, CellsModel):
     """Distributed LuGre friction, differentiable: a bristle `z_i` [m] in every cell, state `[2, N]`; for small patches.
 
     `zdot_i = v_i - beta sigma_0 |v_i|/g z_i`, `W = sum w_i f_N [t_i ; rho_i x t_i]`, `t_i = -(sigma_0 z_i + sigma_1
@@ -36,9 +36,7 @@ class DistributedModel(FrictionModule):
     Source: Waltersson and Karayiannidis 2024, section III.
     """
 
-    equations = distributed
     positions: Tensor
-    """Positions of the cells `[2, N]` [m]; with a friction metric their levers (see `tensors.distributed.Cells`)."""
 
     def __init__(
         self,
@@ -53,6 +51,8 @@ class DistributedModel(FrictionModule):
         super().__init__(patch, law)
         cells = distributed.cells_of(patch, law, normal_force)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
+        if law.reference_load is not None:
+            self.reference_load = torch.tensor(law.reference_load, **kind)
         numbers, chosen = law.numbers._asdict(), tuple(trainable)
         lever = float(patch.contact_radius(normal_force))
         physical = [name for name in chosen if name != "weights"]
@@ -69,22 +69,9 @@ class DistributedModel(FrictionModule):
         """Share of the load on each cell `[N]`, with its gradient."""
         return torch.softmax(self.raw_weights, 0)
 
-    @property
-    def state_shape(self) -> tuple[int, ...]:
-        """Shape of the state of one contact, `(2, N)` of points, `(3, N)` of discs."""
-        return distributed.KINDS[len(self.positions)].bristles, self.positions.shape[1]
-
-    @property
-    def obstacle(self) -> str:
-        """Reason why compiled rollouts do not take the model, or an empty text."""
-        return distributed.obstacle(self.positions)
-
     def compiled(self) -> Compiled:
         """Return the model as compiled rollouts take it."""
         return Compiled(functools.partial(pack_cells, self.elasto_plastic), (self.positions, self.weights))
-
-    def _shape(self, values: Mapping[str, Tensor]) -> distributed.Cells:
-        return distributed.Cells(self.positions, self.weights)
 
 
 class SurfaceBuffers(nn.Module):
@@ -108,7 +95,7 @@ class SurfaceBuffers(nn.Module):
         super()._load_from_state_dict(state_dict, prefix, *rest)
 
 
-class ReducedModelPublished(FrictionModule):
+class ReducedModelPublished(FrictionModule, PublishedModel):
     """Reduced LuGre friction, differentiable: three bristles `z = (z_x, z_y, z_tau)` [m, m, m^2] and a limit surface.
 
     With `S = diag(1, 1, r)`, `V_S = S V`, `v_n = |V_S|`: `zdot = S h(V) v_n - beta sigma_0 v_n/g(v_n) z`, `W =
@@ -124,9 +111,7 @@ class ReducedModelPublished(FrictionModule):
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
 
-    equations = published
     root: Tensor | None
-    """Symmetric root of the friction metric `[2, 2]`, if the patch has one."""
 
     def __init__(
         self,
@@ -151,9 +136,6 @@ class ReducedModelPublished(FrictionModule):
         pack = functools.partial(pack_surface, self.elasto_plastic, self.surface.kind, self.surface.size)
         return Compiled(pack, (self.surface.data,) if self.root is None else (self.surface.data, self.root))
 
-    def _shape(self, values: Mapping[str, Tensor]) -> published.PublishedNumbers:
-        return published.numbers_of(xp, values, self.surface, self.root)
-
 
 class ReducedModel(DistributedModel):
     """Reduced LuGre friction, differentiable: distributed friction on the few discs that stand for the patch.
@@ -172,8 +154,5 @@ class ReducedModel(DistributedModel):
         cells: int = Reference.cells,
         **options: Any,
     ):
-        self.refuse(patch, law, "torch.ReducedModel")
-        replaced = {name: options.pop(name) for name in Reference.REPLACED if name in options}
-        discs = Reference(patch, law, cells=cells, **replaced).reduction.patch
-        super().__init__(discs, law, normal_force, **options)
+        super().__init__(few_discs("torch.ReducedModel", patch, law, cells, options), law, normal_force, **options)
         self.patch = patch

@@ -129,10 +129,10 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         Raises InvalidValueError for what is not a tensor `[..., 3]`.
         """
         v_scaled = self._number("v_scaled", v_scaled)
-        (law, shape), speed = self._contact_at(None), xp.norm(v_scaled, -1)
+        (law, shape, _), speed = self._contact_at(None), xp.norm(v_scaled, -1)
         h = shape.surface(v_scaled, speed) / torch.where(speed > 0.0, speed, 1.0)  # zero at rest
         most = formulas.stribeck(xp, published.wide(speed), law) / law.sigma_0
-        return published.narrow(published.scale(xp, shape) * published.wide(h) * most)
+        return published.narrow(published.raw(xp, shape, published.wide(h) * most))
 
     def bristle_rate(self, z: Tensor, v: Tensor) -> Tensor:
         """Return `z_dot = S h |v_s| - sigma_0 |v_s|/g z` `[..., 3]` [m/s, m/s, m^2/s]."""
@@ -143,11 +143,11 @@ class ReducedPlanarLuGre(ReducedModelPublished):
 
         Raises InvalidValueError for tensors whose shapes do not fit.
         """
-        law, shape = self._contact_at(None)
+        law, shape, _ = self._contact_at(None)
         z, v, load = self._inputs(z, v, f_n)
-        rate, by = published.wide(self._number("z_dot", z_dot)), published.drive(xp, law, shape, v)
-        pull = published.pull(law, published.wide(z), rate, by)
-        return load[..., None] * published.wrench(xp, shape, pull)
+        by = published.drive(xp, law, shape, v)
+        z, rate = (published.scaled(xp, shape, published.wide(each)) for each in (z, self._number("z_dot", z_dot)))
+        return load[..., None] * published.wrench(xp, shape, formulas.traction(z, rate, by.viscous, law))
 
     def step(self, z: Tensor, v: Tensor, f_n: Tensor | float, dt: Tensor | float) -> tuple[Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the bristles after `dt` [s] of a constant twist, and the wrench at the end. Stable at any `dt`."""

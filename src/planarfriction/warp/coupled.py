@@ -35,7 +35,8 @@ class CoupledPatches:
     worlds
         Number of worlds.
     follows
-        True for each patch whose pressure follows the moments of a host, by default all.
+        True for each patch whose pressure follows the moments of a host, by default all; False for laws with a
+        `reference_load`.
     parameters
         Numbers of the laws by name, and `scale`, the size of a patch as a multiple of its model's: a number, or arrays
         [worlds] or [worlds, k]. What is not given is the models'.
@@ -69,8 +70,13 @@ class CoupledPatches:
             raise InvalidValueError("follows", f"hold one for each of {len(which)} models", len(follows))
         kinds = [described(model, precision) for model in known]
         pieces = [each.pieces for each in kinds]
+        can = [not pieces[kind].fixed for kind in which]
+        for p, follow in enumerate(follows or ()):
+            if follow and not can[p]:
+                raise InvalidValueError("follows", "be False for a law with a reference_load", f"True of model {p}")
+        self._follows = follows is not None or all(can)
         radii = [coupling.lever_of(model) or 1.0 for model in self.models]
-        source = coupled_source_of(kinds, which, follows or [True] * len(which), radii, precision)
+        source = coupled_source_of(kinds, which, follows or can, radii, precision)
         self.state_shape = (sum(math.prod(model.state_shape) for model in self.models),)
         """Shape of the state of the patches of a world."""
         self.names = tuple((*pieces[kind].parameters, "scale") for kind in which)
@@ -134,6 +140,8 @@ class CoupledPatches:
         if host.load_response is not None:
             one.load_response = self._address("load_response", host.load_response, k, 3 * k)
         if host.moments is not None:
+            if not self._follows:
+                raise InvalidValueError("moments", "be None for a law with a reference_load", "moments")
             one.moments = self._address("moments", host.moments, k, 2)
         if skip is not None:
             one.skip = self._address("skip", skip, dtype=wp.int32)

@@ -68,6 +68,7 @@ class Model:
         precision, most = arrays.precision_of(dtype), max((each.state_shape for each in models), key=math.prod)
         pieces = [described(each, precision, most[-1] if len(most) > 1 else 0) for each in models]
         sources = [source_of(each, precision) for each in pieces]
+        self._fixed = pieces[0].pieces.fixed
         if any(each.text != sources[0].text for each in sources):
             raise InvalidValueError("model", "have one source, as all of `ReducedModel(patch, law)` do", "several")
         numbers = [{**each.pieces.parameters, "scale": 1.0} for each in pieces]
@@ -146,6 +147,8 @@ class Model:
     def _launch(
         self, steps: tuple[int, ...], state: Any, twist: Any, load: Any, dt: float, new: Any, wrench: Any, moments: Any
     ) -> None:
+        if moments is not None and self._fixed:
+            raise InvalidValueError("moments", "be None for a law with a reference_load", "moments")
         along = (*steps, self.contacts)
         batch = Batch()
         batch.contacts, batch.steps, batch.rows = self.contacts, *(steps or (1,)), self.parameters.shape[0]

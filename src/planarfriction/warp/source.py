@@ -10,9 +10,9 @@ import numpy as np
 from planarfriction.export.c_source import Writer
 from planarfriction.export.library import PARAMETERS, PRECISIONS, tilt_of
 from planarfriction.export.pieces import Pieces, pieces_of
+from planarfriction.export.twins import twin
 from planarfriction.kernels import coupling
 from planarfriction.kernels.trace import Block, Number, Trace, traced
-from planarfriction.kernels.twins import twin
 from planarfriction.models import FrictionModel
 
 ROUNDING = {"double": (coupling.ROUNDING,) * 2, "float": (3e-7, 1e-5)}
@@ -45,7 +45,11 @@ def described(model: FrictionModel, precision: str, count: int = 0) -> Described
     """
     points, words = model.compiled.points()
     pieces = pieces_of(model, precision, count=count)
-    return Described(pieces, np.pad(points, [(0, pieces.count - len(points)), (0, 0)], mode="edge"), not words)
+    return Described(
+        pieces,
+        np.pad(points, [(0, pieces.count - len(points)), (0, 0)], mode="edge" if len(points) else "constant"),
+        not words,
+    )
 
 
 def source_of(model: Described, precision: str) -> Source:
@@ -79,6 +83,7 @@ def coupled_source_of(
         starts=starts,
         radii=[writer.constant(each) for each in radii],
         follows=follows,
+        loaded="loaded" if any(each.fixed for each in pieces) else "unit",
         rounding=list(map(writer.constant, ROUNDING[precision])),
         shortening="\n".join(writer.lines(traced(_shortening), ["too_far", "share"], indent=" " * 16)),
         **{name.lower(): writer.constant(getattr(coupling, name)) for name in names},
@@ -96,8 +101,9 @@ def _described(models: Sequence[Described], precision: str, slopes: bool) -> tup
     writer, described = Writer(precision), []
     joined: list[np.ndarray] = []
     for pieces, points, moves in models:
-        outputs = [f"next[{i}]" for i in range(pieces.states)] + [f"w[{i}]" for i in range(12 if slopes else 3)]
         block = _slopes_by_twist(pieces) if slopes else pieces.step
+        outputs = [f"next[{i}]" for i in range(pieces.states)]
+        outputs += [f"w[{i}]" for i in range(len(block.results) - pieces.states)]
         lines = list(writer.lines(block, outputs, indent=" " * 12))
         tables = dict(zip(("place_x", "place_y"), points.T, strict=True)) | {"share": pieces.tables["share"]}
         tables |= {name: each for name, each in pieces.tables.items() if any(f"{name}[" in line for line in lines)}
@@ -118,11 +124,12 @@ def _described(models: Sequence[Described], precision: str, slopes: bool) -> tup
 
 
 def _slopes_by_twist(pieces: Pieces) -> Block:
-    """Return the step with the slopes of the wrench by the twist, row by row, and no others."""
+    """Return the step with the slopes of the wrench by the twist, row by row, and of a fixed stiffness by the load."""
     block, first = pieces.slopes(), pieces.states + 3
-    columns = pieces.states + 3 + len(pieces.parameters)
-    rows = [first + columns * row + pieces.states for row in range(3)]
-    return Block(block.operations, block.results[:first] + sum((block.results[at : at + 3] for at in rows), ()))
+    columns = pieces.states + 3 + len(pieces.parameters) + pieces.fixed
+    rows = [block.results[first + columns * row : first + columns * (row + 1)] for row in range(3)]
+    results = sum((row[pieces.states : pieces.states + 3] for row in rows), block.results[:first])
+    return Block(block.operations, results + tuple(row[-1] for row in rows if pieces.fixed))
 
 
 def _rendered(name: str, **values: Any) -> str:

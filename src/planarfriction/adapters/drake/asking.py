@@ -25,8 +25,14 @@ MISFIT = 1e-7
 NOTICED = 1e-6
 """Twists that come out [m/s] so far off say how contacts answer; below, what gets no better is taken."""
 
+RESOLUTION = 1e-6
+"""Share of its momentum within which Drake's solver ends a step (`SapSolverParameters`): of all that touches."""
+
 QUIET = 1e-9
 """Changes of twists [m/s] that are not worth asking for: a thousandth of a micrometre in a second."""
+
+STIFFEST = 1e-6
+"""Least response to a change that is learnt, as a share of what was expected."""
 
 _ONES = np.ones(3)
 
@@ -40,6 +46,8 @@ class Asked(NamedTuple):
     """Generalized force of the wrenches `[nv]`."""
     owed: np.ndarray
     """Difference between the twists of the plant and those that the bristles have seen."""
+    axes: np.ndarray
+    """x axes of the patches in their frames; 0 before the first contact."""
     twists: np.ndarray
     loads: np.ndarray
     touching: list[bool]
@@ -56,7 +64,7 @@ class Asking:
     """Steps of patches on a shadow. What it keeps is scratch: each step starts from what it is given."""
 
     def __init__(self, shadow: Shadow, coupled: CoupledPatches, size: int) -> None:
-        k = len(coupled.models)
+        k, self._coupled = len(coupled.models), coupled
         self._shadow, self._row, self._normals = shadow, CouplingRow(coupled, shadow), np.zeros((k, 3))
         self._moments = np.zeros((k, 2, 6))
         """Maps of forces and their moments about the world's origin to the moments about the patches' origins."""
@@ -64,6 +72,8 @@ class Asking:
         self._levers[2::3] = [lever_of(model) for model in coupled.models]
         self._rows, self._moved = np.zeros((3 * k, size)), np.zeros((size, 3 * k))
         """Jacobian of the twists `[3k, nv]`; velocities that wrenches cause without contact `[nv, 3k]`."""
+        self._open = MISFIT
+        """Twists [m/s] that Drake's solver leaves open, next to heavy or fast bodies more than `MISFIT`."""
 
     def step(
         self,
@@ -72,21 +82,24 @@ class Asking:
         wrench: np.ndarray,
         force: np.ndarray,
         owed: np.ndarray,
+        axes: np.ndarray,
         answers: np.ndarray,
     ) -> Asked:
         """Take a step from the state of the shadow, under generalized forces `applied` and friction.
 
         From `bristles`, the `wrench` of each patch in the last step, the generalized `force` that these were, the
-        twists that bristles are `owed` (those that they saw in the last step were off by them), and its `answers`.
+        twists that bristles are `owed` (those that they saw in the last step were off by them), its x `axes`, and its
+        `answers`.
         """
         row, passes, iterations, solved, misfit = self._row, 0, 0, False, np.inf
+        bristles, wrench, owed, axes = bristles.copy(), wrench.copy(), owed.copy(), axes.copy()
         self._forget()
         np.copyto(row.follows, abs(row.follows))
         while True:
             velocity = self._shadow.step(applied + force)
             pushes = self._shadow.pushes(first=passes == 0)
             passes += 1
-            if self._touch(pushes):
+            if self._touch(pushes, bristles, wrench, owed, axes):
                 np.copyto(row.follows, abs(row.follows))
                 if passes == 1:
                     self._answer_as_before(answers)
@@ -95,11 +108,11 @@ class Asking:
             if solved:
                 off = twist - row.twist
                 last, misfit = misfit, self._speed(off, load - row.load)
-                if misfit <= MISFIT or passes >= PASSES or 0.5 * last < misfit <= NOTICED:
+                if misfit <= self._open or passes >= PASSES or 0.5 * last < misfit <= NOTICED:
                     break
                 if misfit > last:  # learnt where contacts came or went
                     self._answer_freely()
-                elif misfit > NOTICED:
+                elif misfit > max(NOTICED, self._open):
                     self._learn(wrench - row.guess, twist - row.free_twist, load - row.free_load)
             turned = self._moved.T @ (wrench @ self._rows - force)  # the axes have, since the last step
             row.free_twist[:], row.free_load[:], row.guess[:], row.state[:] = twist + turned, load, wrench, bristles
@@ -114,24 +127,37 @@ class Asking:
                 break
         report = passes, iterations, row.residual[0], misfit, row.converged[0]
         twists, loads = row.response.ravel(), row.load_response.ravel()
-        return Asked(row.new, wrench, force, off, twist - owed, load, self._touching, twists, loads, velocity, report)
+        return Asked(
+            row.new, wrench, force, off, axes, twist - owed, load, self._touching, twists, loads, velocity, report
+        )
 
     def _forget(self) -> None:
         self._touching = [False] * len(self._touching)
         for each in (self._rows, self._moved, self._row.response):
             each.fill(0.0)
 
-    def _touch(self, pushes: np.ndarray) -> bool:
-        """Place patches that touch for the first time in this step; return True if there are any."""
+    def _touch(
+        self, pushes: np.ndarray, bristles: np.ndarray, wrench: np.ndarray, owed: np.ndarray, axes: np.ndarray
+    ) -> bool:
+        """Place patches that touch for the first time in this step; return True if there are any.
+
+        Their bristles, wrenches and what they are owed are carried into their axes of this step, in place.
+        """
         if all(self._touching):
             return False
         new = [p for p, touching in enumerate(self._touching) if not touching and pushes[p, :3].any()]
         for p in new:
-            self._rows[3 * p : 3 * p + 3], self._normals[p], self._moments[p] = self._shadow.rows(p, pushes[p, :3])
+            one = slice(3 * p, 3 * p + 3)
+            placed = self._shadow.rows(p, pushes[p, :3], axes[one])
+            self._rows[one], self._normals[p], self._moments[p], axes[one], turn = placed
+            for vectors in (self._coupled.states(bristles)[p], wrench[one], owed[one]):
+                vectors[:2] = np.tensordot(turn, vectors[:2], 1)
             self._touching[p] = True
         if new:
-            self._moved = self._shadow.moved(self._rows)
+            self._moved, momentum = self._shadow.moved(self._rows)
             self._answer_freely()
+            speeds = self._levers * np.sqrt(self._row.response.diagonal() / self._shadow.dt)
+            self._open = max(MISFIT, RESOLUTION * momentum * speeds.max())
         return bool(new)
 
     def _answer_freely(self) -> None:
@@ -162,14 +188,15 @@ class Asking:
     def _learn(self, wrench: np.ndarray, twist: np.ndarray, load: np.ndarray) -> None:
         """Correct the responses by changes that came out: of twists symmetrically, of rank one.
 
-        Contacts only stiffen: `A - A_true >= 0`. Where a correction takes more than A has, contacts came or went.
+        Contacts only stiffen: `A - A_true >= 0`. Where a correction takes all that A has, contacts came or went, or the
+        change was too small for Drake's solver.
         """
         response, load_response = self._row.response, self._row.load_response
         expected = response @ wrench
         off, along = expected - twist, expected @ wrench
         load_response += np.outer(load - load_response @ wrench, expected / along)
         gap = off @ wrench
-        if gap > 1e-9 * along:
+        if 1e-9 * along < gap < (1.0 - STIFFEST) * along:
             corrected = response - np.outer(off, off) / gap
             scale = 1.0 / np.sqrt(np.maximum(np.diagonal(response), 1e-300))
             if np.linalg.eigvalsh(scale[:, None] * corrected * scale)[0] > -1e-9:

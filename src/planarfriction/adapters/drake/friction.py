@@ -19,13 +19,15 @@ from planarfriction import validation
 from planarfriction.adapters.drake.asking import Asking
 from planarfriction.adapters.drake.patches import PatchContact, found
 from planarfriction.adapters.drake.shadow import Shadow
+from planarfriction.compiler.notice import said_when_compiling
 from planarfriction.coupling import CoupledPatches
 from planarfriction.errors import InvalidValueError
 
 EXPECTED = 1e-5
 """Difference between predicted and actual velocities [m/s, rad/s] that is not noticed: rounding comes to 1e-7."""
 
-_CHANGED = "parameters in its context are not those with which friction was added"
+_SURPRISED = """the plant moves otherwise than predicted, by {:.3g}: parameters in its context are not those with which
+friction was added, or its solver has not converged""".replace("\n", " ")
 
 _GEOMETRY, _FORCE = "geometry_query", "applied_generalized_force"
 
@@ -69,13 +71,14 @@ class Friction(LeafSystem):
         self.patches = tuple(each.patch for each in self._placed)
         self.coupled = CoupledPatches([patch.model for patch in self.patches])
         self._shadow = Shadow(plant, scene_graph, self._placed)
-        self._asking = Asking(self._shadow, self.coupled, plant.num_velocities())
-        self._size = plant.num_velocities()
+        with said_when_compiling():
+            self._asking = Asking(self._shadow, self.coupled, plant.num_velocities())
+        self._size, self._warned = plant.num_velocities(), False
         self._declare_inputs(plant)
         k, states = len(self.patches), self.coupled.state_shape[0]
         sizes = {
-            "bristles": states, "wrenches": 3 * k, "force": self._size, "owed": 3 * k, "twists": 3 * k, "loads": k,
-            "answers": k * (1 + 12 * k), "velocities": self._size, "report": len(Report._fields),
+            "bristles": states, "wrenches": 3 * k, "force": self._size, "owed": 3 * k, "axes": 3 * k, "twists": 3 * k,
+            "loads": k, "answers": k * (1 + 12 * k), "velocities": self._size, "report": len(Report._fields),
         }  # fmt: skip
         bounds = np.cumsum([0, *sizes.values()])
         self._parts = {name: slice(*ends) for name, ends in zip(sizes, itertools.pairwise(bounds), strict=True)}
@@ -186,13 +189,15 @@ class Friction(LeafSystem):
         applied = port.Eval(context) if port.HasValue(context) else np.zeros(self._size)
         self._shadow.begin(state, self._driven(context))
         own = context.get_discrete_state_vector().value()
-        before = (own[parts[name]] for name in ("bristles", "wrenches", "force", "owed", "answers"))
+        before = (own[parts[name]] for name in ("bristles", "wrenches", "force", "owed", "axes", "answers"))
         asked = self._asking.step(applied, *before)
         *report, converged = asked.report
         surprise, last = self._surprise(state, own), own[parts["report"]][-2]
         if min(surprise, last) > EXPECTED:
             converged = 0.0
-            warnings.warn(f"the plant moves otherwise than predicted, by {surprise:.3g}: {_CHANGED}", stacklevel=2)
+            if not self._warned:
+                warnings.warn(_SURPRISED.format(surprise), stacklevel=2)
+            self._warned = True
         asked = asked._replace(report=(*report, surprise, converged))
         solution.set_value((applied + asked.force, np.concatenate(asked)))
 

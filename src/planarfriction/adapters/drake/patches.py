@@ -38,8 +38,11 @@ _MATERIAL = ("material", "coulomb_friction")
 class PatchContact(Checked):
     """A contact patch between two geometries, attached to the body of a frame.
 
-    The x axis of the patch is that of the frame, projected on the contact plane; its normal points into the frame's
-    body. The twist is that of this body relative to the other one, and the wrench acts on this body.
+    The x axis of the patch is that of the frame, projected on the contact plane; where it lies along the normal at the
+    first contact, the y axis of the frame takes its place. On a body that rolls it does not reverse as the frame's
+    does: within 30 degrees of the normal it goes along with the body, and then is on the same side as before. Bristles
+    are carried into the axes of each step. The normal points into the frame's body. The twist is that of this body
+    relative to the other one, and the wrench acts on this body.
 
     Raises InvalidValueError unless `geometries` are two names, `centre` is an option and `model` a friction model.
     """

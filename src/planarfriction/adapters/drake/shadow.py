@@ -16,6 +16,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from planarfriction.adapters.drake.patches import Placed
 from planarfriction.errors import InvalidValueError
+from planarfriction.kernels.coupling_rows import ALONG, FLAT
 
 _ORIGIN = np.zeros(3)
 
@@ -97,31 +98,38 @@ class Shadow:
             _add(forces[p], -sign, force, map(operator.add, moment, _cross(place, force)))
         return np.array(forces)
 
-    def rows(self, p: int, force: np.ndarray) -> tuple[np.ndarray, list[float], list[list[float]]]:
-        """Return the Jacobian of the twist of a patch `[3, nv]`, in the axes of its frame, the normal, and moments.
+    def rows(self, p: int, force: np.ndarray, before: np.ndarray) -> tuple[Any, ...]:
+        """Return the Jacobian of the twist of a patch `[3, nv]`, the normal, moments, the x axis, and how it turned.
 
-        These are the maps `[2, 6]` of what `pushes` returns to (m_x, m_y) about the origin of the patch.
+        Moments are the maps `[2, 6]` of what `pushes` returns to (m_x, m_y) about the origin of the patch. The x axis
+        `[3]` is in the frame of the patch, as that `before`; the last is the map `[2, 2]` from vectors in the axes of
+        the last step, carried along, to these.
         """
         pose = self._frames[p].CalcPoseInWorld(self._begin)
         turned, place, origin = pose.rotation().matrix(), pose.translation(), _ORIGIN
         if self._centres[p] == "contact":
             centre = self._centre(p)
             origin, place = turned.T @ (centre - place), centre
-        x, normal, place = turned[:, 0].tolist(), _unit(force.tolist()), place.tolist()
-        along = sum(map(operator.mul, x, normal))
-        x = _unit([a - along * b for a, b in zip(x, normal, strict=True)])
+        normal, place = _unit(force.tolist()), place.tolist()
+        last = _across((turned @ before).tolist(), normal)
+        x, last = _axis(turned[:, 0].tolist(), turned[:, 1].tolist(), last, normal)
         y = _cross(normal, x)
+        c, s = _dot(last, x), _dot(last, y)
         measured = JacobianWrtVariable.kV, self._frames[p], origin, self._others[p], self._world
         spatial = self.plant.CalcJacobianSpatialVelocity(self._begin, *measured)
         seen = np.array([[0.0, 0.0, 0.0, *x], [0.0, 0.0, 0.0, *y], [*normal, 0.0, 0.0, 0.0]])
-        return seen @ spatial, normal, [[*_cross(place, x), *x], [*_cross(place, y), *y]]
+        return seen @ spatial, normal, [[*_cross(place, x), *x], [*_cross(place, y), *y]], x @ turned, ((c, -s), (s, c))
 
-    def moved(self, jacobian: np.ndarray) -> np.ndarray:
-        """Return the velocities that wrenches cause in a step without contact `[nv, 3k]`: `dt (M + dt D)^-1 J'`."""
-        metric = self.plant.CalcMassMatrix(self._begin)
+    def moved(self, jacobian: np.ndarray) -> tuple[np.ndarray, float]:
+        """Return the velocities that wrenches cause in a step without contact `[nv, 3k]`: `dt (M + dt D)^-1 J'`.
+
+        With the size of the momentum as Drake's solver weighs it, `sqrt(v'Mv)` [sqrt(J)].
+        """
+        metric, velocity = self.plant.CalcMassMatrix(self._begin), self.plant.GetVelocities(self._begin)
+        momentum = math.sqrt(velocity @ metric @ velocity)
         metric.flat[:: len(metric) + 1] += self._damping
         _, found, _ = self._solve(metric, jacobian.T)
-        return self.dt * found
+        return self.dt * found, momentum
 
     # ------------------------------------------------------------------ contacts
 
@@ -154,6 +162,30 @@ class Shadow:
 def _cross(one: Sequence[float], other: Sequence[float]) -> list[float]:
     (a, b, c), (d, e, f) = one, other
     return [b * f - c * e, c * d - a * f, a * e - b * d]
+
+
+def _dot(one: Sequence[float], other: Sequence[float]) -> float:
+    return sum(map(operator.mul, one, other))
+
+
+def _across(vector: Sequence[float], normal: Sequence[float]) -> list[float]:
+    along = _dot(vector, normal)
+    return [a - along * b for a, b in zip(vector, normal, strict=True)]
+
+
+def _axis(x: list[float], y: list[float], last: list[float], normal: list[float]) -> tuple[list[float], list[float]]:
+    """Return the x axis of a patch from the axes of its frame and its last one, carried along, and this one.
+
+    As in `planarfriction.adapters.mujoco.loops.geometry`.
+    """
+    x = _across(x, normal)
+    flat = _dot(x, x)
+    if _dot(last, last) >= ALONG:
+        last = _unit(last)
+        sign = math.copysign(1.0, _dot(x, last))
+        return (last if flat < FLAT else _unit([sign * each for each in x])), last
+    x = _unit(x if flat >= ALONG else _across(y, normal))
+    return x, x
 
 
 def _unit(vector: Sequence[float]) -> list[float]:

@@ -28,6 +28,7 @@ from planarfriction.adapters.mujoco.patches import (
 from planarfriction.coupling import ITERATIONS, TOLERANCE
 from planarfriction.environments import SHAPE, check, defaults
 from planarfriction.errors import InvalidValueError
+from planarfriction.formulas import LIGHTEST
 from planarfriction.jax import DistributedModel, ReducedModelPublished
 from planarfriction.jax.base import FrictionPytree
 from planarfriction.tensors.steps import LAW
@@ -120,7 +121,7 @@ class Friction:
         made = zip(numbers, np.array([defaults(patch.model.law) for patch in patches]).T, strict=True)
         changed = {name: jnp.asarray(numbers[name]) for name, own in made if (numbers[name] != own).any()}
         self.parameters: dict[str, jax.Array] = changed
-        fixed = responses.places(placed, radius), which, follows, shapes, radius, at, m.nuserdata
+        fixed = responses.places(m, placed, radius), which, follows, shapes, radius, at, m.nuserdata
         self._fixed = _Fixed(*fixed, numbers=check(numbers))
 
     def replace(self, models: Sequence[FrictionPytree]) -> Self:
@@ -219,24 +220,25 @@ class Friction:
         given, dt, at = d, m.opt.timestep, self._fixed.memory
         states, guess = self.states(d), self._now(d, at.wrench, at.guess, 3 * len(self._fixed.which))
         held = self._now(d, at.centre, at.held, 3 * len(self._fixed.which)).reshape(-1, 3)
+        before = self._now(d, at.axis, at.before, 3 * len(self._fixed.which)).reshape(-1, 3)
         own = self._own()
-        guess = responses.back(guess.reshape(-1, 3), own.displaced).ravel()
-        d = _moved(m, d)
-        where = responses.geometry(m, d, self._fixed.places, held)
+        d, begun = _moved(m, d), states
+        where = responses.geometry(m, d, self._fixed.places, held, before)
+        states = [where.carry(p, each) for p, each in enumerate(begun)]
+        guess = jnp.stack([where.carry(p, each) for p, each in enumerate(guess.reshape(-1, 3))])
+        guess = responses.back(guess, own.displaced).ravel()
         guess = jnp.where(jnp.repeat(where.touching, 3), guess, 0.0)
         found = self._search(*jax.lax.stop_gradient((own, m, d, where, states, guess)))
-        answer = responses.answer(m, d, where.jacobian, where.rows, found.active)
+        answer = responses.answer(m, d, where, found.active)
         centre = where.centres(answer.forces(d, guess))  # that of the search, with its derivatives
         shift, pressed = self._pressed(own, where, found.centre + centre - jax.lax.stop_gradient(centre))
-
-        def unit(twist):
-            return self._evaluate(own, pressed, shift, states, twist, jnp.ones(len(where.rows)), dt)[1]
-
+        unit = self._unit(own, pressed, shift, states, dt)
         wrench = newton.fitting(unit, answer.host, found.wrench)
         twist, load = answer.host.twists(wrench), answer.host.loads(wrench)
         new, _ = self._evaluate(own, pressed, shift, states, twist, load, dt)
         d = self._integrated(m, d, where.jacobian, wrench, answer)
-        kept = {"state": states, "new": new, "guess": guess, "load": load, "held": held, "centre": where.moved(shift)}
+        kept = {"state": begun, "new": new, "guess": guess, "load": load, "held": held, "centre": where.moved(shift)}
+        kept |= {"before": before, "axis": where.axes[:, 0]}
         shift = shift + own.displaced
         kept |= {"wrench": responses.back(wrench.reshape(-1, 3), -shift), "twist": responses.about(twist, shift)}
         kept |= {"time": given.time, "next": d.time, "iterations": found.iterations, "passes": found.passes}
@@ -279,13 +281,10 @@ class Friction:
         def body(last: _Search) -> _Search:
             pushed = mjx.fwd_acceleration(m, d.replace(qfrc_applied=applied + last.wrench @ where.jacobian))
             active = responses.active_rows(mjx.solve(m, pushed.replace(qacc_warmstart=last.acceleration)))
-            answer = responses.answer(m, d, where.jacobian, where.rows, active)
+            answer = responses.answer(m, d, where, active)
             centre = jnp.where(last.passes == 0, where.centres(answer.forces(d, last.wrench)), last.centre)
             shift, pressed = self._pressed(own, where, centre)
-
-            def unit(twist):
-                return self._evaluate(own, pressed, shift, states, twist, jnp.ones(len(where.rows)), dt)[1]
-
+            unit = self._unit(own, pressed, shift, states, dt)
             solved = newton.solve(unit, answer.host, last.wrench, radius, TOLERANCE, ITERATIONS)
             acceleration = answer.acceleration(solved.wrench)
             slack = responses.slack(d, active, responses.active_at(d, acceleration), acceleration, dt)
@@ -317,6 +316,16 @@ class Friction:
         rest = (centre - shift - own.displaced) / own.scale[:, None]
         groups = zip(self._groups(), own.models, strict=True)
         return shift, [model.pressed(rest[np.array(at)]) if follow else None for (_, follow, at), model in groups]
+
+    def _unit(self, own: _Own, pressed, shift, states, dt) -> newton.Unit:
+        """Return the friction of steps, per unit load; that of a fixed stiffness depends on the loads."""
+        by_load = any(model.reference_load is not None for model in own.models)
+
+        def wrench(twist, load):
+            load = jnp.maximum(load, LIGHTEST) if by_load else jnp.ones_like(load)
+            return self._evaluate(own, pressed, shift, states, twist, load, dt)[1] / load[:, None]
+
+        return newton.Unit(wrench, by_load)
 
     def _evaluate(self, own: _Own, pressed, shift, states, twist, load, dt) -> tuple[list[jax.Array], jax.Array]:
         """Return the new states and wrenches of steps; patches of the same model side by side."""

@@ -23,8 +23,14 @@ ROUNDING_SINGLE = 1e-5
 
 What a body moves, its bristles give, to the last digit; so a held body does not creep however large this is."""
 
-Unit = Callable[[jax.Array], jax.Array]
-"""Wrenches of the models' steps per unit load `[k, 3]` of their twists `[k, 3]`."""
+
+class Unit(NamedTuple):
+    """Friction of the models' steps."""
+
+    wrench: Callable[[jax.Array, jax.Array], jax.Array]
+    """Wrenches per unit load `[k, 3]` at twists `[k, 3]` and loads `[k]` [N]."""
+    by_load: bool
+    """True if wrenches per unit load depend on the loads."""
 
 
 class HostResponse(NamedTuple):
@@ -69,8 +75,9 @@ class _Round(NamedTuple):
     twist: Any
     load: Any
     unit: Any
-    """Friction per unit load at the guess, with its slopes and the misfit."""
+    """Friction per unit load at the guess, with its slopes, those of the wrench by the load, and the misfit."""
     slopes: Any
+    by_load: Any
     misfit: Any
     start: Any
     """Newton step under trial: start, change of wrenches and of twists, `A dW . s` at its start, share tried."""
@@ -104,10 +111,16 @@ class _Search(NamedTuple):
     most: int
     """Largest number of iterations."""
 
-    def evaluate(self, twist):
-        """Return the friction per unit load of twists `[k, 3]`, and its slopes `[k, 3, 3]`."""
+    def evaluate(self, twist, load):
+        """Return the friction per unit load `[k, 3]`, its slopes `[k, 3, 3]`, and of wrenches by loads `[k, 3]`."""
+
+        def slope(along, more):
+            return jax.jvp(self.unit.wrench, (twist, load), (along, more))
+
         eye = jnp.broadcast_to(jnp.eye(3)[:, None], (3, len(twist), 3))
-        return jax.vmap(lambda along: jax.jvp(self.unit, (twist,), (along,)), out_axes=(None, -1))(eye)
+        unit, slopes = jax.vmap(lambda along: slope(along, 0.0 * load), out_axes=(None, -1))(eye)
+        by_load = load[:, None] * slope(0.0 * twist, jnp.ones_like(load))[1] if self.unit.by_load else 0.0
+        return unit, slopes, unit + by_load
 
     def misfit(self, twist, load, unit):
         """Return the largest speed [m/s] by which twists and loads miss those that the friction `unit` causes."""
@@ -118,7 +131,7 @@ class _Search(NamedTuple):
         gap = jnp.maximum(gap, self.diagonal * missing[:, None] * jnp.array([1.0, 1.0, 0.0]))
         return jnp.where(jnp.isfinite(gap).all(), gap.max(), jnp.inf)
 
-    def newton(self, w, twist, load, unit, slopes, held):
+    def newton(self, w, twist, load, unit, slopes, by_load, held):
         """Return the step, the twists that it adds, and `A dW . s` at its start."""
         host, count = self.host, len(load)
         lacks = host.load + host.load_response @ w - load
@@ -127,10 +140,10 @@ class _Search(NamedTuple):
         both = jnp.stack([own, _without_rising(own, self.scale)])
         caused = (
             both @ host.response.reshape(count, 3, -1)
-            + (follows[:, None] * unit)[..., None] * (host.load_response[:, None])
+            + (follows[:, None] * by_load)[..., None] * (host.load_response[:, None])
         )
         matrix = jnp.eye(3 * count) - caused.reshape(2, 3 * count, -1)
-        base = (load + follows * lacks)[:, None] * unit - w.reshape(-1, 3)
+        base = load[:, None] * unit + (follows * lacks)[:, None] * by_load - w.reshape(-1, 3)
         right = base + (both @ (host.twists(w) - twist)[..., None])[..., 0]
         change, sign = _solved(matrix, right.reshape(2, -1))
         move = change @ host.response.T
@@ -143,7 +156,7 @@ class _Search(NamedTuple):
     def next_round(self, c: _Round) -> _Round:
         """Evaluate the models once: take a step if it leads far enough downhill, else try less of it."""
         host = self.host
-        unit, slopes = self.evaluate(c.twist)
+        unit, slopes, by_load = self.evaluate(c.twist, c.load)
         searching = c.phase == _SEARCH
         here = (c.move * ((c.load[:, None] * unit).ravel() - c.w)).sum()
         far_enough = c.whole | (here >= -DOWNHILL * c.first) | ~(c.first > 0.0) | (c.tries == SHORTENINGS)
@@ -154,6 +167,7 @@ class _Search(NamedTuple):
         back = (c.phase == _REST) & (misfit > c.misfit)
         twist, misfit = jnp.where(back, host.twists(c.w), c.twist), jnp.where(back, c.misfit, misfit)
         unit, slopes = jnp.where(back, c.unit, unit), jnp.where(back, c.slopes, slopes)
+        by_load = jnp.where(back, c.by_load, by_load)
         to_rest = (c.phase == _GUESS) & (misfit > self.near)
         iterations = c.iterations + (searching & far_enough)
         better = accepted & (misfit < c.best)
@@ -162,7 +176,7 @@ class _Search(NamedTuple):
         done = accepted & ~to_rest & ((misfit <= self.near) | (iterations >= self.most) | (misfit == jnp.inf))
         # a new step, or less of the last
         held = jnp.where(accepted, iterations % ROUND >= JOINT, c.held)
-        change, move, first = self.newton(c.w, twist, load, unit, slopes, held)
+        change, move, first = self.newton(c.w, twist, load, unit, slopes, by_load, held)
         change, move, first = (
             jnp.where(accepted, new, old)
             for new, old in zip((change, move, first), (c.change, c.move, c.first), strict=True)
@@ -173,10 +187,10 @@ class _Search(NamedTuple):
         w = jnp.where(to_rest, c.w, start + far * change)
         return _Round(
             phase=jnp.where(to_rest, _REST, _SEARCH), w=w, twist=jnp.where(to_rest, 0.0, host.twists(w)),
-            load=jnp.where(to_rest | held, load, host.loads(w)), unit=unit, slopes=slopes, misfit=misfit,
-            start=start, change=change, move=move, first=first, far=far, tries=jnp.where(accepted, 0, c.tries + 1),
-            whole=jnp.where(accepted, c.phase == _REST, c.whole) & ~back, held=held & ~to_rest,
-            iterations=iterations, best=best, wrench=wrench, done=done,
+            load=jnp.where(to_rest | held, load, host.loads(w)), unit=unit, slopes=slopes, by_load=by_load,
+            misfit=misfit, start=start, change=change, move=move, first=first, far=far,
+            tries=jnp.where(accepted, 0, c.tries + 1), whole=jnp.where(accepted, c.phase == _REST, c.whole) & ~back,
+            held=held & ~to_rest, iterations=iterations, best=best, wrench=wrench, done=done,
         )  # fmt: skip
 
 
@@ -193,7 +207,7 @@ def solve(unit: Unit, host: HostResponse, guess: jax.Array, radius: jax.Array, t
     none, zeros = jnp.zeros(3 * count), jnp.zeros((count, 3))
     first = _Round(
         phase=jnp.asarray(_GUESS), w=guess, twist=host.twists(guess), load=host.loads(guess),
-        unit=zeros, slopes=jnp.zeros((count, 3, 3)), misfit=jnp.asarray(jnp.inf),
+        unit=zeros, slopes=jnp.zeros((count, 3, 3)), by_load=zeros, misfit=jnp.asarray(jnp.inf),
         start=guess, change=none, move=none, first=jnp.asarray(0.0), far=jnp.asarray(1.0), tries=jnp.asarray(0),
         whole=jnp.asarray(False), held=jnp.asarray(False), iterations=jnp.asarray(0),
         best=jnp.asarray(jnp.inf), wrench=none, done=jnp.asarray(False),
@@ -206,7 +220,8 @@ def fitting(unit: Unit, host: HostResponse, found: jax.Array) -> jax.Array:
     """Return the wrenches `found`, with the derivatives of `w(V, N) - W = 0` by all that is in `unit` and `host`."""
 
     def gap(w):
-        return (host.loads(w)[:, None] * unit(host.twists(w))).ravel() - w
+        load = host.loads(w)
+        return (load[:, None] * unit.wrench(host.twists(w), load)).ravel() - w
 
     def linear(slope, right):
         return jnp.linalg.solve(jax.jacobian(slope)(right), right)

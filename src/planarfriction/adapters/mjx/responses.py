@@ -19,9 +19,9 @@ from mujoco import mjx
 
 from planarfriction.adapters.mjx.newton import HostResponse
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
-from planarfriction.adapters.mujoco.loops.geometry import ALONG
 from planarfriction.adapters.mujoco.patches import Placed
 from planarfriction.jax.namespace import xp
+from planarfriction.kernels.coupling_rows import ALONG, FLAT
 from planarfriction.tensors.pressure import centre_of
 
 
@@ -83,11 +83,9 @@ def slack(d: Any, before: Active, after: Active, acceleration: jax.Array, dt: ja
     return (jnp.where(wrong, abs(abs(_gap(d, acceleration)) - loss), 0.0) * dt).max(initial=0.0)
 
 
-def answer(m: Any, d: Any, jacobian: jax.Array, rows: jax.Array, active: Active) -> WrenchResponse:
-    """Return the response to wrenches from the Jacobian `[3k, nv]` of the twists; `rows` `[k, nefc]` mark contacts.
-
-    `qfrc_smooth` in the data is without wrenches.
-    """
+def answer(m: Any, d: Any, where: Geometry, active: Active) -> WrenchResponse:
+    """Return the response to wrenches on patches; `qfrc_smooth` in the data is without these."""
+    jacobian, rows = where.jacobian, where.rows
     constraints, inertia = d._impl.efc_J, mjx.full_m(m, d)
     stiffness = jnp.where(active.quadratic, d._impl.efc_D, 0.0)
     limit = active.pull * d._impl.efc_frictionloss
@@ -99,7 +97,7 @@ def answer(m: Any, d: Any, jacobian: jax.Array, rows: jax.Array, active: Active)
     gains = jax.vmap(lambda acceleration: _gained(m, d, inertia, acceleration), in_axes=1, out_axes=1)(found)
     weights = rows * stiffness
     host = HostResponse(
-        twist=jacobian @ (d.qvel + gains[:, 0]),
+        twist=jacobian @ (d.qvel + gains[:, 0]) + where.drift.ravel(),
         load=-weights @ _gap(d, free),
         response=jacobian @ gains[:, 1:],
         load_response=-weights @ (constraints @ moved),
@@ -140,12 +138,15 @@ class PatchPlaces(NamedTuple):
     """True where the origin follows the contact forces."""
     radius: Any
     """Lever arms of the patches [m]."""
+    surface: Any
+    """Velocities of the surfaces of both geoms in their frames (`surfacevel`), `[k, 2, 6]`."""
 
 
-def places(placed: Sequence[Placed], radius: np.ndarray) -> PatchPlaces:
+def places(m: Any, placed: Sequence[Placed], radius: np.ndarray) -> PatchPlaces:
     """Return the places of patches found in a model."""
     numbers = [(p.site, p.own, p.other, p.bodies[1], p.bodies[0], p.at_contact) for p in placed]
-    return PatchPlaces(*map(np.array, zip(*numbers, strict=True)), radius=radius)
+    surface = getattr(m, "geom_surfacevel", np.zeros((m.ngeom, 6)))[[(p.own, p.other) for p in placed]]
+    return PatchPlaces(*map(np.array, zip(*numbers, strict=True)), radius=radius, surface=surface)
 
 
 class Geometry(NamedTuple):
@@ -165,6 +166,15 @@ class Geometry(NamedTuple):
     """Axes of the patches in the frames of the sites, as rows, `[k, 3, 3]`."""
     share: jax.Array
     """Share of the displacement to the centre of the contact forces that the origin takes in the step, `[k]`."""
+    carried: jax.Array
+    """Cosine and sine of the angles from the x axes of the last step, carried along, to these, `[k, 2]`."""
+    drift: jax.Array
+    """Twists of the surfaces relative to the bodies, of the own one less those of the other, `[k, 3]`."""
+
+    def carry(self, p: int, vectors: jax.Array) -> jax.Array:
+        """Return vectors of patch p, x and y in front, in its axes of this step instead of the last ones."""
+        (c, s), (x, y) = self.carried[p], vectors[:2]
+        return vectors.at[:2].set(jnp.stack([c * x + s * y, c * y - s * x]))
 
     def centres(self, force: jax.Array) -> jax.Array:
         """Return the centres of pressure `[k, 2]` [m] of forces of constraints `[nefc]`."""
@@ -188,8 +198,8 @@ def back(wrench: jax.Array, shift: jax.Array) -> jax.Array:
     return jnp.stack([fx, fy, torque + shift[:, 0] * fy - shift[:, 1] * fx], axis=1)
 
 
-def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array) -> Geometry:
-    """Return the geometry of the contacts of patches with their last origins `[k, 3]`, in the frames of the sites.
+def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Array) -> Geometry:
+    """Return the geometry of the contacts of patches with their last origins and x axes `[k, 3]`, in the sites' frames.
 
     See `planarfriction.adapters.mujoco.loops.centres`.
     """
@@ -197,7 +207,7 @@ def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array) -> Geometry:
     single = jnp.asarray(contact.dim == 1) & (contact.dist < contact.includemargin)
     frames = contact.frame.reshape(-1, 3, 3)
 
-    def one(place: PatchPlaces, held: jax.Array):
+    def one(place: PatchPlaces, held: jax.Array, before: jax.Array):
         forward = (contact.geom[:, 0] == place.other) & (contact.geom[:, 1] == place.own)
         backward = (contact.geom[:, 0] == place.own) & (contact.geom[:, 1] == place.other)
         chosen = (forward | backward) & single
@@ -206,7 +216,12 @@ def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array) -> Geometry:
         normal = _unit(normal, touching)
         turned, site = d.site_xmat[place.site].reshape(3, 3), d.site_xpos[place.site]
         across = turned - jnp.outer(normal, normal @ turned)
-        x = _unit(jnp.where(across[:, 0] @ across[:, 0] >= ALONG, across[:, 0], across[:, 1]), touching)
+        flat, along = across[:, 0] @ across[:, 0], across @ before
+        kept = touching & (along @ along >= ALONG)
+        along = _unit(along, kept)
+        sided = jnp.where(kept & (across[:, 0] @ along < 0.0), -1.0, 1.0) * across[:, 0]
+        x = _unit(jnp.where(flat >= ALONG, sided, across[:, 1]), touching)
+        x = jnp.where(kept & (flat < FLAT), along, x)
         middle = jnp.where(chosen[:, None], contact.pos, 0.0).sum(0) / jnp.maximum(chosen.sum(), 1)
         last, new = site + turned @ held, (held == 0.0).all()
         last = jnp.where(new, middle, last + normal * (normal @ (middle - last)))
@@ -216,16 +231,25 @@ def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array) -> Geometry:
             for own, other in zip(mjx.jac(m, d, centre, place.owner), mjx.jac(m, d, centre, place.support), strict=True)
         )
         y = jnp.cross(normal, x)
+        carried = jnp.where(kept, jnp.stack([along @ x, -along @ y]), jnp.array([1.0, 0.0]))
+        drift = jnp.zeros(3)
+        for geom, surface, sign in zip((place.own, place.other), place.surface, (1.0, -1.0), strict=True):
+            frame = d.geom_xmat[geom].reshape(3, 3)
+            turn = frame @ surface[3:]
+            move = frame @ surface[:3] + jnp.cross(turn, centre - d.geom_xpos[geom])
+            drift += sign * jnp.stack([x @ move, y @ move, normal @ turn])
+        drift = jnp.where(touching, drift, 0.0)
         jacobian, away = jnp.stack([moves @ x, moves @ y, turns @ normal]), contact.pos - centre
         own = jnp.where(chosen, jnp.stack([jnp.ones(len(away)), away @ y, -away @ x]), 0.0)
-        tilt, slip = (turns @ jnp.stack([x, y]).T).T @ d.qvel, jacobian[:2] @ d.qvel
+        tilt, slip = (turns @ jnp.stack([x, y]).T).T @ d.qvel, jacobian[:2] @ d.qvel + drift[:2]
         rolled = _norm(tilt) + jnp.where(place.radius > 0.0, _norm(slip) / place.radius, 0.0)
         share = jnp.where(new, 1.0, jnp.minimum(1.0, m.opt.timestep * rolled / FOLLOWS))
         share = jnp.where(touching & place.at_contact, share, 0.0)
-        axes = jnp.stack([x, y, normal]) @ turned
-        return jnp.where(touching, jacobian, 0.0), own, touching, turned.T @ (centre - site), axes, share
+        axes = jnp.where(touching, jnp.stack([x, y, normal]) @ turned, before)
+        place_of = turned.T @ (centre - site)
+        return jnp.where(touching, jacobian, 0.0), own, touching, place_of, axes, share, carried, drift
 
-    jacobian, own, *others = jax.vmap(one)(jax.tree.map(jnp.asarray, where), held)
+    jacobian, own, *others = jax.vmap(one)(jax.tree.map(jnp.asarray, where), held, before)
     rows = jnp.zeros((len(where.site), 3, d._impl.efc_J.shape[0])).at[:, :, contact.efc_address].set(own)
     return Geometry(jacobian.reshape(-1, m.nv), rows[:, 0], rows[:, 1:], *others)
 

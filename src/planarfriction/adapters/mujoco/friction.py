@@ -8,6 +8,7 @@ import copy
 import ctypes
 import functools
 import warnings
+import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple
@@ -30,6 +31,7 @@ from planarfriction.adapters.mujoco.patches import (
     write_parameters,
 )
 from planarfriction.compiler.memory import place_of, row_of
+from planarfriction.compiler.notice import said_when_compiling
 from planarfriction.coupling import CoupledPatches
 from planarfriction.environments import check
 from planarfriction.errors import FrictionError, InvalidValueError
@@ -79,6 +81,8 @@ class Friction:
         self._check(m)
         self._said: set[str | None] = set()
         self._memory = memory(patches, m.nv, m.nuserdata)
+        self._used: list[bool] = []
+        weakref.finalize(self, _say_unused, self._used)
 
     def _check(self, m: Any) -> None:
         """Refuse options and parameters of a model that do not fit."""
@@ -127,7 +131,17 @@ class Friction:
     # ------------------------------------------------------------------ what the data hold
 
     def _own(self, d: Any, first: int, count: int) -> np.ndarray:
+        self._say_alone(d)
         return d.userdata[first : first + count]
+
+    def _say_alone(self, d: Any) -> None:
+        """Warn, once, if data have moved on by steps without friction."""
+        self._used[:] = [True]
+        steps = (d.time - d.userdata[self._memory.next]) / d.model.opt.timestep
+        if 0.5 < steps < 1e9 and abs(steps - round(steps)) < 1e-6 and _ALONE not in self._said:
+            self._said.add(_ALONE)
+            line = f"the time of these data went on by {round(steps)} steps without patch friction"
+            warnings.warn(f"{line}: {_ALONE}", stacklevel=4)
 
     def state(self, d: Any) -> np.ndarray:
         """Return the state of all patches now, as a view of `userdata`, which `coupled.states` gives its shape."""
@@ -140,7 +154,7 @@ class Friction:
         return self._own(d, self._memory.wrench, 3 * len(self.patches)).reshape(-1, 3)
 
     def twists(self, d: Any) -> np.ndarray:
-        """Return the last twists `[k, 3]` [m/s, m/s, rad/s] of the sites' bodies relative to the others."""
+        """Return the last twists `[k, 3]` [m/s, m/s, rad/s] of the sites' surfaces relative to the others."""
         return self._own(d, self._memory.twist, 3 * len(self.patches)).reshape(-1, 3)
 
     def loads(self, d: Any) -> np.ndarray:
@@ -153,7 +167,9 @@ class Friction:
         It is that of the last step; without contact it is the site, and its axes are not numbers.
         """
         placed, at, own = self.placed[p], self._memory.centre + 3 * p, self.parameters(d.model)
-        origin, axes = placed.frame(d, *placed.contacts(d), d.userdata[at : at + 3])
+        axis = self._memory.axis + 3 * p
+        kept = d.userdata[at : at + 3], d.userdata[axis : axis + 3]
+        origin, axes = placed.frame(d, *placed.contacts(d), *kept)
         return origin + own["centre_x"][p] * axes[0] + own["centre_y"][p] * axes[1], axes
 
     def misplaced(self, d: Any) -> str | None:
@@ -174,6 +190,7 @@ class Friction:
         """Relax all bristles."""
         at = self._memory
         d.userdata[at.state : at.converged + 1] = 0.0
+        d.userdata[at.next] = d.time
 
     def draw(self, scene: Any, d: Any) -> None:
         """Add each patch in contact to an `MjvScene`: its outline, its friction, and its centre of rotation.
@@ -203,6 +220,9 @@ class Friction:
         m = d.model
         if m is not self.m and not loops.is_served(self._row, m._address):
             raise InvalidValueError("d", "be data of the model of the patches, or of a copy", "data of another model")
+        if d.time != d.userdata[self._memory.next]:
+            self._say_alone(d)
+        self._used[:] = [True]
         mujoco.mj_step1(m, d)
         silent = loops.plan_step(self._row, m._address, d._address)
         iterations = 0.0 if silent else d.userdata[self._memory.iterations]
@@ -228,6 +248,7 @@ class Friction:
         if options of this model do not fit any more.
         """
         self._check(self.m)
+        self._used[:] = [True]
         if mujoco.get_mjcb_control() is not None or loops.INSTALLED[0] != 0:
             raise FrictionError("a control callback is installed already: remove it with mujoco.set_mjcb_control(None)")
         loops.INSTALLED[0] = place_of(self._row)
@@ -241,7 +262,12 @@ class Friction:
 
     @functools.cached_property
     def _row(self) -> np.ndarray:
-        """Record of the model for compiled steps."""
+        """Record of the model for compiled steps, which are ready then."""
+        with said_when_compiling():
+            loops.compile_ahead()
+            return self._host_row()
+
+    def _host_row(self) -> np.ndarray:
         packed, k = self.coupled._packed, len(self.patches)
         problem, scratch = (
             self.coupled._blank_problem([each.follows for each in self.placed]),
@@ -278,6 +304,15 @@ class Friction:
             extents=place_of(extents), memory=self._memory, scratch=scratch.offsets, **places, **layout(),
         )  # fmt: skip
         return row_of(host)
+
+
+_ALONE = "mj_step has none by itself; call friction.step(d) instead, or mj_step within friction.install()"
+
+
+def _say_unused(used: list[bool]) -> None:
+    """Warn of friction that no step has had."""
+    if not used:
+        warnings.warn(f"Friction was made and not used: {_ALONE}", stacklevel=2)
 
 
 @functools.cache

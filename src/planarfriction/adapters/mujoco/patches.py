@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -16,7 +18,6 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.adapters.mujoco.loops.centres import ALONG as ALONG_X
 from planarfriction.adapters.mujoco.loops.centres import BEHIND, BEYOND
-from planarfriction.adapters.mujoco.loops.geometry import ALONG
 from planarfriction.adapters.mujoco.loops.models import DIGEST, LONGEST
 from planarfriction.adapters.mujoco.loops.records import Memory, memory_layout
 from planarfriction.compiler.memory import Layout
@@ -53,8 +54,11 @@ finds one point, which says nothing of the pressure."""
 class PatchContact(Checked):
     """A contact patch between two geoms, attached to the body of a site.
 
-    The x axis of the patch is that of the site, projected on the contact plane; its normal points into the site's body.
-    The twist is that of this body relative to the other one, and the wrench acts on this body.
+    The x axis of the patch is that of the site, projected on the contact plane; where it lies along the normal at the
+    first contact, the y axis of the site takes its place. On a body that rolls it does not reverse as the site's does:
+    within 30 degrees of the normal it goes along with the body, and then is on the same side as before. Bristles are
+    carried into the axes of each step. The normal points into the site's body. The twist is that of the surface of this
+    body relative to the other one's, and the wrench acts on this body.
 
     Raises InvalidValueError unless `geoms` are two names, `centre` is an option and `model` a friction model.
     """
@@ -98,28 +102,37 @@ def room_of(patches: Sequence[PatchContact], nv: int) -> int:
     return _layout(patches, nv).size
 
 
-def prepare(spec: Any, patches: Sequence[PatchContact]) -> None:
-    """Prepare an `MjSpec` for the patches: add a contact pair without friction for each, and room in the user data.
+def prepare(spec: Any, patches: Sequence[PatchContact]) -> Any:
+    """Prepare an `MjSpec`, or a model file, for the patches; return the spec.
 
-    An existing pair keeps its settings except for friction; a new pair takes those of its geoms. A second call replaces
-    the room that the first one took. A custom numeric "planarfriction" holds the room taken, a digest of the patches,
-    by which copies of the model are told from other models, and the parameters of the patches, which copies may change.
+    Each patch gets a contact pair without friction; together they get room in the user data. An existing pair keeps its
+    settings except for friction; a new one takes those that MuJoCo gives contacts of its geoms, adhesion, margin and
+    gap among them. A second call replaces the room that the first one took. A custom numeric "planarfriction" holds the
+    room taken, a digest of the patches, by which copies of the model are told from other models, and the parameters of
+    the patches, which copies may change.
 
-    Raises `InvalidValueError` for a geom or a site that does not exist, and for the same pair twice.
+    Raises `InvalidValueError` for what is neither a spec nor the path of a file, for a geom or a site that does not
+    exist, and for the same pair twice.
     """
+    if isinstance(spec, str | Path) and Path(spec).is_file():
+        spec = mujoco.MjSpec.from_file(str(spec))
+    if not isinstance(spec, mujoco.MjSpec):
+        rule = "be an MjSpec or the path of a model file (MjSpec.from_string takes XML; compile the model afterwards)"
+        raise InvalidValueError("spec", rule, spec if isinstance(spec, str | Path) else type(spec).__name__)
     check_once(patches)
     for patch in patches:
-        if spec.site(patch.site) is None:
-            raise InvalidValueError("site", "be in the model", patch.site)
+        _choose("site", patch.site, [each.name for each in spec.sites])
         for name in patch.geoms:
-            if spec.geom(name) is None:
-                raise InvalidValueError("geoms", "be in the model", name)
+            _choose("geoms", name, [each.name for each in spec.geoms])
+    compiled = spec.copy().compile()
+    for patch in patches:
         pair = next((each for each in spec.pairs if {each.geomname1, each.geomname2} == set(patch.geoms)), None)
         if pair is None:
             pair = spec.add_pair(geomname1=patch.geoms[0], geomname2=patch.geoms[1])
-            pair.solref[:], pair.solimp[:], pair.margin, pair.gap = math.nan, math.nan, math.nan, math.nan
+            for name, value in _between(compiled, [compiled.geom(name).id for name in patch.geoms]).items():
+                setattr(pair, name, value)
         pair.condim = 1
-    room = _layout(patches, spec.copy().compile().nv).size
+    room = _layout(patches, compiled.nv).size
     record = next((each for each in spec.numerics if each.name == RECORD), None)
     taken = 0 if record is None else int(record.data[0])
     record = spec.add_numeric(name=RECORD) if record is None else record
@@ -127,6 +140,35 @@ def prepare(spec: Any, patches: Sequence[PatchContact]) -> None:
     record.data = [room, *_digest(patches), *numbers]
     record.size = len(record.data)
     spec.nuserdata = max(spec.nuserdata, 0) - taken + room
+    return spec
+
+
+_MIXED = "friction", "solref", "solimp", "solmix", "priority", "adhesion"
+"""Fields of geoms from which those of their contacts follow; margins and gaps are told apart below."""
+
+
+def _between(m: Any, geoms: Sequence[int]) -> dict[str, Any]:
+    """Return the settings of a pair that MuJoCo itself gives contacts of two geoms, by its own rules: of two spheres.
+
+    The rule for gaps is that for margins, which a contact tells.
+    """
+
+    def contact(margin: str) -> Any:
+        spec = mujoco.MjSpec()
+        for geom in geoms:
+            body = spec.worldbody.add_body()
+            body.add_freejoint()
+            sphere = body.add_geom(size=[1.0, 0.0, 0.0], margin=getattr(m, f"geom_{margin}")[geom])
+            for name in _MIXED:
+                if hasattr(m, f"geom_{name}"):
+                    setattr(sphere, name, getattr(m, f"geom_{name}")[geom])
+        d = mujoco.MjData(spec.compile())
+        mujoco.mj_forward(d.model, d)
+        return d.contact
+
+    found, gap = contact("margin"), contact("gap").includemargin[0]
+    same = {name: getattr(found, name)[0] for name in dir(mujoco.MjsPair) if hasattr(found, name) and name[0] != "_"}
+    return {**same, "margin": found.includemargin[0], "gap": gap}
 
 
 def place_of_parameters(m: Any) -> int:
@@ -233,17 +275,19 @@ class Placed:
         chosen = np.flatnonzero((forward | backward) & (d.contact.efc_address >= 0))
         return chosen, np.where(forward[chosen], 1.0, -1.0)
 
-    def frame(self, d: Any, chosen: np.ndarray, sign: np.ndarray, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return origin [3] and axes [3, 3], as rows, of its frame in the world; `centre` [3] is in that of the site.
+    def frame(
+        self, d: Any, chosen: np.ndarray, sign: np.ndarray, centre: np.ndarray, axis: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return origin [3] and axes [3, 3], as rows, of its frame in the world.
 
-        An x axis of the site along the normal gives way to its y axis.
+        `centre` [3] and x `axis` [3] are in the frame of the site.
         """
         normal = sign @ d.contact.frame[chosen, :3]
         normal /= np.linalg.norm(normal)
         turned = d.site_xmat[self.site].reshape(3, 3)
-        across = turned - np.outer(normal, normal @ turned)
-        x = across[:, 0] if across[:, 0] @ across[:, 0] >= ALONG else across[:, 1]
-        x = x / np.linalg.norm(x)
+        x = turned @ axis
+        x -= (x @ normal) * normal
+        x /= np.linalg.norm(x)
         return d.site_xpos[self.site] + turned @ centre, np.array([x, np.cross(normal, x), normal])
 
     def extent(self) -> tuple[float, ...]:
@@ -258,7 +302,7 @@ class Placed:
         words = {
             BEYOND: 'contact forces act beyond the patch: put the site into the contact, or use centre="contact"',
             BEHIND: "it lies on another side of its geom than the contact",
-            ALONG_X: "its x axis lies along the normal of the contact, where the patch takes any direction",
+            ALONG_X: "its x axis lies along the normal of the contact, where its y axis takes its place",
         }
         return f"site {self.patch.site} of the contact between {' and '.join(self.patch.geoms)}: {words[number]}"
 
@@ -275,5 +319,15 @@ class Placed:
 def _named(m: Any, what: str, name: str, kind: Any) -> int:
     found = mujoco.mj_name2id(m, kind, name)
     if found < 0:
-        raise InvalidValueError(what, "be in the model", name)
+        count = getattr(m, f"n{kind.name.removeprefix('mjOBJ_').lower()}")
+        _choose(what, name, [mujoco.mj_id2name(m, kind, i) for i in range(count)])
     return found
+
+
+def _choose(what: str, name: str, names: Iterable[str | None]) -> None:
+    """Raise unless a name is among these, and tell some of them, like ones first."""
+    known = sorted(filter(None, names))
+    if name not in known:
+        near = difflib.get_close_matches(name, known, 3) or known[:5]
+        told = f" (did you mean {' or '.join(near)}?)" if near else ""
+        raise InvalidValueError(what, "be in the model", name + told)

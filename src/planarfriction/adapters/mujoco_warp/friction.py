@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -175,14 +176,12 @@ class Friction:
         def launch(kernel: Any, *inputs: Any) -> None:
             wp.launch(kernel, dim=worlds, inputs=inputs)
 
-        launch(
-            geometry.recall, patches, self._places, d.time, dt, self._memory, self._state, problem.guess, frames.held
-        )
+        before = frames.held, frames.before
+        launch(geometry.recall, patches, self._places, d.time, dt, self._memory, self._state, problem.guess, *before)
         places = d.site_xpos, d.site_xmat
-        launch(
-            geometry.place,
-            *(patches, own["tree"], contacts, frames, *places, d.qvel, problem.guess, d.qfrc_passive),
-        )
+        geoms = d.geom_xpos, d.geom_xmat
+        moving = d.qvel, self._state, problem.guess, d.qfrc_passive
+        launch(geometry.place, patches, own["tree"], contacts, frames, *places, *geoms, *moving)
         mjw.fwd_actuation(m, d)
         mjw.fwd_acceleration(m, d, factorize=True)
         mjw.solve(m, d)
@@ -223,6 +222,7 @@ class Friction:
             {
                 "owner": zeros(njmax, dtype=int), "lever": zeros(njmax, dtype=wp.vec2), "touching": zeros(k, dtype=int),
                 "axes": zeros(k, dtype=wp.mat33), "origin": zeros(k, dtype=wp.vec3), "rolling": zeros(k),
+                "before": zeros(k, dtype=wp.vec3), "axis": zeros(k, dtype=wp.vec3), "drift": zeros(k, dtype=wp.vec3),
                 "jacobian": zeros(3 * k, nv), "held": zeros(k, dtype=wp.vec3), "centre": zeros(k, dtype=wp.vec3),
             },
         )  # fmt: skip
@@ -253,11 +253,17 @@ class Friction:
 
     def _numbers(self) -> Any:
         """Return the numbers of the patches for kernels."""
-        names = "site", "own", "other", "owner", "support", "at_contact"
+        names = "site", "own", "other", "owner", "support", "at_contact", "bristles", "first"
         rows = [(p.site, p.own, p.other, p.bodies[1], p.bodies[0], int(p.at_contact)) for p in self.placed]
         device, levers = self.coupled.device, [lever_of(each.model) for each in self.patches]
+        shapes = [each.model.state_shape for each in self.patches]
+        firsts = np.cumsum([0, *map(math.prod, shapes)]).tolist()
+        rows = [(*row, math.prod(shape[1:]), first) for row, shape, first in zip(rows, shapes, firsts, strict=False)]
         columns = zip(names, zip(*rows, strict=True), strict=True)
         found = {name: wp.array(each, dtype=int, device=device) for name, each in columns}
+        surface = getattr(self.m, "geom_surfacevel", np.zeros((self.m.ngeom, 6)))
+        surface = surface[[(each.own, each.other) for each in self.placed]].astype(np.float32)
+        found["surface"] = wp.array(surface, dtype=wp.spatial_vector, device=device)
         return _filled(
             geometry.Patches(),
             {

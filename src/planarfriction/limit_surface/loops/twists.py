@@ -47,6 +47,9 @@ _ROUGH = FINE._replace(balanced=1e-6)
 _FLATTEST = 1e-12
 """Least curvature that a step of Newton's method trusts, relative to the largest [-]: cells in a line have none."""
 
+NORMAL = 2.3e-308
+"""Number whose reciprocal is one too: wrenches below it are scaled by that."""
+
 MOST_TRIALS = 400
 """Evaluations at which the search gives up; a handful are usual."""
 
@@ -110,7 +113,7 @@ def target_of(frame, wrench):
     """Return the unit vector that h has to be parallel to; a zero vector for a wrench that is zero or not finite."""
     largest = xp.maximum(xp.maximum(abs(wrench[0]), abs(wrench[1])), abs(wrench[2]))
     sound = xp.is_finite(wrench[0]) and xp.is_finite(wrench[1]) and xp.is_finite(wrench[2]) and largest > 0.0
-    per = 1.0 / largest if sound else 0.0
+    per = 1.0 / xp.maximum(largest, NORMAL) if sound else 0.0
     x, y, s = wrench[0] * per, wrench[1] * per, wrench[2] * per
     t = (
         frame[0] * x + frame[1] * y + frame[2] * s,

@@ -31,9 +31,15 @@ def use_one_thread() -> None:
         os.environ.setdefault(name, os.environ.get("OMP_NUM_THREADS", "1"))
 
 
-@click.command(
-    short_help="Measure the speed of this installation.",
-    help="""Measure the speed of this installation, each benchmark next to its baseline from the same run.
+@click.command(short_help="Measure the speed of this installation.")
+@click.option("--only", metavar="NAME", multiple=True, help="Only this benchmark; may be repeated.")
+@click.option("--full", is_flag=True, help="Include the baselines that take minutes.")
+@click.option("--rounds", type=int, help="Rounds of each benchmark. Default: 1, with --compare 3.")
+@click.option("--compare", "old", type=FILE, help="Earlier run to compare with, as --json prints it.")
+@click.option("--force", is_flag=True, help="Compare although other programs use the machine.")
+@click.option("--json", "as_json", is_flag=True, help="Print a JSON list and nothing else on stdout.")
+def bench(only: tuple[str, ...], full: bool, rounds: int | None, old: Path | None, force: bool, as_json: bool) -> None:
+    """Measure the speed of this installation, each benchmark next to its baseline from the same run.
 
     \b
     Examples:
@@ -45,16 +51,7 @@ def use_one_thread() -> None:
 
     --compare measures again and prints how far the ratios to the baselines have moved since, which depends less on the
     machine than the times do. NumPy, SciPy and PyTorch get one thread unless OMP_NUM_THREADS says otherwise.
-    """,
-)
-@click.option("--only", metavar="NAME", multiple=True, help="Only this benchmark; may be repeated.")
-@click.option("--full", is_flag=True, help="Include the baselines that take minutes.")
-@click.option("--rounds", type=int, help="Rounds of each benchmark. Default: 1, with --compare 3.")
-@click.option("--compare", "old", type=FILE, help="Earlier run to compare with, as --json prints it.")
-@click.option("--force", is_flag=True, help="Compare although other programs use the machine.")
-@click.option("--json", "as_json", is_flag=True, help="Print a JSON list and nothing else on stdout.")
-def bench(only: tuple[str, ...], full: bool, rounds: int | None, old: Path | None, force: bool, as_json: bool) -> None:
-    """Measure (the help above is what users see)."""
+    """
     import dataclasses
     import json
 
@@ -89,22 +86,7 @@ def bench(only: tuple[str, ...], full: bool, rounds: int | None, old: Path | Non
 # ---------------------------------------------------------------------- measured
 
 
-@click.command(
-    short_help="Compare friction models on measured data.",
-    help="""Compare friction models on published measurements, which come with the package: four tasks, fixed splits.
-
-    slides: the path and final pose of a cube on a table, from its first 8 poses. pushes: the twist of an object that is
-    pushed slowly, from the wrench. series: twists and wrenches during whole pushes. onsets: the final pose of a push
-    from its touch, and the peak of the force at breakaway. Each model is fitted to the training cases and scored on
-    the others, with bootstrap intervals. --own adds your own function (docs/measured.md).
-
-    \b
-    Examples:
-      planarfriction measured --out results/
-      planarfriction measured --task slides --only "exact surface" --own my_model.py:predict
-      planarfriction measured --list
-    """,
-)
+@click.command(short_help="Compare friction models on measured data.")
 @click.option("--task", "tasks", metavar="NAME", multiple=True, help="Only this task; may be repeated.")
 @click.option("--only", metavar="NAME", multiple=True, help="Only this model of the library; may be repeated.")
 @click.option("--own", metavar="FILE.py:NAME", multiple=True, help="A model of your own; may be repeated.")
@@ -123,7 +105,19 @@ def measured(
     seed: int,
     as_json: bool,
 ) -> int:
-    """Compare on measured data (the help above is what users see). An interrupt keeps the models that are done."""
+    """Compare friction models on published measurements, which come with the package: four tasks, fixed splits.
+
+    slides: the path and final pose of a cube on a table, from its first 8 poses. pushes: the twist of an object that is
+    pushed slowly, from the wrench. series: twists and wrenches during whole pushes. onsets: the final pose of a push
+    from its touch, and the peak of the force at breakaway. Each model is fitted to the training cases and scored on
+    the others, with bootstrap intervals. --own adds your own function (docs/measured.md).
+
+    \b
+    Examples:
+      planarfriction measured --out results/
+      planarfriction measured --task slides --only "exact surface" --own my_model.py:predict
+      planarfriction measured --list
+    """
     from planarfriction import validation
     from planarfriction.cli import INTERRUPTED
     from planarfriction.cli.console import note, print_table, work_progress
@@ -218,9 +212,15 @@ def _show(benchmark: Any, as_json: bool, folder: Path | None) -> None:
 # ---------------------------------------------------------------------- reproduce
 
 
-@click.command(
-    short_help="Reproduce the published experiments in one report.",
-    help="""Reproduce the experiments of the source paper in one HTML report that compares the results with the paper's.
+@click.command(short_help="Reproduce the published experiments in one report.")
+@click.option("--only", metavar="NAME", multiple=True, help="Only this experiment; may be repeated.")
+@click.option("--list", "list_only", is_flag=True, help="List the experiments.")
+@click.option("--out", type=FILE, default=Path("reproduction"), show_default=True, help="Folder for the report.")
+@click.option("--quick", is_flag=True, help="A small part of everything, in seconds.")
+@click.option("--full", is_flag=True, help="Include what takes many minutes: published solvers, long baselines.")
+@click.option("--again", is_flag=True, help="Repeat finished experiments.")
+def reproduce(only: tuple[str, ...], list_only: bool, out: Path, quick: bool, full: bool, again: bool) -> int:
+    """Reproduce the experiments of the source paper in one HTML report that compares the results with the paper's.
 
     Writes report.html (with figures), numbers.json, and the figures (PNG, SVG) and curves (NetCDF) of each experiment
     to --out. If it is interrupted and started again, finished experiments are not repeated. The exit code is 1 if a
@@ -232,16 +232,7 @@ def _show(benchmark: Any, as_json: bool, folder: Path | None) -> None:
       planarfriction reproduce --list
       planarfriction reproduce --only drift --only in-hand --out results/
       planarfriction reproduce --quick
-    """,
-)
-@click.option("--only", metavar="NAME", multiple=True, help="Only this experiment; may be repeated.")
-@click.option("--list", "list_only", is_flag=True, help="List the experiments.")
-@click.option("--out", type=FILE, default=Path("reproduction"), show_default=True, help="Folder for the report.")
-@click.option("--quick", is_flag=True, help="A small part of everything, in seconds.")
-@click.option("--full", is_flag=True, help="Include what takes many minutes: published solvers, long baselines.")
-@click.option("--again", is_flag=True, help="Repeat finished experiments.")
-def reproduce(only: tuple[str, ...], list_only: bool, out: Path, quick: bool, full: bool, again: bool) -> int:
-    """Reproduce the paper (the help above is what users see)."""
+    """
     use_one_thread()
     from planarfriction.cli.console import note, print_table
     from planarfriction.errors import InvalidValueError

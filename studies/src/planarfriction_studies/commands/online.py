@@ -47,22 +47,19 @@ def online() -> None:
     """Try the observer and the controllers of a gripper."""
 
 
-@online.command(
-    short_help="Hold, slide, turn and hinge random parts.",
-    help="""Hold, slide, turn and hinge random parts with unknown friction, and print what came of it.
+@online.command(short_help="Hold, slide, turn and hinge random parts.")
+@click.option("--parts", type=int, default=1000, show_default=True, help="Number of random parts.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Random seed of parts and noise.")
+@click.option("--json", "file", type=FILE, help="File for the numbers of the table (JSON).")
+def trials(parts: int, seed: int, file: Path | None) -> None:
+    """Hold, slide, turn and hinge random parts with unknown friction, and print what came of it.
 
     The published rules do the same beside it, with the true friction. 100 parts take about three minutes.
 
     \b
     Example:
       planarfriction online trials --parts 100 --json trials.json
-    """,
-)
-@click.option("--parts", type=int, default=1000, show_default=True, help="Number of random parts.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Random seed of parts and noise.")
-@click.option("--json", "file", type=FILE, help="File for the numbers of the table (JSON).")
-def trials(parts: int, seed: int, file: Path | None) -> None:
-    """Run the trials (the help above is what users see)."""
+    """
     from planarfriction import validation
     from planarfriction.cli.console import note, print_table, work_progress
     from planarfriction.writing import check_writable, write_text
@@ -84,21 +81,18 @@ def rows(found: dict[str, float]) -> list[list[str]]:
     return [[words, f"{found[name]:g}"] for name, words in WORDS.items()]
 
 
-@online.command(
-    short_help="Film a part that is held while its friction is found.",
-    help="""Hold a part of unknown friction, through a tap and a tilt, and film it.
+@online.command(short_help="Film a part that is held while its friction is found.")
+@click.option("--out", type=FILE, default="hold.gif", show_default=True, help="Film to write (.gif, .mp4, .html).")
+@click.option("--seed", type=int, default=0, show_default=True, help="Random seed of the noise.")
+def demo(out: Path, seed: int) -> None:
+    """Hold a part of unknown friction, through a tap and a tilt, and film it.
 
     The film shows the part in the hand, the grip force, and the estimate of mu_c with its 95 % interval.
 
     \b
     Example:
       planarfriction online demo --out hold.gif
-    """,
-)
-@click.option("--out", type=FILE, default="hold.gif", show_default=True, help="Film to write (.gif, .mp4, .html).")
-@click.option("--seed", type=int, default=0, show_default=True, help="Random seed of the noise.")
-def demo(out: Path, seed: int) -> None:
-    """Write the film (the help above is what users see)."""
+    """
     from planarfriction import validation
     from planarfriction.cli.console import note, work_progress
     from planarfriction.plots.film_files import check_kind

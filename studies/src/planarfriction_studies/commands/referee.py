@@ -25,20 +25,6 @@ JSON = click.option("--json", "file", type=FILE, help="File for a JSON list of r
 @click.group(
     invoke_without_command=True,
     short_help="Judge the friction of simulators by exact cases.",
-    help="""Judge the contact friction of simulators by cases with exact truths: closed forms, or exact motions.
-
-    Every engine that is installed runs every case at its defaults and at good settings, this library's adapters among
-    them. Marks: ok within what is allowed, off up to ten times that, fails beyond it; - without words for the case.
-    With --json, each result is written when it is there, and the same command goes on from the file.
-
-    \b
-    Examples:
-      planarfriction referee
-      planarfriction referee --quick
-      planarfriction referee --engine MuJoCo --case stop --step 0.005
-      planarfriction referee --json referee.json --out referee/
-      planarfriction referee export cases/
-    """,
 )
 @ENGINE
 @CASE
@@ -58,7 +44,20 @@ def referee(
     file: Path | None,
     folder: Path | None,
 ) -> int:
-    """Judge (the help above is what users see). An interrupt keeps what is done."""
+    """Judge the contact friction of simulators by cases with exact truths: closed forms, or exact motions.
+
+    Every engine that is installed runs every case at its defaults and at good settings, this library's adapters among
+    them. Marks: ok within what is allowed, off up to ten times that, fails beyond it; - without words for the case.
+    With --json, each result is written when it is there, and the same command goes on from the file.
+
+    \b
+    Examples:
+      planarfriction referee
+      planarfriction referee --quick
+      planarfriction referee --engine MuJoCo --case stop --step 0.005
+      planarfriction referee --json referee.json --out referee/
+      planarfriction referee export cases/
+    """
     if context.invoked_subcommand is not None:
         return 0
     from planarfriction import validation
@@ -109,9 +108,12 @@ def _judged(
     return verdicts, code
 
 
-@click.command(
-    short_help="Compare patches with simulators' own friction.",
-    help="""Compare patch friction in simulators with their own friction, as it comes and at its best settings.
+@click.command(short_help="Compare patches with simulators' own friction.")
+@ENGINE
+@CASE
+@JSON
+def simulators(engines: tuple[str, ...], cases: tuple[str, ...], file: Path | None) -> int:
+    """Compare patch friction in simulators with their own friction, as it comes and at its best settings.
 
     This is a view of `planarfriction referee`, in units instead of marks. What --json has is not computed again.
 
@@ -119,13 +121,7 @@ def _judged(
     Examples:
       planarfriction simulators
       planarfriction simulators --engine MuJoCo --json referee.json
-    """,
-)
-@ENGINE
-@CASE
-@JSON
-def simulators(engines: tuple[str, ...], cases: tuple[str, ...], file: Path | None) -> int:
-    """Compare (the help above is what users see)."""
+    """
     from planarfriction.cli.console import note, print_table
     from planarfriction_studies.referee import report
 
@@ -138,19 +134,16 @@ def simulators(engines: tuple[str, ...], cases: tuple[str, ...], file: Path | No
     return code
 
 
-@referee.command(
-    short_help="Write all cases for other engines.",
-    help="""Write all cases to FOLDER, to be run without this library: for each its TOML, MJCF and SDF of its bodies and
+@referee.command(short_help="Write all cases for other engines.")
+@click.argument("folder", type=FILE)
+def export(folder: Path) -> int:
+    """Write all cases to FOLDER, to be run without this library: for each its TOML, MJCF and SDF of its bodies and
     friction, the forces on its bodies over time, and the truths with their errors, as CSV.
 
     \b
     Examples:
       planarfriction referee export cases/
-    """,
-)
-@click.argument("folder", type=FILE)
-def export(folder: Path) -> int:
-    """Export (the help above is what users see)."""
+    """
     from planarfriction.cli.console import note
     from planarfriction.writing import make_folder
     from planarfriction_studies.referee.case import all_cases

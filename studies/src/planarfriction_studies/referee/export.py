@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable, Mapping, Sequence
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ def mjcf(case: Case, dt: float, options: str = "", contact: str = "", integrator
     """
     bodies = "\n".join(_body(case, body) for body in case.bodies)
     pairs = "\n".join(f"  <pair {_pair(each)} {contact}/>" for each in case.contacts)
-    return f"""<mujoco model="{case.name}">
+    return f"""<mujoco model="{escape(case.name)}">
 <option timestep="{dt}" gravity="{_numbers(case.gravity)}" integrator="{integrator}" {options}/>
 <default><geom contype="0" conaffinity="0"/></default>
 <worldbody>
@@ -52,7 +53,7 @@ def _body(case: Case, body: Body) -> str:
         place = f'pos="{_numbers(body.centre_of_mass)}" mass="{body.mass:.12g}"'
         parts = [joint, f'<inertial {place} diaginertia="{_numbers(body.moments)}"/>', *parts]
     inner = "\n".join(f"    {part}" for part in parts)
-    return f'  <body name="{body.name}" pos="{_numbers(body.position)}">\n{inner}\n  </body>'
+    return f'  <body name="{escape(body.name)}" pos="{_numbers(body.position)}">\n{inner}\n  </body>'
 
 
 def _geom(shape: Shape) -> str:
@@ -65,14 +66,14 @@ def _geom(shape: Shape) -> str:
         "capsule": lambda: (shape.size[0], 0.5 * shape.size[1]),
     }
     place = f'pos="{_numbers(shape.position)}" zaxis="{_numbers(shape.axis)}"'
-    return f'<geom name="{shape.name}" type="{shape.kind}" size="{_numbers(sizes[shape.kind]())}" {place}/>'
+    return f'<geom name="{escape(shape.name)}" type="{shape.kind}" size="{_numbers(sizes[shape.kind]())}" {place}/>'
 
 
 def _pair(contact: Contact) -> str:
     """Return names and friction of a pair: MuJoCo's first tangent is y and its second one x where normals are z."""
     along, across = contact.mu
     first, second = contact.pair
-    return f'geom1="{first}" geom2="{second}" friction="{across:.12g} {along:.12g} 0.005 0.0001 0.0001"'
+    return f'geom1="{escape(first)}" geom2="{escape(second)}" friction="{across:.12g} {along:.12g} 0.005 0.0001 0.0001"'
 
 
 GRIPS = 1e3
@@ -91,7 +92,7 @@ def sdf(case: Case, dt: float) -> str | None:
     grips = {name: (GRIPS, GRIPS) if name not in moving else next(iter(mus[name]), (0.0, 0.0)) for name in case.shapes}
     models = "\n".join(_model(body, grips) for body in case.bodies)
     return f"""<?xml version="1.0"?>
-<sdf version="1.9"><world name="{case.name}">
+<sdf version="1.9"><world name="{escape(case.name)}">
 <gravity>{_numbers(case.gravity)}</gravity>
 <physics name="steps" type="ode"><max_step_size>{dt}</max_step_size></physics>
 {models}
@@ -105,7 +106,7 @@ def _model(body: Body, grips: Mapping[str, Sequence[float]]) -> str:
     inertial = "" if fixed else _inertial(body)
     joint = """  <joint name="slide" type="prismatic"><parent>world</parent><child>link</child>
   <axis><xyz>0 0 1</xyz></axis></joint>\n"""
-    return f"""<model name="{body.name}"><static>{str(fixed).lower()}</static>
+    return f"""<model name="{escape(body.name)}"><static>{str(fixed).lower()}</static>
   <pose>{_numbers(body.position)} 0 0 0</pose>
   <link name="link">
 {inertial}{shapes}
@@ -128,7 +129,7 @@ def _collision(shape: Shape, along: float, across: float) -> str:
         "sphere": f"<radius>{_numbers(shape.size)}</radius>",
     }.get(shape.kind) or f"<radius>{shape.size[0]:.12g}</radius><length>{shape.size[1]:.12g}</length>"
     turn = "0 1.5707963267948966 0" if shape.axis[0] else "0 0 0"
-    return f"""  <collision name="{shape.name}"><pose>{_numbers(shape.position)} {turn}</pose>
+    return f"""  <collision name="{escape(shape.name)}"><pose>{_numbers(shape.position)} {turn}</pose>
   <geometry><{shape.kind}>{inner}</{shape.kind}></geometry><surface><friction><ode><mu>{along:.12g}</mu>
   <mu2>{across:.12g}</mu2><fdir1>1 0 0</fdir1></ode></friction></surface></collision>"""
 

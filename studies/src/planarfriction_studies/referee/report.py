@@ -167,8 +167,9 @@ moves worst.</p>
 
 def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     head = "".join(f"<th>{html.escape(each)}</th>" for each in headings)
-    cells = lambda row: "".join(f'<td class="{each.split(" ")[0]}">{html.escape(each)}</td>' for each in row)  # noqa: E731
-    return f"<table><tr>{head}</tr>{''.join(f'<tr>{cells(row)}</tr>' for row in rows)}</table>"
+    lines = ([html.escape(each) for each in row] for row in rows)
+    cells = ("".join(f'<td class="{each.split(" ")[0]}">{each}</td>' for each in line) for line in lines)
+    return f"<table><tr>{head}</tr>{''.join(f'<tr>{line}</tr>' for line in cells)}</table>"
 
 
 def _section(case: Case, verdicts: Sequence[Verdict]) -> str:
@@ -177,10 +178,11 @@ def _section(case: Case, verdicts: Sequence[Verdict]) -> str:
         for each in case.truths
     ]
     results = [[each.engine, each.mark, *_numbers(each), each.reason] for each in verdicts if each.case == case.name]
-    return f"""<h2 id="{case.name}">{html.escape(case.title)}</h2><p>{html.escape(case.about)}</p>
-<p>Allowed: {html.escape(case.why)}</p><p><img src="{case.name}-scene.svg" alt="the bodies of the case">
-<img src="{case.name}.svg" alt="errors of all engines"></p>
-<p><img src="{case.name}-film.svg" alt="film: the worst body of each engine"></p>
+    name = html.escape(case.name)
+    return f"""<h2 id="{name}">{html.escape(case.title)}</h2><p>{html.escape(case.about)}</p>
+<p>Allowed: {html.escape(case.why)}</p><p><img src="{name}-scene.svg" alt="the bodies of the case">
+<img src="{name}.svg" alt="errors of all engines"></p>
+<p><img src="{name}-film.svg" alt="film: the worst body of each engine"></p>
 {_table(["engine", "mark", "error", "allowed", "worst quantity", "time step", "cost [µs]", "start [s]", ""], results)}
 <details><summary>Truths</summary>
 {_table(["body", "quantity", "value", "its error", "allowed", "source"], truths)}</details>"""

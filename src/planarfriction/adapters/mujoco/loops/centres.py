@@ -44,7 +44,8 @@ def _centre(d, own, s, nefc, p):
 @kernel
 def _share(own, d, s, p, radius, dt):
     """Return the share of the displacement to the centre that patch p, of a lever arm `radius`, takes in this step."""
-    velocity, rows, vx, vy = doubles(integers(d + own.data.qvel)[0]), at(s.jacobian, 3 * own.nv * p), 0.0, 0.0
+    velocity, rows = doubles(integers(d + own.data.qvel)[0]), at(s.jacobian, 3 * own.nv * p)
+    vx, vy = s.drift[3 * p], s.drift[3 * p + 1]
     for i in range(own.nv):
         vx, vy = vx + rows[i] * velocity[i], vy + rows[own.nv + i] * velocity[i]
     slid = math.sqrt(vx * vx + vy * vy) / radius if radius > 0.0 else 0.0
@@ -52,18 +53,20 @@ def _share(own, d, s, p, radius, dt):
 
 
 @kernel
-def _move(own, d, s, nefc, p, guess, dx, dy):
+def _move(own, s, nefc, p, guess, dx, dy):
     """Move the origin of patch p: its Jacobian, its contacts, and the guess of its wrench, whose forces stay."""
     nv, rows, frame = own.nv, at(s.jacobian, 3 * own.nv * p), at(s.frames, 6 * p)
     for i in range(nv):
         rows[i] -= dy * rows[2 * nv + i]
         rows[nv + i] += dx * rows[2 * nv + i]
+    s.drift[3 * p] -= dy * s.drift[3 * p + 2]
+    s.drift[3 * p + 1] += dx * s.drift[3 * p + 2]
     guess[2] -= dx * guess[1] - dy * guess[0]
     owners, places = owners_of(s, nefc), places_of(s, nefc)
     for r in range(nefc):
         if owners[r] == p:
             places[r], places[nefc + r] = places[r] - dx, places[nefc + r] - dy
-    x, y, _ = axes(own, d, frame, integers(own.sites)[p])
+    x, y, _ = axes(s, p)
     frame[3], frame[4], frame[5] = plus(plus(three(at(frame, 3)), dx, x), dy, y)
 
 
@@ -72,7 +75,7 @@ def _fault(own, m, d, s, p, x, y):
     """Return the fault of patch p, with the centre of its contact forces at x, y in its frame."""
     scale, (dx, dy) = scale_of(own, m, p), displacement_of(own, m, p)
     frame, site, extent = at(s.frames, 6 * p), integers(own.sites)[p], at(doubles(own.extents), 6 * p)
-    normal, faces = axes(own, d, frame, site)[2], integers(own.faces)[p] != 0
+    normal, faces = axes(s, p)[2], integers(own.faces)[p] != 0
     if integers(own.at_contact)[p] == 0:
         size = scale * extent[4]
         slack = MARGIN * size + s.depths[2 * p + 1]
@@ -96,11 +99,11 @@ def _support(own, m, d, s, p, support):
 
     Lengths are those of the patch in the size of its friction model.
     """
-    frame, other, shrunk = at(s.frames, 6 * p), integers(own.other)[p], 1.0 / scale_of(own, m, p)
+    other, shrunk = integers(own.other)[p], 1.0 / scale_of(own, m, p)
     support[4] = 0.0
     if integers(own.boxes)[p] == 0:
         return
-    x, y, normal = axes(own, d, frame, integers(own.sites)[p])
+    x, y, normal = axes(s, p)
     turned = at(doubles(integers(d + own.data.geom_xmat)[0]), 9 * other)
     half = at(doubles(integers(m + own.model.geom_size)[0]), 3 * other)
     away = plus(
@@ -116,13 +119,14 @@ def _support(own, m, d, s, p, support):
 
 
 @kernel
-def _resize(own, m, d, s, nefc, p, guess):
+def _resize(own, m, s, nefc, p, guess):
     """Displace patch p from its origin, and go over to twists, torques and places in the size of its friction model."""
     scale, (dx, dy) = scale_of(own, m, p), displacement_of(own, m, p)
-    _move(own, d, s, nefc, p, guess, dx, dy)
+    _move(own, s, nefc, p, guess, dx, dy)
     rows, owners, places = at(s.jacobian, 3 * own.nv * p), owners_of(s, nefc), places_of(s, nefc)
     for i in range(own.nv):
         rows[2 * own.nv + i] *= scale
+    s.drift[3 * p + 2] *= scale
     guess[2] /= scale
     for r in range(nefc):
         if owners[r] == p:
@@ -150,11 +154,11 @@ def follow_centres(own, m, d, s, nefc, radius, problem, kept):
         if integers(own.at_contact)[p] != 0:
             lever = scale_of(own, m, p) * radius[p]
             share = 1.0 if square(three(held)) == 0.0 else _share(own, d, s, p, lever, dt)
-            _move(own, d, s, nefc, p, guess, share * x, share * y)
+            _move(own, s, nefc, p, guess, share * x, share * y)
             turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
             place = three(at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site))
             away = plus(three(at(s.frames, 6 * p + 3)), -1.0, place)
             for i in range(3):
                 centre[i] = dot((turned[i], turned[3 + i], turned[6 + i]), away)
-        _resize(own, m, d, s, nefc, p, guess)
+        _resize(own, m, s, nefc, p, guess)
         _support(own, m, d, s, p, at(problem.support, 7 * p))

@@ -8,6 +8,7 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call_c
 from planarfriction.compiler.memory import at, doubles, integers, integers32
+from planarfriction.kernels.coupling_rows import ALONG, FLAT
 from planarfriction.kernels.vectors import dot, norm, plus, square, three, times
 
 
@@ -59,20 +60,59 @@ def _collect(own, d, s, nefc):
                 s.depths[2 * p + 1] = xp.maximum(s.depths[2 * p + 1], -doubles(contact + own.contact.dist)[0])
 
 
-ALONG = 1e-12
-"""Square of the sine of the angle between a site's x axis and the normal below which its y axis takes its place."""
+@kernel
+def cross(a, b):
+    """Return `a x b`."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @kernel
-def axes(own, d, frame, site):
-    """Return the axes of a patch: x along that of its site, across the normal."""
-    n = times(1.0 / norm(three(frame)), three(frame))
-    turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
-    x, y = (turned[0], turned[3], turned[6]), (turned[1], turned[4], turned[7])
-    x = plus(x, -dot(x, n), n)
-    x = plus(y, -dot(y, n), n) if square(x) < ALONG else x
+def axes(s, p):
+    """Return the axes of patch p: x, y, normal."""
+    frame, x = three(at(s.frames, 6 * p)), three(at(s.axes, 3 * p))
+    n = times(1.0 / norm(frame), frame)
+    return x, cross(n, x), n
+
+
+@kernel
+def _put_axis(own, d, s, p, before, axis):
+    """Write the x axis of patch p: that of its site, across the normal, on the side of the last one; see `FLAT`."""
+    turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * integers(own.sites)[p])
+    frame, last = three(at(s.frames, 6 * p)), three(before)
+    n, one, two = times(1.0 / norm(frame), frame), three(turned), three(at(turned, 3))
+    end = three(at(turned, 6))
+    x, y = (one[0], two[0], end[0]), (one[1], two[1], end[1])
+    last = dot(one, last), dot(two, last), dot(end, last)
+    x, last = plus(x, -dot(x, n), n), plus(last, -dot(last, n), n)
+    flat, carried = square(x), square(last) >= ALONG
+    if carried:
+        last = times(1.0 / norm(last), last)
+        x = last if flat < FLAT else (times(-1.0, x) if dot(x, last) < 0.0 else x)
+    elif flat < ALONG:
+        x = plus(y, -dot(y, n), n)
     x = times(1.0 / norm(x), x)
-    return x, (n[1] * x[2] - n[2] * x[1], n[2] * x[0] - n[0] * x[2], n[0] * x[1] - n[1] * x[0]), n
+    s.carried[2 * p], s.carried[2 * p + 1] = 1.0, 0.0
+    if carried:
+        s.carried[2 * p], s.carried[2 * p + 1] = dot(last, x), dot(n, cross(last, x))
+    for i in range(3):
+        s.axes[3 * p + i] = x[i]
+        axis[i] = x[0] * turned[i] + x[1] * turned[3 + i] + x[2] * turned[6 + i]
+
+
+@kernel
+def _add_drift(own, m, d, s, p, geom, sign):
+    """Add to the drift of patch p the twist of the surface of a geom relative to it."""
+    surface = at(doubles(integers(m + own.model.geom_surfacevel)[0]), 6 * geom)
+    turned = at(doubles(integers(d + own.data.geom_xmat)[0]), 9 * geom)
+    away = plus(three(at(s.frames, 6 * p + 3)), -1.0, three(at(doubles(integers(d + own.data.geom_xpos)[0]), 3 * geom)))
+    rows = three(turned), three(at(turned, 3)), three(at(turned, 6))
+    move, turn = three(surface), three(at(surface, 3))
+    turn = dot(rows[0], turn), dot(rows[1], turn), dot(rows[2], turn)
+    move = plus((dot(rows[0], move), dot(rows[1], move), dot(rows[2], move)), 1.0, cross(turn, away))
+    x, y, normal = axes(s, p)
+    s.drift[3 * p] += sign * dot(x, move)
+    s.drift[3 * p + 1] += sign * dot(y, move)
+    s.drift[3 * p + 2] += sign * dot(normal, turn)
 
 
 @kernel
@@ -113,13 +153,17 @@ def _put_origin(own, d, s, p, normal, held):
 
 
 @kernel
-def _rows(own, m, d, s, nefc, p, held):
+def _rows(own, m, d, s, nefc, p, kept):
     """Write the three rows of patch p into the Jacobian, the places of its contacts, and how fast its bodies roll."""
-    nv, frame, site = own.nv, at(s.frames, 6 * p), integers(own.sites)[p]
-    x, y, normal = axes(own, d, frame, site)
+    nv, frame = own.nv, at(s.frames, 6 * p)
+    _put_axis(own, d, s, p, at(kept.before, 3 * p), at(kept.axis, 3 * p))
+    x, y, normal = axes(s, p)
     centre, rows = at(frame, 3), at(s.jacobian, 3 * nv * p)
-    _put_origin(own, d, s, p, normal, at(held, 3 * p))
+    _put_origin(own, d, s, p, normal, at(kept.held, 3 * p))
     _put_places(own, d, s, nefc, p, centre, x, y)
+    if own.model.geom_surfacevel >= 0:
+        _add_drift(own, m, d, s, p, integers(own.own)[p], 1.0)
+        _add_drift(own, m, d, s, p, integers(own.other)[p], -1.0)
     for i in range(3 * nv):
         rows[i] = 0.0
     moves, turns, velocity, roll, rock = s.moves, s.turns, doubles(integers(d + own.data.qvel)[0]), 0.0, 0.0
@@ -140,16 +184,19 @@ def _rows(own, m, d, s, nefc, p, held):
 
 
 @kernel
-def place(own, m, d, s, nefc, held):
+def place(own, m, d, s, nefc, kept):
     """Write the Jacobian of the twists, zero without contact; return the number of patches in contact.
 
-    `held` [3k] are their last origins, in the frames of their sites.
+    What patches remember has their last origins and x axes, in the frames of their sites.
     """
     _collect(own, d, s, nefc)
     touching = 0
     for p in range(own.count):
+        s.carried[2 * p], s.carried[2 * p + 1] = 1.0, 0.0
+        for i in range(3):
+            s.drift[3 * p + i], kept.axis[3 * p + i] = 0.0, kept.before[3 * p + i]
         if s.counts[p] > 0:
-            _rows(own, m, d, s, nefc, p, held)
+            _rows(own, m, d, s, nefc, p, kept)
             touching += 1
         else:
             for i in range(3 * own.nv):

@@ -18,9 +18,9 @@ def _integers(name: str, fields: str) -> Any:
 ModelOffsets = _integers(
     "ModelOffsets",
     "nv nuserdata timestep integrator disableflags enableflags noslip_iterations dof_damping pair_dim pair_solref "
-    "geom_size numeric_data",
+    "geom_size geom_surfacevel numeric_data",
 )
-"""Offsets of `mjModel`."""
+"""Offsets of `mjModel`; -1 of `geom_surfacevel` in versions without it."""
 
 DataOffsets = _integers(
     "DataOffsets",
@@ -70,6 +70,10 @@ class Remembered(NamedTuple):
     """Origins of patches at the beginning of the step, in the frames of their sites, [3k]; 0 at a site, or for none."""
     centre: Doubles
     """Origins of patches in the step, [3k]."""
+    before: Doubles
+    """x axes of patches at the beginning of the step, in the frames of their sites, [3k]; 0 before any."""
+    axis: Doubles
+    """x axes of patches in the step, [3k]."""
     warmstart: Doubles
     """`qacc_warmstart` at the beginning of the step, [nv]."""
     passive: Doubles
@@ -96,7 +100,7 @@ Memory = offsets_of(Remembered)
 def memory_layout(states: int, k: int, nv: int) -> Layout:
     """Return the layout of `Remembered` for k patches with so many states in all."""
     shapes = dict.fromkeys(Remembered._fields, 1) | dict.fromkeys(("state", "new"), states) | {"load": k}
-    shapes |= dict.fromkeys(("guess", "wrench", "twist", "held", "centre"), 3 * k)
+    shapes |= dict.fromkeys(("guess", "wrench", "twist", "held", "centre", "before", "axis"), 3 * k)
     return Layout(Remembered, **shapes | dict.fromkeys(("warmstart", "passive", "total"), nv))
 
 
@@ -135,6 +139,12 @@ class Scratch(NamedTuple):
     """Contacts of each patch, [k]."""
     frames: Doubles
     """Sums over these of normals into the own body; origins, [k, 6]."""
+    axes: Doubles
+    """x axes of the patches in the world, [k, 3]."""
+    carried: Doubles
+    """Cosine and sine of the angles from the x axes of the last step, carried along, to these, [k, 2]."""
+    drift: Doubles
+    """Twists of the surfaces relative to the bodies (`surfacevel`), of the own body less those of the other, [3k]."""
     tilts: Doubles
     """Speeds at which the bodies roll or rock on each other [rad/s], [k]."""
     depths: Doubles
@@ -164,7 +174,7 @@ def scratch_layout(words: int, records: int, k: int, nv: int) -> Layout:
         "frames": 6 * k,
         "misses": 0,
     }
-    shapes |= {"tilts": k, "depths": 2 * k}
+    shapes |= {"tilts": k, "depths": 2 * k, "carried": 2 * k, "axes": 3 * k, "drift": 3 * k}
     shapes |= dict.fromkeys(("inertia", "stiff"), nv * nv) | dict.fromkeys(("answers", "held"), nv * (n + 1))
     return Layout(
         Scratch, **shapes | dict.fromkeys(("moves", "turns"), 3 * nv) | dict.fromkeys(("start", "goal", "move"), n)

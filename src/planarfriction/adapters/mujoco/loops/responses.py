@@ -221,7 +221,7 @@ def respond(own, m, d, sparse, nefc):
         backward(stiff, nv, held, columns)
     response, twist = own.problem.response, own.problem.free_twist
     for r in range(n):
-        twist[r] = 0.0
+        twist[r] = s.drift[r]
         for c in range(n):
             response[n * r + c] = 0.0
         for i in range(nv):

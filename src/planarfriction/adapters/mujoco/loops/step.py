@@ -71,11 +71,13 @@ def _recall(host, kept, d):
         _copy(kept.new, kept.state, host.states)
         _copy(kept.wrench, kept.guess, 3 * host.count)
         _copy(kept.centre, kept.held, 3 * host.count)
+        _copy(kept.axis, kept.before, 3 * host.count)
     else:
         # other times than those of the last step, or a roll-out, which clears where the solver starts but not this
         _clear(kept.state, host.states)
         _clear(kept.guess, 3 * host.count)
         _clear(kept.held, 3 * host.count)
+        _clear(kept.before, 3 * host.count)
     _copy(warmstart, kept.warmstart, host.nv)
     kept.time[0] = now
     return again
@@ -224,11 +226,21 @@ def _remember(own, m, iterations, passes):
 
 
 @kernel
+def _carry(s, p, vectors, count):
+    """Write vectors of patch p, all x before all y, in its axes of this step instead of the last ones."""
+    c, sine = s.carried[2 * p], s.carried[2 * p + 1]
+    for i in range(count):
+        x, y = vectors[i], vectors[count + i]
+        vectors[i], vectors[count + i] = c * x + sine * y, c * y - sine * x
+
+
+@kernel
 def _put_guess(host, m, p, s, kept, guess):
     """Write the last wrench of patch p about its origin before it is displaced; zero without contact."""
     dx, dy = displacement_of(host, m, p)
     for i in range(3):
         guess[i] = kept[i] if s.counts[p] > 0 else 0.0
+    _carry(s, p, guess, 1)
     guess[2] += dx * guess[1] - dy * guess[0]
 
 
@@ -246,7 +258,7 @@ def plan(place_of_host, m, d):
     if not fits(host, m):
         _forget(host, kept, d)
         kept.iterations[0], kept.converged[0] = UNFIT, 0.0
-    elif place(host, m, d, s, nefc, kept.held) == 0:
+    elif place(host, m, d, s, nefc, kept) == 0:
         _forget(host, kept, d)
     else:
         problem = arrays_at(patches.row, s.problem)
@@ -256,6 +268,8 @@ def plan(place_of_host, m, d):
         _copy(kept.state, problem.state, host.states)
         write_laws(host, m, patches, problem, at(taken, host.scratch.records))
         for p in range(host.count):
+            first = patches.firsts[p]
+            _carry(s, p, at(problem.state, first), (patches.firsts[p + 1] - first) // patches.bristle[p])
             _put_guess(host, m, p, s, at(kept.guess, 3 * p), at(problem.guess, 3 * p))
         _copy(problem.guess, problem.wrench, 3 * host.count)
         _apply(own, d, problem.guess)

@@ -11,8 +11,8 @@ import mujoco
 import warp as wp
 
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
-from planarfriction.adapters.mujoco.loops.geometry import ALONG
 from planarfriction.adapters.mujoco.loops.records import Memory
+from planarfriction.kernels.coupling_rows import ALONG, FLAT
 
 FRICTIONLESS = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS))
 
@@ -29,6 +29,12 @@ class Patches:
     owner: wp.array(dtype=int)
     support: wp.array(dtype=int)
     at_contact: wp.array(dtype=int)
+    bristles: wp.array(dtype=int)
+    """Number of bristles of a patch: all x components come before all y."""
+    first: wp.array(dtype=int)
+    """First state."""
+    surface: wp.array2d(dtype=wp.spatial_vector)
+    """Velocities of the surfaces of both geoms in their frames (`surfacevel`) [k, 2]."""
     radius: wp.array(dtype=float)
 
 
@@ -75,6 +81,12 @@ class Frames:
     """Origins at the beginning of the step in the frames of the sites; 0 at a site, or for none [E, k]."""
     centre: wp.array2d(dtype=wp.vec3)
     """Origins in the step [E, k]."""
+    before: wp.array2d(dtype=wp.vec3)
+    """x axes at the beginning of the step in the frames of the sites; 0 before the first contact [E, k]."""
+    axis: wp.array2d(dtype=wp.vec3)
+    """x axes in the step [E, k]."""
+    drift: wp.array2d(dtype=wp.vec3)
+    """Twists of the surfaces relative to the bodies, of the own one less those of the other [E, k]."""
 
 
 AFTER = "after"
@@ -100,6 +112,7 @@ def recall(
     state: wp.array2d(dtype=float),
     guess: wp.array3d(dtype=float),
     held: wp.array2d(dtype=wp.vec3),
+    before: wp.array2d(dtype=wp.vec3),
 ):
     """Bring states, guesses and origins to the times of the worlds: those of the last step's end, or of its start."""
     w = wp.tid()
@@ -110,12 +123,14 @@ def recall(
         for i in range(3 * patches.count):
             memory[w, at.guess + i] = memory[w, at.wrench + i]
             memory[w, at.held + i] = memory[w, at.centre + i]
+            memory[w, at.before + i] = memory[w, at.axis + i]
     elif time != memory[w, at.time]:
         for i in range(patches.states):
             memory[w, at.state + i] = 0.0
         for i in range(3 * patches.count):
             memory[w, at.guess + i] = 0.0
             memory[w, at.held + i] = 0.0
+            memory[w, at.before + i] = 0.0
     memory[w, at.time] = time
     memory[w, at.next] = time + timestep[w % timestep.shape[0]]
     for i in range(patches.states):
@@ -123,6 +138,8 @@ def recall(
     for p in range(patches.count):
         first = at.held + 3 * p
         held[w, p] = wp.vec3(memory[w, first], memory[w, first + 1], memory[w, first + 2])
+        first = at.before + 3 * p
+        before[w, p] = wp.vec3(memory[w, first], memory[w, first + 1], memory[w, first + 2])
         for i in range(3):
             guess[w, p, i] = memory[w, at.guess + 3 * p + i]
 
@@ -139,16 +156,40 @@ def jacobian_of(tree: Tree, w: int, point: wp.vec3, body: int, dof: int) -> wp.s
 
 
 @wp.func
-def axes_of(turned: wp.mat33, normal: wp.vec3) -> wp.mat33:
-    """Return the axes of a patch as rows: x along that of its site, across the normal."""
+def axes_of(turned: wp.mat33, normal: wp.vec3, last: wp.vec3) -> wp.mat33:
+    """Return the axes of a patch as rows: x along that of its site, across the normal, on the side of the last one."""
     one = wp.vec3(turned[0, 0], turned[1, 0], turned[2, 0])
     two = wp.vec3(turned[0, 1], turned[1, 1], turned[2, 1])
     x = one - wp.dot(one, normal) * normal
-    if wp.dot(x, x) < wp.static(ALONG):
+    flat = wp.dot(x, x)
+    if wp.dot(last, last) > 0.0:
+        if flat < wp.static(FLAT):
+            x = last
+        elif wp.dot(x, last) < 0.0:
+            x = -x
+    elif flat < wp.static(ALONG):
         x = two - wp.dot(two, normal) * normal
     x = wp.normalize(x)
     y = wp.cross(normal, x)
     return wp.matrix_from_rows(x, y, normal)
+
+
+@wp.func
+def carried(turned: wp.mat33, normal: wp.vec3, before: wp.vec3) -> wp.vec3:
+    """Return the x axis of the last step, which went along with the body; zero for none."""
+    last = turned * before
+    last -= wp.dot(last, normal) * normal
+    if wp.dot(last, last) < wp.static(ALONG):
+        return wp.vec3()
+    return wp.normalize(last)
+
+
+@wp.func
+def drift_of(frame: wp.mat33, away: wp.vec3, surface: wp.spatial_vector, axes: wp.mat33) -> wp.vec3:
+    """Return the twist of the surface of a geom relative to it, at a place away from its origin, in some axes."""
+    turn = frame * wp.spatial_bottom(surface)
+    move = axes * (frame * wp.spatial_top(surface) + wp.cross(turn, away))
+    return wp.vec3(move[0], move[1], wp.dot(wp.vec3(axes[2, 0], axes[2, 1], axes[2, 2]), turn))
 
 
 @wp.func
@@ -175,6 +216,62 @@ def touch(patches: Patches, contacts: Contacts, frames: Frames, w: int, p: int, 
     return normal, middle, count
 
 
+@wp.func
+def carry(
+    patches: Patches,
+    state: wp.array2d(dtype=float),
+    guess: wp.array3d(dtype=float),
+    w: int,
+    p: int,
+    last: wp.vec3,
+    x: wp.vec3,
+    normal: wp.vec3,
+):
+    """Write bristles and guess of a patch in its axes of this step instead of the last ones, if there are any."""
+    if wp.dot(last, last) > 0.0:
+        cosine = wp.dot(last, x)
+        sine = wp.dot(normal, wp.cross(last, x))
+        fx = guess[w, p, 0]
+        fy = guess[w, p, 1]
+        guess[w, p, 0] = cosine * fx + sine * fy
+        guess[w, p, 1] = cosine * fy - sine * fx
+        for i in range(patches.bristles[p]):
+            one = patches.first[p] + i
+            two = one + patches.bristles[p]
+            zx = state[w, one]
+            zy = state[w, two]
+            state[w, one] = cosine * zx + sine * zy
+            state[w, two] = cosine * zy - sine * zx
+
+
+@wp.func
+def write_rows(
+    patches: Patches,
+    tree: Tree,
+    frames: Frames,
+    qvel: wp.array2d(dtype=float),
+    guess: wp.array3d(dtype=float),
+    passive: wp.array2d(dtype=float),
+    w: int,
+    p: int,
+    origin: wp.vec3,
+    axes: wp.mat33,
+) -> wp.vec3:
+    """Write the Jacobian of a patch, add its guess to the passive forces, and return the spin in its axes."""
+    tilt = wp.vec3()
+    for i in range(frames.jacobian.shape[2]):
+        both = jacobian_of(tree, w, origin, patches.owner[p], i)
+        both -= jacobian_of(tree, w, origin, patches.support[p], i)
+        move = axes * wp.spatial_top(both)
+        turn = axes * wp.spatial_bottom(both)
+        frames.jacobian[w, 3 * p, i] = move[0]
+        frames.jacobian[w, 3 * p + 1, i] = move[1]
+        frames.jacobian[w, 3 * p + 2, i] = turn[2]
+        tilt += qvel[w, i] * turn
+        passive[w, i] = passive[w, i] + move[0] * guess[w, p, 0] + move[1] * guess[w, p, 1] + turn[2] * guess[w, p, 2]
+    return tilt
+
+
 @wp.kernel(enable_backward=False)
 def place(
     patches: Patches,
@@ -183,11 +280,17 @@ def place(
     frames: Frames,
     site_xpos: wp.array2d(dtype=wp.vec3),
     site_xmat: wp.array2d(dtype=wp.mat33),
+    geom_xpos: wp.array2d(dtype=wp.vec3),
+    geom_xmat: wp.array2d(dtype=wp.mat33),
     qvel: wp.array2d(dtype=float),
+    state: wp.array2d(dtype=float),
     guess: wp.array3d(dtype=float),
     passive: wp.array2d(dtype=float),
 ):
-    """Write the frames of the patches, the Jacobian of their twists, and add the guesses to the passive forces."""
+    """Write the frames of the patches, the Jacobian of their twists, and add the guesses to the passive forces.
+
+    Bristles and guesses are carried into the axes of the step.
+    """
     w = wp.tid()
     nv = frames.jacobian.shape[2]
     nefc = wp.min(contacts.nefc[w], frames.owner.shape[1])
@@ -196,6 +299,8 @@ def place(
     for p in range(patches.count):
         normal, middle, count = touch(patches, contacts, frames, w, p, nefc)
         frames.touching[w, p] = count
+        frames.axis[w, p] = frames.before[w, p]
+        frames.drift[w, p] = wp.vec3()
         if count == 0:
             for j in range(3):
                 guess[w, p, j] = 0.0
@@ -206,7 +311,11 @@ def place(
         middle = middle / float(count)
         site = patches.site[p]
         turned = site_xmat[w, site]
-        axes = axes_of(turned, normal)
+        last = carried(turned, normal, frames.before[w, p])
+        axes = axes_of(turned, normal, last)
+        x = wp.vec3(axes[0, 0], axes[0, 1], axes[0, 2])
+        frames.axis[w, p] = wp.transpose(turned) * x
+        carry(patches, state, guess, w, p, last, x, normal)
         origin = site_xpos[w, site]
         held = frames.held[w, p]
         if patches.at_contact[p] != 0:
@@ -215,19 +324,12 @@ def place(
             else:
                 origin += turned * held
                 origin += wp.dot(normal, middle - origin) * normal
-        tilt = wp.vec3()
-        for i in range(nv):
-            both = jacobian_of(tree, w, origin, patches.owner[p], i)
-            both -= jacobian_of(tree, w, origin, patches.support[p], i)
-            move = axes * wp.spatial_top(both)
-            turn = axes * wp.spatial_bottom(both)
-            frames.jacobian[w, 3 * p, i] = move[0]
-            frames.jacobian[w, 3 * p + 1, i] = move[1]
-            frames.jacobian[w, 3 * p + 2, i] = turn[2]
-            tilt += qvel[w, i] * turn
-            passive[w, i] = (
-                passive[w, i] + move[0] * guess[w, p, 0] + move[1] * guess[w, p, 1] + turn[2] * guess[w, p, 2]
-            )
+        own = patches.own[p]
+        other = patches.other[p]
+        drift = drift_of(geom_xmat[w, own], origin - geom_xpos[w, own], patches.surface[p, 0], axes)
+        drift -= drift_of(geom_xmat[w, other], origin - geom_xpos[w, other], patches.surface[p, 1], axes)
+        frames.drift[w, p] = drift
+        tilt = write_rows(patches, tree, frames, qvel, guess, passive, w, p, origin, axes)
         frames.rolling[w, p] = wp.sqrt(tilt[0] * tilt[0] + tilt[1] * tilt[1])
         frames.axes[w, p] = axes
         frames.origin[w, p] = origin
@@ -240,7 +342,7 @@ def place(
 @wp.func
 def speed_of(frames: Frames, qvel: wp.array2d(dtype=float), w: int, p: int) -> float:
     """Return the speed at which a patch slides [m/s]."""
-    v = wp.vec2()
+    v = wp.vec2(frames.drift[w, p][0], frames.drift[w, p][1])
     for i in range(frames.jacobian.shape[2]):
         v += qvel[w, i] * wp.vec2(frames.jacobian[w, 3 * p, i], frames.jacobian[w, 3 * p + 1, i])
     return wp.length(v)
@@ -283,6 +385,8 @@ def follow_centres(
                 spin = frames.jacobian[w, 3 * p + 2, i]
                 frames.jacobian[w, 3 * p, i] = frames.jacobian[w, 3 * p, i] - move[1] * spin
                 frames.jacobian[w, 3 * p + 1, i] = frames.jacobian[w, 3 * p + 1, i] + move[0] * spin
+            drift = frames.drift[w, p]
+            frames.drift[w, p] = drift + drift[2] * wp.vec3(-move[1], move[0], 0.0)
             guess[w, p, 2] = guess[w, p, 2] - move[0] * guess[w, p, 1] + move[1] * guess[w, p, 0]
             for r in range(nefc):
                 if frames.owner[w, r] == p:

@@ -232,7 +232,7 @@ def write_twists(
 ):
     """Write the twists at the end of the step and their response."""
     for c in range(n):
-        v = wp.float64(0.0)
+        v = wp.float64(frames.drift[w, c / 3][c % 3])
         for e in range(n):
             out.response[w, c, e] = 0.0
         for i in range(s.stiff.shape[1]):
@@ -375,6 +375,7 @@ def remember(
         for i in range(3):
             place = 3 * p + i
             memory[w, at.centre + place] = frames.centre[w, p][i]
+            memory[w, at.axis + place] = frames.axis[w, p][i]
             memory[w, at.wrench + place] = wp.where(touches, wrench[w, p, i], 0.0)
             memory[w, at.twist + place] = wp.where(touches, twist[w, p, i], 0.0)
             if touches:

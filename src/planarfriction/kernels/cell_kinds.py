@@ -1,0 +1,58 @@
+"""Roll-outs of kinds of cells, their adjoint and their derivatives (see `cells_rollout`)."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, NamedTuple
+
+from planarfriction.compiler import kernel
+from planarfriction.compiler.memory import at
+from planarfriction.kernels import cells_rollout, cells_sensitivities
+from planarfriction.kernels.cell_blocks import BLOCK, LANES, Kind, StepBars, room
+from planarfriction.kernels.cell_passes import KINDS, backward_passes, forward_passes
+from planarfriction.kernels.passes import Passes
+from planarfriction.kernels.vectors import plus, reader_of
+
+
+def _advance_of(written: Passes) -> Any:
+    """Return `cell_blocks.Kind.advance` from the passes of a step."""
+    step, numbers = written.run, LANES * written.rows
+
+    @kernel
+    def advance(lever, law, w, blocks, lanes, twist, dt):
+        work, total = room(numbers), (0.0, 0.0, 0.0)
+        for k in range(blocks):
+            total = plus(total, 1.0, step(law, twist, (dt,), at(w, k * BLOCK), work, lanes))
+        return total
+
+    return advance
+
+
+def _retreat_of(written: Passes) -> Any:
+    """Return `cell_blocks.Kind.retreat` from the passes of the adjoint of a step."""
+    adjoint, numbers = written.run, LANES * written.rows
+
+    @kernel
+    def retreat(lever, law, block, lanes, interval, pull, load):
+        shared = interval[1], load, 0.0 if load == 0.0 else 1.0, pull[0], pull[1], pull[2]
+        s = adjoint(law, interval[0], shared, block, room(numbers), lanes)
+        return StepBars((s[0], s[1], s[2]), s[3], (s[4], s[5], s[6], s[7], s[8], s[9], s[10], s[11]))
+
+    return retreat
+
+
+class Rollouts(NamedTuple):
+    """Entry points of a kind of cells."""
+
+    rollouts: cells_rollout.CellRollouts
+    sensitivities: Any
+
+
+@functools.cache
+def rollouts_of_cells(size: int, turned: bool) -> Rollouts:
+    """Return the roll-outs of a kind of cells without asymmetry (see `KINDS`); they are written on first use."""
+    kind = KINDS[size, turned, False]
+    step, reader = kind.element.step, reader_of(size)
+    advance, retreat = _advance_of(forward_passes(kind)), _retreat_of(backward_passes(kind))
+    functions = Kind(kind.lever, size, advance, retreat, cells_rollout.pushed_of(step), reader)
+    return Rollouts(cells_rollout.bound(functions, kind.name), cells_sensitivities.bound(functions, step, kind.name))

@@ -1,0 +1,67 @@
+"""Functions with the code of others that see other globals: compiled functions over symbols, or over arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from types import CellType, CodeType, FunctionType, ModuleType
+from typing import Any
+
+
+def like(a: Any, numbers: Iterable[Any]) -> Any:
+    """Return a tuple of numbers, a record if `a` is one."""
+    return type(a)(*numbers) if hasattr(a, "_fields") else tuple(numbers)
+
+
+class Rewriting:
+    """Map from functions, modules and records of functions to their twins; anything else is its own twin.
+
+    A twin has the code of its function and sees twins in place of globals, the given ones of `known` among them.
+    """
+
+    def __init__(
+        self,
+        known: Iterable[tuple[Any, Any]],
+        names: Mapping[str, Any] | None = None,
+        finished: Callable[[FunctionType], Any] = lambda twin: twin,
+    ) -> None:
+        self._twins = {id(own): (twin, own) for own, twin in known}  # an `id` is that of an object that is kept
+        self._names, self._finished = names or {}, finished
+
+    def __call__(self, own: Any) -> Any:
+        """Return the twin."""
+        if id(own) in self._twins:
+            return self._twins[id(own)][0]
+        if isinstance(own, ModuleType):
+            return _Module(own, self)
+        if isinstance(own, tuple):
+            return like(own, [self(each) for each in own])
+        function = getattr(own, "py_func", own)
+        if not isinstance(function, FunctionType):
+            return own
+        space: dict[str, Any] = {"__builtins__": function.__globals__.get("__builtins__"), **self._names}
+        cells = [CellType() for _ in function.__closure__ or ()]
+        made = FunctionType(function.__code__, space, function.__name__, function.__defaults__, tuple(cells))
+        twin = self._finished(made)
+        self._twins[id(own)] = twin, own
+        for name in _global_names(function.__code__):
+            if name in function.__globals__:
+                space[name] = self(function.__globals__[name])
+        for cell, given in zip(cells, function.__closure__ or (), strict=True):
+            cell.cell_contents = self(given.cell_contents)
+        return twin
+
+
+class _Module:
+    """A module whose functions are twins."""
+
+    def __init__(self, own: ModuleType, rewriting: Rewriting) -> None:
+        self._own, self._rewriting = own, rewriting
+
+    def __getattr__(self, name: str) -> Any:
+        return self._rewriting(getattr(self._own, name))
+
+
+def _global_names(code: CodeType) -> set[str]:
+    """Return the names that code may look up, with those of the code inside it."""
+    inner = [each for each in code.co_consts if isinstance(each, CodeType)]
+    return set(code.co_names).union(*map(_global_names, inner))

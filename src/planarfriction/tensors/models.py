@@ -1,0 +1,55 @@
+"""The friction models over `xp`, without the parameters, which each front end holds in its own way."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from planarfriction import models
+from planarfriction.laws import FrictionLaw
+from planarfriction.patch import ContactPatch
+from planarfriction.tensors import distributed, published
+from planarfriction.tensors.steps import TensorModel
+
+
+class CellsModel(TensorModel):
+    """The distributed model: a bristle in every cell of a patch."""
+
+    equations = distributed
+    positions: Any
+    """Positions of the cells `[2, N]` [m]; with a friction metric their levers (see `tensors.distributed.Cells`)."""
+    weights: Any
+    """Share of the load that each cell carries [-], `[N]`."""
+
+    @property
+    def state_shape(self) -> tuple[int, ...]:
+        """Shape of the state of one contact, `(2, N)` of points, `(3, N)` of discs."""
+        return distributed.KINDS[len(self.positions)].bristles, self.positions.shape[1]
+
+    @property
+    def obstacle(self) -> str:
+        """Reason why compiled rollouts do not take the model, or an empty text."""
+        return super().obstacle or distributed.obstacle(self.positions)
+
+    def _shape(self, values: Mapping[str, Any]) -> distributed.Cells:
+        return distributed.Cells(self.positions, self.weights)
+
+
+class PublishedModel(TensorModel):
+    """The published reduced model: three bristles and a limit surface."""
+
+    equations = published
+    surface: Any
+    """Numbers of the limit surface: `kind`, `size` and `data` (see `planarfriction.kernels.surfaces`)."""
+    root: Any
+    """Symmetric root of the friction metric `[2, 2]`, if the patch has one."""
+
+    def _shape(self, values: Mapping[str, Any]) -> published.PublishedNumbers:
+        return published.numbers_of(self.xp, values, self.surface, self.root)
+
+
+def few_discs(name: str, patch: ContactPatch, law: FrictionLaw, cells: int, options: dict[str, Any]) -> ContactPatch:
+    """Return the discs on which the reduced model `name` is the distributed one, and take its settings from options."""
+    TensorModel.refuse(patch, law, name)
+    replaced = {each: options.pop(each) for each in models.ReducedModel.REPLACED if each in options}
+    return models.ReducedModel(patch, law, cells=cells, **replaced).reduction.patch

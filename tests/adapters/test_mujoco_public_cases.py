@@ -1,0 +1,109 @@
+"""Cases of public threads with closed forms: a ball that is hit, a pinch, a disc that spins, a ladder."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+
+mujoco = pytest.importorskip("mujoco")
+
+from planarfriction.adapters.mujoco import Friction, PatchContact, prepare  # noqa: E402
+
+pytestmark = pytest.mark.mujoco
+
+G, DT = 9.81, 1e-3
+
+
+def law(mu: float) -> pf.LuGre:
+    return pf.LuGre(mu_c=mu, sigma_0=1e5, sigma_2=0.0, elasto_plastic=0.9)
+
+
+def point(mu: float) -> pf.ReducedModel:
+    return pf.ReducedModel(pf.ContactPatch.disc(radius=1e-4, cells=5), law(mu))
+
+
+def made(text: str, patches, actuators: str = ""):
+    xml = f'<mujoco><option timestep="{DT}"/><worldbody>{text}</worldbody><actuator>{actuators}</actuator></mujoco>'
+    m = prepare(mujoco.MjSpec.from_string(xml), patches).compile()
+    return m, mujoco.MjData(m), Friction(m, patches)
+
+
+def test_a_ball_that_is_hit_slides_until_it_rolls():
+    """After 2 v / (7 mu g), at 5/7 v: 0.2912 s and 1.4286 m/s."""
+    text = """<geom name="table" type="plane" size="5 5 1"/><body pos="0 0 0.02849"><freejoint/>
+    <geom name="ball" type="sphere" size="0.0285" mass="0.17"/><site name="ball"/></body>"""
+    _, d, friction = made(text, [PatchContact(point(0.2), "ball", ("ball", "table"))])
+    d.qvel[0], slips = 2.0, []
+    for _ in range(400):
+        friction.step(d)
+        slips.append(abs(friction.twists(d)[0, 0]))
+    rolls = np.flatnonzero(np.array(slips) > 1e-3)[-1] * DT
+    assert rolls == pytest.approx(2.0 * 2.0 / (7.0 * 0.2 * G), rel=0.01)
+    assert d.qvel[0] == pytest.approx(5.0 / 7.0 * 2.0, rel=4e-3)
+
+
+def test_a_disc_that_spins_on_its_face_stops():
+    """After 3 R w / (4 mu g): 0.5097 s."""
+    text = """<geom name="table" type="plane" size="5 5 1"/><body pos="0 0 0.00999"><freejoint/>
+    <geom name="disc" type="cylinder" size="0.1 0.01" mass="0.5"/><site name="disc" pos="0 0 -0.01"/></body>"""
+    face = pf.ReducedModel(pf.ContactPatch.disc(radius=0.1), law(0.3))
+    _, d, friction = made(text, [PatchContact(face, "disc", ("disc", "table"))])
+    d.qvel[5] = 20.0
+    while d.qvel[5] > 1e-3:
+        friction.step(d)
+    assert d.time == pytest.approx(3.0 * 0.1 * 20.0 / (4.0 * 0.3 * G), rel=0.01)
+
+
+@pytest.mark.parametrize("share", [0.97, 1.03])
+def test_a_pinched_capsule_holds_from_its_weight_on(share):
+    """Two pads press with N: they hold 2 mu N, and what is heavier falls at the rest of g."""
+    mass, mu = 0.045, 0.8
+    pads = "".join(
+        f"""<body pos="{0.02 * sign} 0 1"><joint name="{side}" type="slide" axis="{-sign} 0 0" damping="1"/>
+        <geom name="{side}" type="box" size="0.01 0.02 0.02" mass="0.1" contype="1" conaffinity="0"/></body>"""
+        for side, sign in (("left", -1), ("right", 1))
+    )
+    text = f"""<body pos="0 0 1"><freejoint/><geom name="capsule" type="capsule" size="0.01 0.03" euler="90 0 0"
+    mass="{mass}" contype="0" conaffinity="1"/><site name="left" zaxis="1 0 0"/><site name="right" zaxis="-1 0 0"/>
+    </body>{pads}"""
+    motors = '<motor joint="left"/><motor joint="right"/>'
+    patches = [PatchContact(point(mu), side, (side, "capsule")) for side in ("left", "right")]
+    m, d, friction = made(text, patches, motors)
+    m.opt.gravity[:] = 0.0
+    d.ctrl[:] = share * mass * G / (2.0 * mu)
+    for _ in range(500):
+        friction.step(d)
+    m.opt.gravity[2] = -G
+    speeds = []
+    for _ in range(200):
+        friction.step(d)
+        speeds.append(d.qvel[2])
+    falls = (speeds[199] - speeds[99]) / (100 * DT)
+    assert falls == pytest.approx(-max(1.0 - share, 0.0) * G, rel=0.02, abs=1e-4)
+
+
+@pytest.mark.parametrize(("angle", "holds"), [(48.2, True), (47.2, False)])
+def test_a_ladder_slips_below_its_angle(angle, holds):
+    """tan(angle) = (1 - mu_floor mu_wall) / (2 mu_floor): 47.73 deg for 0.4 and 0.3."""
+    assert math.degrees(math.atan((1.0 - 0.4 * 0.3) / 0.8)) == pytest.approx(47.73, abs=0.005)
+    half, tip = 1.0, 0.001
+    x, z = half * math.cos(math.radians(angle)), half * math.sin(math.radians(angle))
+    text = f"""<geom name="floor" type="plane" size="5 5 1"/>
+    <geom name="wall" type="plane" size="5 5 1" pos="0 0 0" zaxis="-1 0 0"/>
+    <body pos="{-x - tip + 2e-6} 0 {z + tip - 2e-6}" euler="0 {-angle} 0"><freejoint/>
+    <inertial pos="0 0 0" mass="5" diaginertia="0.1 1.7 1.7"/>
+    <geom name="foot" size="{tip}" pos="{-half} 0 0"/><site name="foot" pos="{-half} 0 0" xyaxes="0 1 0 0 0 1"/>
+    <geom name="head" size="{tip}" pos="{half} 0 0"/><site name="head" pos="{half} 0 0" xyaxes="0 1 0 0 0 1"/>
+    </body>"""
+    patches = [
+        PatchContact(point(0.4), "foot", ("foot", "floor")),
+        PatchContact(point(0.3), "head", ("head", "wall")),
+    ]
+    _, d, friction = made(text, patches)
+    for _ in range(600):
+        friction.step(d)
+    assert (d.qpos[2] > z - 0.002) == holds
