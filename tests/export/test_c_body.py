@@ -14,7 +14,7 @@ from tests.support.c_libraries import library, samples
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
-NAMES = "few", "distributed", "table", "ellipsoid", "soft"
+NAMES = "few", "distributed", "table", "ellipsoid", "soft", "fixed discs"
 NOT_CONVERGED = 4
 
 
