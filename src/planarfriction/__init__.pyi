@@ -54,6 +54,7 @@ from .scenes import Signal as Signal
 from .scenes import Solution as Solution
 from .scenes import Spring as Spring
 from .scenes import simulate as simulate
+from .sliding_body import SlidingBody as SlidingBody
 from .sweeps import sweep as sweep
 from .warm import warm_up as warm_up
 

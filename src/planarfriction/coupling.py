@@ -166,7 +166,7 @@ class CoupledPatches(ByValue):
         if not isinstance(host, HostStep):
             raise InvalidValueError("host", "be a HostStep", type(host).__name__)
         tolerance = validation.positive("tolerance", tolerance)
-        most = ITERATIONS if iterations is None else validation.count("iterations", iterations, 0)
+        most = ITERATIONS if iterations is None else validation.count("iterations", iterations, 0, 10**9)
         given = dict(zip(_INPUTS, (state, dt, *host), strict=True))
         for name in ("load_response", "moments"):
             if given[name] is None:

@@ -13,6 +13,7 @@ import numpy as np
 from planarfriction import validation, writing
 from planarfriction.compiler import compiled_math
 from planarfriction.errors import InvalidValueError
+from planarfriction.export.body import body_of
 from planarfriction.export.c_source import SQRT, Writer, comment, of_compiled, passes_of
 from planarfriction.export.c_values import Array, Fixed, Scalar
 from planarfriction.export.loops import Loops
@@ -223,6 +224,7 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, grip: dict, ki
             "slip": None if slip is None else _search(writer, slip),
             "passes": passes,
             "moves": moves,
+            "body": body_of(model, precision),
             "share": share,
             "own": own,
             "samples": samples_of(model, slip, writer, pieces.tables.get("rungs")),

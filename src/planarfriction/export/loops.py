@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction.compiler import compiled_math
+from planarfriction.compiler.memory import at
 from planarfriction.export.c_source import Writer
 from planarfriction.export.c_values import (
     LEAVES,
@@ -39,7 +40,8 @@ from planarfriction.kernels.trace import Number, Table, Trace, traced
 
 _OPERATORS: dict[type, tuple[str, Callable[..., Any]]] = {
     ast.Add: ("+", operator.add), ast.Sub: ("-", operator.sub), ast.Mult: ("*", operator.mul),
-    ast.Div: ("/", operator.truediv), ast.USub: ("-", operator.neg), ast.Not: ("!", operator.not_),
+    ast.Div: ("/", operator.truediv), ast.Mod: ("%", operator.mod),
+    ast.FloorDiv: ("/", operator.floordiv), ast.USub: ("-", operator.neg), ast.Not: ("!", operator.not_),
     ast.Lt: ("<", operator.lt), ast.LtE: ("<=", operator.le), ast.Gt: (">", operator.gt),
     ast.GtE: (">=", operator.ge), ast.Eq: ("==", operator.eq), ast.NotEq: ("!=", operator.ne),
 }  # fmt: skip
@@ -52,11 +54,15 @@ class Loops:
 
     def __init__(self, writer: Writer, structs: dict[np.dtype, str] | None = None) -> None:
         self.writer, self.structs = writer, structs or {}
+        self.replaced: dict[Any, Callable[[Any], str]] = {}
+        """Names of C functions, from their arguments, that take the record among these in place of a kernel."""
         self.functions: list[str] = []
         self._made: dict[Any, tuple[str, list[bool], Any]] = {}
 
     def add(self, kernel: Any, arguments: tuple[Any, ...]) -> tuple[str, list[bool], Any]:
         """Write a kernel for arguments like these; return its name, which of their numbers it takes, and its result."""
+        if kernel in self.replaced:
+            return self.replaced[kernel](arguments), [isinstance(each, Record) for each in leaves(arguments)], None
         straight = kernel.py_func.__module__ == surfaces.__name__
         if straight:
             arguments = tuple(Fixed(each) if isinstance(each, (int, float)) else each for each in arguments)
@@ -177,8 +183,8 @@ class _Translated(_Function):
         getattr(self, f"_{type(node).__name__.lower()}")(node)
 
     def _expr(self, node: ast.Expr) -> None:
-        if isinstance(node.value, ast.Call):
-            self._value(node.value)
+        if isinstance(node.value, ast.Call) and isinstance(value := self._value(node.value), Scalar):
+            self._line(f"{value.text};")
 
     def _break(self, node: ast.Break) -> None:
         self._line("break;")
@@ -202,10 +208,8 @@ class _Translated(_Function):
         first, last = limits[:2] if len(limits) > 1 else ("0", limits[0])
         index = "rounds" if node.target.id == "_" else node.target.id
         self._declare(index, Scalar(index, "int"))
-        down = len(limits) > 2
-        self._line(
-            f"for ({index} = {first}; {index} {'>' if down else '<'} {last}; {'--' if down else '++'}{index}) {{"
-        )
+        until, on = (">", "--") if len(limits) > 2 else ("<", "++")
+        self._line(f"for ({index} = {first}; {index} {until} {last}; {on}{index}) {{")
         self._block(node.body)
         self._line("}")
 
@@ -377,6 +381,8 @@ class _Translated(_Function):
             return Scalar(f"{name}{self.loops.writer.suffix}({', '.join(map(self._of, given))})")
         if isinstance(function, type):
             return function(*given)
+        if function is at:
+            return given[0]._replace(text=f"({given[0].text} + {self._of(given[1])})")
         if function is np.empty:
             name = f"a{len(self.locals)}"
             self.locals[f"{name}[{given[0]}]"] = "real"

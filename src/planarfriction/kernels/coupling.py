@@ -248,7 +248,7 @@ def _valid(own, p, words):
 
 
 @kernel
-def _prepare(own, p):
+def prepare(own, p):
     """Write twists and loads without wrenches, and the scale; return the largest speed [m/s] that goes into a twist."""
     n, a, largest = 3 * own.count, p.response, 0.0
     for i in range(n):
@@ -334,6 +334,30 @@ def _restrain(own, p):
             w[i], p.twist[i] = s * w[i], p.twist_0[i] + s * move[i]
 
 
+@kernel
+def search(own, p, tolerance, most):
+    """Write the twists and loads of the least misfit; return that, and True if states and wrenches are those there."""
+    misfit, rest = _start(own, p, tolerance)
+    best = math.inf
+    for iteration in range(most + 1):
+        p.iterations[0] = iteration
+        if misfit < best:
+            best = misfit
+            _copy(own, p.twist, p.load, p.best_twist, p.best_load)
+        if misfit <= tolerance or iteration == most or misfit == math.inf:
+            break
+        held = iteration % ROUND >= JOINT
+        step_all(own, p, own.slopes)  # dear: not before they are needed, which at rest they are not
+        _load_slopes(own, p)
+        if not _newton(own, p, held, False):
+            _newton(own, p, held, True)
+        _go(own, p, held, rest)
+        rest, misfit = False, _misfit(own, p)
+    if not misfit <= best:
+        _copy(own, p.best_twist, p.best_load, p.twist, p.load)
+    return best, misfit <= best
+
+
 @entry
 def solve(patches, problem):
     """Solve the problem of one row, whose address comes in; `patches` is that of its `Patches`."""
@@ -343,46 +367,22 @@ def solve(patches, problem):
     if not _valid(own, p, doubles(problem)):
         return
     follow(own, p, problem)
-    tolerance = xp.maximum(p.tolerance[0], ROUNDING * _prepare(own, p))
-    misfit, rest = _start(own, p, tolerance)
-    best, iterations = math.inf, 0
-    while True:
-        if misfit < best:
-            best = misfit
-            _copy(own, p.twist, p.load, p.best_twist, p.best_load)
-        if misfit <= tolerance or iterations >= p.most[0] or misfit == math.inf:
-            break
-        held = iterations % ROUND >= JOINT
-        step_all(own, p, own.slopes)  # dear: not before they are needed, which at rest they are not
-        _load_slopes(own, p)
-        if not _newton(own, p, held, False):
-            _newton(own, p, held, True)
-        _go(own, p, held, rest)
-        iterations, rest = iterations + 1, False
-        misfit = _misfit(own, p)
-    p.iterations[0] = iterations
-    if not misfit <= best:
-        _copy(own, p.best_twist, p.best_load, p.twist, p.load)
+    tolerance = xp.maximum(p.tolerance[0], ROUNDING * prepare(own, p))
+    best, there = search(own, p, tolerance, int(p.most[0]))
     lost = best > tolerance and p.again[0] > 0.0
     if lost and p.most[0] > 0.0:
         best = _again(own, p, patches, problem, best)
-    if lost or not misfit <= best:
+    if lost or not there:
         step_all(own, p, own.steps)
     for i in range(3 * own.count):
         p.wrench[i] = p.load[i // 3] * p.unit[i]
-    _forget_unloaded(own, p)
+    for k in range(own.count):
+        if p.load[k] == 0.0:  # without load there is no memory
+            for i in range(own.firsts[k], own.firsts[k + 1]):
+                p.new[i] = 0.0
     if lost and best > tolerance:
         _restrain(own, p)
     p.residual[0], p.converged[0] = best, 1.0 if best <= tolerance else 0.0
-
-
-@kernel
-def _forget_unloaded(own, p):
-    """Clear the states of patches without load: they keep no memory."""
-    for k in range(own.count):
-        if p.load[k] == 0.0:
-            for i in range(own.firsts[k], own.firsts[k + 1]):
-                p.new[i] = 0.0
 
 
 @functools.cache

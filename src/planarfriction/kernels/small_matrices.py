@@ -88,10 +88,10 @@ def solved(m, x, n):
         per = 1.0 / m[n * c + c] if m[n * c + c] != 0.0 else 0.0
         m[n * c + c] = per
         for r in range(c + 1, n):
-            share = m[n * r + c] * per
+            part = m[n * r + c] * per
             for j in range(c + 1, n):
-                m[n * r + j] -= share * m[n * c + j]
-            x[r] -= share * x[c]
+                m[n * r + j] -= part * m[n * c + j]
+            x[r] -= part * x[c]
     for c in range(n - 1, -1, -1):
         for j in range(c + 1, n):
             x[c] -= m[n * c + j] * x[j]

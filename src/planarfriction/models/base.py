@@ -135,6 +135,8 @@ class FrictionModel(ByValue):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Advance by `dt` [s] at a held twist; return the new state and the wrench at the end. Stable at any `dt`.
 
+        A loop that moves a body by this wrench is not: up to `SlidingBody.largest_step`; `SlidingBody.step` is.
+
         Plain LuGre is linear in z, and its step is exact. Elasto-plastic bristles use an exponential step with the mean
         of the decay at the start and at the predicted end: second order, and limited to the largest deflection so that
         nothing overshoots.

@@ -52,6 +52,8 @@ BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
     "export.step.reduced.vector": partial(exported.step, kind="reduced", vector=True),
     **{f"export.step.{kind}.instructions": partial(exported.instructions, kind=kind) for kind in exported.MODELS},
     **{f"export.step.{kind}.999": partial(exported.percentile, kind=kind) for kind in exported.MODELS},
+    "body.call": steps.body,
+    "export.body": exported.body,
     "coupled.four_feet.call": steps.coupled,
     "coupled.four_feet.batch": partial(steps.coupled, environments=1000),
     "mujoco.tray.1": partial(simulator_costs.mujoco_tray, blocks=1),

@@ -14,6 +14,7 @@ from planarfriction.derivatives import rollout
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
+from planarfriction.sliding_body import SlidingBody
 from planarfriction_studies.bench.measurement import (
     AGAINST_PUBLISHED,
     Measurement,
@@ -90,6 +91,14 @@ def reduced_four(full: bool) -> Measurement:
 
 def _beside_a_step(model: ReducedModel, action: Callable[[], Any]) -> Measurement:
     return line(median(action, 9, 2000) * 1e6, "us", "one Python call of step", _python_step(model, 2000) * 1e6)
+
+
+def body(full: bool) -> Measurement:
+    """Measure an implicit step of 1 ms of a block that is held, in one Python call."""
+    model = ReducedModel(disc(), law())
+    block = SlidingBody(0.2, 1e-5, model)
+    end = block.step(block.rest(), np.zeros(3), 2.0, 1e-3, (1.5, 0.0, 0.0))
+    return _beside_a_step(model, lambda: block.step(end.state, end.twist, 2.0, 1e-3, (1.5, 0.0, 0.0)))
 
 
 def coupled(full: bool, environments: int = 1) -> Measurement:

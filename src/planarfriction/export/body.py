@@ -1,0 +1,50 @@
+"""The search of `kernels.coupling` in C, for a body on one patch."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from planarfriction.coupling import ITERATIONS, TOLERANCE, lever_of
+from planarfriction.export.c_source import Writer
+from planarfriction.export.c_values import Array, Fixed, Record, Scalar
+from planarfriction.export.loops import Loops
+from planarfriction.kernels import coupling
+from planarfriction.kernels.coupling_rows import Patches, layout
+
+_STEP, _SLOPES = Fixed(0), Fixed(1)
+"""Stand in place of the addresses of a patch's functions."""
+
+_FUNCTIONS = {_STEP: "step_patch", _SLOPES: "slope_patch"}
+
+ROUNDING = {"double": coupling.ROUNDING, "float": 1e-5}
+"""Error of a twist, in the largest speed that goes into it, below which no step gets, by precision."""
+
+
+def body_of(model: Any, precision: str) -> dict[str, Any]:
+    """Return fields and functions of the search, always in double precision, and its constants."""
+    row = layout(1, 0, 0, 0)
+    counts = {name: part.stop - part.start for name, part in row.slices.items()}
+    record = np.dtype([(name, "f8", (count,)) for name, count in counts.items() if count])
+    own = Patches(**dict.fromkeys(Patches._fields, Fixed(0)))._replace(  # pyright: ignore
+        count=Fixed(1), steps=_STEP, slopes=_SLOPES, radius=Array("lever_arm", (1,), fixed=True)
+    )
+    writer, p = Writer(), Record("p", record)
+    loops = Loops(writer, {record: "search_t"})
+    loops.replaced[coupling._step] = lambda given: _FUNCTIONS[given[2]]
+    loops.replaced[coupling._load_slopes] = lambda _: "(void)"  # the load is given
+    loops.add(coupling.prepare, (own, p))
+    loops.add(coupling.search, (own, p, Scalar("tolerance"), Fixed(ITERATIONS)))
+    functions = re.sub(r"\breal\b", "double", "\n\n".join(loops.functions))
+    return {
+        "fields": [f"{name}[{count}]" for name, count in counts.items() if f"p->{name}" in functions],
+        "functions": functions,
+        "stages": coupling.STAGES,
+        "ratio": Writer(precision).constant(coupling.SHORTER),
+        "shortest": writer.constant(coupling.SHORTER**-coupling.STAGES),
+        "lever": writer.constant(lever_of(model) or 1.0),
+        "tolerance": writer.constant(TOLERANCE),
+        "rounding": writer.constant(ROUNDING[precision]),
+    }

@@ -1,0 +1,144 @@
+"""A body on patches as the simplest thing to step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction import coupling, geometry
+from planarfriction.errors import SolverError
+from planarfriction.sliding_body import BodyStep
+
+DISC = pf.ContactPatch.disc(radius=0.01)
+GRAINED = pf.ContactPatch.rectangle(0.02, 0.01, cells=7).with_friction_metric([[1.0, 0.2], [0.2, 1.5]])
+MASS, INERTIA, PUSH = 0.2, 1e-5, 1.5
+
+
+def model_of(sigma_0=1e6, **law):
+    return pf.ReducedModel(DISC, pf.LuGre(mu_c=1.0, mu_s=1.2, v_s=1e-3, sigma_0=sigma_0, elasto_plastic=0.9, **law))
+
+
+def travel(body, dt, load, duration=0.2):
+    """Return how far a block goes that is pushed from rest."""
+    state, twist, x = body.rest(), np.zeros(3), 0.0
+    for i in range(round(duration / dt)):
+        state, twist, _ = body.step(state, twist, load((i + 1) * dt), dt, wrench=(PUSH, 0.0, 0.0))
+        x += dt * twist[0]
+    return x
+
+
+@pytest.mark.parametrize("sigma_0", [1e5, 1e6, 1e7])
+@pytest.mark.parametrize("loads", [(2.0, 2.0), (2.0, 1.7), (1.7, 30.0)])
+def test_a_pushed_block_stays_at_any_time_step(sigma_0, loads):
+    """Within 1e-6 m of the solver's run, at 0.1 to 10 ms; a load jumps after half of the time."""
+    model = model_of(sigma_0)
+    pushed = pf.Body(MASS, INERTIA, gravity=(PUSH / MASS, 0.0))
+    contact = pf.Contact(model, normal_force=pf.Signal([0.0, 0.1], loads))
+    wanted = float(pf.simulate(pf.Scene(pushed, [contact], 0.2, rtol=1e-8, atol=1e-6)).data.x[-1])
+    body = pf.SlidingBody(MASS, INERTIA, model)
+    for dt in (1e-4, 1e-3, 1e-2):
+        assert travel(body, dt, lambda t: loads[0] if t < 0.1 + 1e-9 else loads[1]) == pytest.approx(wanted, abs=1e-6)
+    assert wanted < 1.1 * PUSH / (sigma_0 * min(loads)) + 1e-6
+
+
+def four_feet(angles=0.0):
+    feet = [(0.05, 0.03), (0.05, -0.03), (-0.05, 0.03), (-0.05, -0.03)]
+    models = [model_of(), model_of(1e4), pf.DistributedModel(GRAINED, pf.LuGre()), model_of()]
+    return pf.SlidingBody(MASS, 2e-4, models, feet, angles)
+
+
+def test_wrench_is_that_of_the_models_at_the_end():
+    """Friction moves the body by `dt M^-1 W`, and W are the wrenches of `step` at the twist that it moves to."""
+    body, dt, angle = four_feet([0.3, 0.0, -1.0, 2.0]), 2e-3, 0.7
+    loads, twist, push = np.array([0.5, 1.0, 0.2, 0.0]), np.array([0.03, -0.01, 0.8]), np.array([0.3, 0.2, 0.01])
+    end = body.step(body.rest(), twist, loads, dt, push, angle)
+    np.testing.assert_allclose(end.twist, twist + dt / np.array([MASS, MASS, 2e-4]) * (push + end.wrench), rtol=1e-12)
+    total = np.zeros(3)
+    for model, place, turn, load in zip(body.patches.models, body.positions, body.angles, loads, strict=True):
+        arm = geometry.rotate(place, angle)
+        seen = geometry.rotate(geometry.twist_at(end.twist, arm), -angle - turn)
+        wrench = geometry.rotate(model.step(model.rest(), seen, load, dt)[1], angle + turn)
+        total += geometry.wrench_at(wrench, -arm)
+    np.testing.assert_allclose(end.wrench, total, atol=1e-5 * np.abs(total).max())
+    assert isinstance(end, BodyStep) and total[2] != 0.0 and not body.patches.states(end.state)[3].any()
+
+
+def test_batches():
+    """Bodies of a batch move as each one alone."""
+    body, rng = four_feet(), np.random.default_rng(0)
+    twists, pushes = rng.normal(size=(6, 3)) * 0.05, rng.normal(size=(6, 3)) * [1.0, 1.0, 0.02]
+    loads, angles, dt = rng.uniform(0.0, 1.0, (6, 4)), rng.uniform(-3.0, 3.0, 6), np.linspace(1e-4, 1e-2, 6)
+    many = body.step(body.rest(), twists, loads, dt, pushes, angles)
+    for i in range(6):
+        one = body.step(body.rest(), twists[i], loads[i], dt[i], pushes[i], angles[i])
+        for a, b in zip(many, one, strict=True):
+            np.testing.assert_array_equal(a[i], b)
+    lone = pf.SlidingBody(MASS, INERTIA, model_of())
+    assert lone.step(lone.rest(5), np.zeros(3), np.ones((2, 1)), 1e-3).wrench.shape == (2, 5, 3)
+
+
+@pytest.mark.parametrize("sigma_0, sigma_1", [(1e6, 800.0), (1e7, 10.0), (1e3, 800.0)])
+def test_largest_step_of_a_loop_around_step(sigma_0, sigma_1):
+    """A stuck block that is nudged comes to rest below that, and swings ever wider above it."""
+    model = model_of(sigma_0, sigma_1=sigma_1)
+    body = pf.SlidingBody(MASS, INERTIA, model)
+    speeds = {}
+    for share in (0.98, 1.02):
+        dt, state, v = share * body.largest_step(2.0), model.rest(), 1e-9
+        for _ in range(400):
+            state, wrench = model.step(state, (v, 0.0, 0.0), 2.0, dt)
+            v += dt * wrench[0] / MASS
+        speeds[share] = abs(v)
+    assert speeds[0.98] < 1e-9 < 1e-7 < speeds[1.02]
+
+
+def test_largest_step_of_several_patches():
+    """Patches add up, spin has its own limit, and without load every step is stable."""
+    model, far = model_of(), [(0.1, 0.0), (-0.1, 0.0)]
+    pair = pf.SlidingBody(MASS, 1.0, [model, model], far)
+    assert pair.largest_step([1.0, 1.0]) == pytest.approx(pf.SlidingBody(MASS, 1.0, model).largest_step(2.0), rel=1e-9)
+    light = pf.SlidingBody(MASS, 1e-4, [model, model], far)
+    equal = pf.SlidingBody(1e-4 / 1e-2, 1e9, model).largest_step(2.0)  # a mass that the feet feel at their arm
+    assert light.largest_step([1.0, 1.0]) == pytest.approx(equal, rel=1e-2)
+    assert light.largest_step([[0.0, 0.0], [1.0, 1.0]])[0] == np.inf
+
+
+def test_a_step_that_does_not_converge_says_so(monkeypatch):
+    monkeypatch.setattr(coupling, "ITERATIONS", 0)
+    body = pf.SlidingBody(MASS, INERTIA, model_of())
+    with pytest.raises(SolverError, match=r"a body did not converge \(2 of 3 bodies, off by .* m/s\)"):
+        body.step(body.rest(), [[0.1, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.2, 0.0]], 2.0, 1e-3)
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ({"mass": 0.0}, "mass must be > 0"),
+        ({"models": []}, "models must hold at least one"),
+        ({"positions": [(0.0, 0.0)] * 2}, "positions must have shape"),
+        ({"angles": np.nan}, "angles must be finite"),
+    ],
+)
+def test_bad_bodies(change, words):
+    with pytest.raises(pf.FrictionError, match=words):
+        pf.SlidingBody(**{"mass": MASS, "inertia": INERTIA, "models": model_of()} | change)
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ({"twist": (0.0, 0.0)}, "twist must have shape"),
+        ({"wrench": (np.nan, 0.0, 0.0)}, "wrench must be finite"),
+        ({"normal_force": (1.0, 2.0, 3.0)}, r"normal_force must have shape \[..., 4\]"),
+        ({"normal_force": (1.0, 2.0, 3.0, -1.0)}, "normal_force must be finite and >= 0"),
+        ({"dt": -1e-3}, "dt must be >= 0"),
+        ({"dt": np.ones(2), "angle": np.ones(3)}, "must broadcast"),
+        ({"state": np.zeros(3)}, "state must have shape"),
+    ],
+)
+def test_bad_steps(change, words):
+    body = four_feet()
+    given = {"state": body.rest(), "twist": np.zeros(3), "normal_force": np.ones(4), "dt": 1e-3}
+    with pytest.raises(pf.FrictionError, match=words):
+        body.step(**given | change)
