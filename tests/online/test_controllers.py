@@ -9,7 +9,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
-from planarfriction.online import FrictionObserver, Hinge, Hold, Measurement, SlideBy, TurnBy
+from planarfriction.online import FrictionObserver, Hinge, Hold, Measurement, Sensors, SlideBy, TurnBy
 from planarfriction.online.controllers import trapezoid
 from planarfriction.online.loops import friction_filter
 from planarfriction_studies.rig import Gripper, Parts
@@ -71,6 +71,55 @@ def test_a_controller_begins_when_the_hand_grips(kind, options, load):
             sample = gripper.step(own.update(sample))
         grips.append(gripper.normal_force)
     assert grips[0] == pytest.approx(grips[1], rel=1e-9)
+
+
+def held(make, change=lambda k, sample: sample, steps=1800):
+    """Controller and gripper after parts hung still from hands whose samples are changed."""
+    gripper, own = (
+        Gripper(few(tap=(0.0, 0.0, 0.0), tilt=0.0), 20.0, seed=1),
+        FrictionObserver(known_model(), batch=COUNT),
+    )
+    for sample in gripper.empty_hand():
+        own.update(sample)
+    control, sample = make(own), gripper.measurement
+    for k in range(steps):
+        sample = gripper.step(control.update(change(k, sample)))
+    return control, gripper
+
+
+KINDS = {"hold": Hold, "slide": lambda own: SlideBy(own, -0.02), "turn": lambda own: TurnBy(own, -0.5), "hinge": Hinge}
+DEAD = {"stuck": 0.0, "silent": np.nan}
+
+
+@pytest.mark.parametrize("make", KINDS.values(), ids=KINDS)
+@pytest.mark.parametrize("velocity", DEAD.values(), ids=DEAD)
+def test_a_dead_slip_sensor_drops_nothing(make, velocity):
+    control, gripper = held(make, lambda k, s: s._replace(slip_velocity=s.slip_velocity * 0.0 + velocity))
+    assert np.hypot(*gripper.slip[:, :2].T).max() < 5e-3
+    assert control.blind.all() == (velocity == 0.0)
+    assert (gripper.normal_force > 1.5 * control.state["load"] / 0.52).all()  # by the least friction of the prior
+
+
+@pytest.mark.parametrize("kind", [SlideBy, TurnBy, Hinge])
+def test_no_slip_sensor_no_slip_on_purpose(kind):
+    own = FrictionObserver(known_model(), batch=COUNT, sensors=Sensors(slip_rate=0.0))
+    with pytest.raises(InvalidValueError, match="observer must have a slip sensor"):
+        kind(own, *([-0.02] if kind is not Hinge else []))
+
+
+@pytest.mark.parametrize("make", KINDS.values(), ids=KINDS)
+@pytest.mark.parametrize("wrong", [0.0, 300.0])
+def test_one_wrong_load_is_not_the_grip(make, wrong):
+    """The last sample before the filters have settled."""
+    right, _ = held(make, steps=40)
+    control, _ = held(make, lambda k, s: s._replace(normal_force=s.normal_force * 0.0 + wrong) if k == 29 else s, 40)
+    assert control.state["grip"] == pytest.approx(right.state["grip"], rel=0.02)
+
+
+def test_a_wrong_sign_holds_by_the_least_friction():
+    control, gripper = held(Hold, lambda k, s: s._replace(wrench=-s.wrench))
+    assert (control.estimate.flags == 16).any()
+    assert np.hypot(*gripper.slip[:, :2].T).max() < 5e-3
 
 
 def test_the_trapezoid_is_the_integral_of_its_speed():
@@ -169,7 +218,7 @@ def test_a_part_that_sticks_near_its_goal_is_left_there(observer, kind, goal, ne
 
 @pytest.mark.parametrize("torque, falls", [(0.02, True), (2e-4, False)])
 def test_a_hinge_releases_what_does_not_hang_yet(observer, torque, falls):
-    hinge, sample = Hinge(observer), {"slip": 0.0, "wrench": (0.0, 1.0, torque)}
+    hinge, sample = Hinge(observer), {"slip": 0.0, "velocity": 0.0, "wrench": (0.0, 1.0, torque)}
     first = gripped(hinge, sample, found=1.0, force=1.0, torque=torque, since=0.2)
     for _ in range(100):
         hinge._grip(hinge.state, found(**sample), *hinge._settings)

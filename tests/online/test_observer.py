@@ -25,7 +25,8 @@ MODEL = pf.ReducedModel(PATCH, LAW)
 
 
 def observer(**options) -> FrictionObserver:
-    return FrictionObserver(MODEL, surface=SURFACE, **options)
+    """Observer of a sensor whose bias is below its noise, unless the options say otherwise."""
+    return FrictionObserver(MODEL, surface=SURFACE, **{"bias": (0.01, 0.01, 1e-4)} | options)
 
 
 def sliding(mu=0.7, scale=1.1, load=4.0, count=1200, turning=True):
@@ -114,6 +115,52 @@ def test_bad_samples_are_said_and_lose_nothing(what):
     assert found.flags == 0
     assert found.mu_c == pytest.approx(float(clean.mu_c), rel=1e-3)
     assert found.radius == pytest.approx(float(clean.radius), rel=1e-2)
+
+
+def reached(change=lambda sample: sample, empty=True, **options):
+    """Estimate at the end of a slip in the gripper whose samples are changed."""
+    patch = pf.ContactPatch.disc(9e-3, 21, pressure=pf.SoftFinger(c=9e-3, k=4.0))
+    gripper = Gripper(Parts([0.2], [3e-4], [(0.002, 0.0)], [0.7], radius=9e-3, growth=0.0, delay=0.02), 5.0)
+    own = FrictionObserver(pf.ReducedModel(patch, LAW), batch=1, **options)
+    samples = [gripper.step(max(5.0 - 8e-3 * k, 1.2)) for k in range(600)]
+    return taken(own, [*(gripper.empty_hand() if empty else ()), *map(change, samples)])
+
+
+def changes():
+    return {
+        "reaction on the finger": (lambda s: s._replace(wrench=-s.wrench), 16),
+        "velocity of the finger": (lambda s: s._replace(slip_velocity=-s.slip_velocity), 16),
+        "load in kg": (lambda s: s._replace(normal_force=s.normal_force / 9.81), 32),
+        "load in grams": (lambda s: s._replace(normal_force=s.normal_force * 1e3 / 9.81), 32),
+        "velocity in mm/s": (lambda s: s._replace(slip_velocity=s.slip_velocity * 1e3), 32),
+        "nothing": (lambda s: s, 0),
+    }
+
+
+@pytest.mark.parametrize("name", changes())
+def test_signs_and_units_that_are_wrong_are_said(name):
+    change, flag = changes()[name]
+    found = reached(change)
+    assert found.flags == flag
+    assert found.determined[0, 0] == (flag == 0)
+    if flag == 16:  # nothing was learnt but the peak of mu_s, which has no sign
+        assert found.mu_c == pytest.approx(0.7, rel=0.2)
+
+
+@pytest.mark.parametrize("bias, flag", [((0.03, 0.03, 3e-4), 8), ((0.01, 0.01, 1e-4), 0)])
+def test_a_bias_that_no_empty_hand_showed_is_said(bias, flag):
+    found = reached(empty=False, bias=bias)
+    assert found.flags == flag
+    assert found.determined[0, 0] == (flag == 0)
+
+
+def test_a_wrench_beyond_all_friction_is_said_and_forgotten():
+    own, flags = observer(), []
+    for k in range(200):
+        load = 0.2 if 100 <= k < 150 else 4.0
+        flags.append(int(own.update(Measurement(1e-3 * k, (0.0, 1.0, 0.0), load, np.zeros(3))).flags))
+    assert set(flags[:100]) == set(flags[170:]) == {0}
+    assert set(flags[110:150]) == {32}  # |f|/f_N = 5
 
 
 NUMBERS = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-10.0, 10.0)

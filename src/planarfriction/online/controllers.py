@@ -14,6 +14,9 @@ from planarfriction.online.loops import grips
 from planarfriction.online.observer import Estimate, FrictionObserver, estimate_of
 from planarfriction.online.sensors import GRAVITY, Measurement
 
+_LEAST_MU = 3.0902
+"""Standard deviations by which mu_c is assumed to be smaller where it cannot be found: one part in a thousand slips."""
+
 trapezoid = functools.partial(grips.trapezoid.py_func, np)
 """Place, speed and acceleration at times [s] of a displacement whose ramps take a quarter each of the duration."""
 
@@ -28,8 +31,12 @@ class GripController:
     def __init__(self, observer: FrictionObserver, grip: Any, *settings: float, most: float) -> None:
         self.observer = validation.instance("observer", observer, FrictionObserver, "a FrictionObserver")
         self.state = np.full(observer.state.shape[:-1], np.array(grips.FRESH, grips.STATE))
-        least_load = observer._filter.least_load
-        self._grip, self._settings = grip, (least_load, validation.positive("most", most), *settings)
+        if grip is not grips.hold and not observer.sensors.slip_rate:
+            raise InvalidValueError("observer", "have a slip sensor to let parts slip", observer.sensors)
+        known = observer._filter
+        least_mu = math.exp(known.prior[0] - _LEAST_MU * known.prior_spread[0])
+        self._grip = grip
+        self._settings = known.least_load, validation.positive("most", most), least_mu, *settings
         self.state["grip"] = most
         self._found: Any = None
 
@@ -37,6 +44,11 @@ class GripController:
     def estimate(self) -> Estimate:
         """Estimate of the observer after the last sample."""
         return estimate_of(self._found)
+
+    @property
+    def blind(self) -> np.ndarray:
+        """True where a part began to fall and the slip sensor did not say so, bool `[...]`."""
+        return self.state["blind"] >= grips.LATE
 
     def update(self, measurement: Measurement) -> np.ndarray:
         """Take a sample of the sensors; return the grip force `[...]` [N].

@@ -19,8 +19,15 @@ from planarfriction.online.sensors import Measurement, Sensors
 PARAMETERS = ("mu_c", "mu_s", "radius")
 """Names of what is estimated beside the twist, in the order of `Estimate.determined` and `covariance`."""
 
-FLAGS = {1: "no wrench or load", 2: "time does not go on", 4: "sensor is saturated"}
-"""Meaning of the bits of `Estimate.flags`."""
+FLAGS = {
+    1: "no wrench or load",
+    2: "time does not go on",
+    4: "sensor is saturated",
+    8: "bias of the wrench is unknown: no sample of an empty hand agrees with it",
+    16: "friction drives the slip: the wrench or the slip velocity has the wrong sign",
+    32: "friction or radius are far from what was assumed: check the units of wrench and load",
+}
+"""Meaning of the bits of `Estimate.flags`; those from 8 on last as long as their cause, and nothing is determined."""
 
 _SEGMENTS = 20
 """Planes around the limit surface along a quadrant: they miss the gauge of a wrench by 0.2 % at most [-]."""
@@ -85,7 +92,11 @@ class FrictionObserver:
     of a slip are mu_s. Samples of an empty hand (a load below `least_load`) give the bias of the wrench. The
     probability of slip follows a hidden Markov chain. Without slip velocities nothing but that bound is learnt.
 
-    `information()` is that of the motion so far. `state` `[..., 185]` is all that changes: a copy of it is a
+    `flags` doubt what cannot be: friction that drives the slip, friction or a radius more than 4 standard deviations
+    from what was assumed, and a bias that no empty hand has shown, unless `bias` (standard deviations) is at most the
+    noise of the sensors. Nothing is determined then.
+
+    `information()` is that of the motion so far. `state` `[..., 187]` is all that changes: a copy of it is a
     checkpoint. With `batch`, the observer watches so many parts at once; measurements have that leading shape.
 
     Raises InvalidValueError for what is neither a model nor a limit surface, asymmetric friction, and values out of
@@ -120,29 +131,34 @@ class FrictionObserver:
         self.surface = validation.instance("surface", surface, LimitSurface, "a limit surface")
         if surface.patch.asymmetric:
             raise InvalidValueError("model", "have symmetric friction", "a patch with an asymmetry")
-        own: Any = Sensors() if sensors is None else validation.instance("sensors", sensors, Sensors, "Sensors")
+        self.sensors: Any = (
+            Sensors() if sensors is None else validation.instance("sensors", sensors, Sensors, "Sensors")
+        )
         refuse_fixed_stiffness(model.law, "FrictionObserver")
         self.tolerance = validation.positive("tolerance", tolerance)
+        spreads = {"mu_spread": mu_spread, "ratio_spread": ratio_spread, "radius_spread": radius_spread}
+        prior = np.array([validation.positive(name, value) for name, value in spreads.items()])
+        n, numbers = kernels.N, model.law.numbers
+        middle = np.log([numbers.mu_c, numbers.mu_s / numbers.mu_c, 1.0])
         self._filter = _settings(
             model,
             surface,
             load,
-            own,
+            self.sensors,
             validation.positive("model_error", model_error),
             validation.non_negative("drift", drift),
             validation.positive("saturation", saturation),
             validation.positive("least_load", least_load),
             (math.log1p(self.tolerance) / _TWO_SIDED) ** 2,
+            middle,
+            prior,
         )
-        spreads = {"mu_spread": mu_spread, "ratio_spread": ratio_spread, "radius_spread": radius_spread}
-        self._prior = np.array([validation.positive(name, value) for name, value in spreads.items()])
         unsure = np.abs(self._filter.conjugate) @ validation.non_negative_array("bias", bias, (3,))
         fresh = [kernels.FRESH] * 3
-        root = np.diag(np.concatenate([self._filter.remainder, fresh, self._prior, np.maximum(unsure, 1e-9)]))
-        n, numbers = kernels.N, model.law.numbers
+        root = np.diag(np.concatenate([self._filter.remainder, fresh, prior, np.maximum(unsure, 1e-9)]))
         self.state = state = np.zeros(validation.batched(batch, (kernels.STATE,)))
-        state[..., kernels.MU] = math.log(numbers.mu_c)
-        state[..., kernels.RATIO] = math.log(numbers.mu_s / numbers.mu_c)
+        state[..., kernels.MU : kernels.BIAS] = middle
+        state[..., kernels.TARED] = (unsure <= np.sqrt(self._filter.noise)).all()
         state[..., kernels.ROOT : kernels.ROOT + n * n] = root.ravel()
         state[..., kernels.SLIP], state[..., kernels.TIME] = 1e-3, -math.inf
         state[..., [kernels.BOUND, kernels.PEAK, kernels.GAUGE]] = -10.0
@@ -185,7 +201,7 @@ class FrictionObserver:
         root = self.state[..., kernels.ROOT : kernels.ROOT + n * n].reshape(*self.state.shape[:-1], n, n)[
             ..., kernels.MU : kernels.BIAS, :
         ]
-        return np.linalg.inv(root @ np.swapaxes(root, -1, -2)) - np.diag(1.0 / self._prior**2)
+        return np.linalg.inv(root @ np.swapaxes(root, -1, -2)) - np.diag(1.0 / self._filter.prior_spread**2)
 
 
 def estimate_of(found: np.ndarray) -> Estimate:
@@ -193,7 +209,7 @@ def estimate_of(found: np.ndarray) -> Estimate:
     return Estimate._make(found[name] for name in Estimate._fields)._replace(determined=found["determined"] > 0)
 
 
-def _settings(model: FrictionModel, surface: LimitSurface, load: float, sensors: Sensors, *rest: float) -> Any:
+def _settings(model: FrictionModel, surface: LimitSurface, load: float, sensors: Sensors, *rest: Any) -> Any:
     """Return what the filter reads and never changes; `rest` are its last fields."""
     kind, size, data = surface.numbers
     frame, numbers = surface._frame(), model.law.numbers

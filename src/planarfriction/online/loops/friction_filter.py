@@ -52,7 +52,11 @@ BACK = CHAIN + 1
 """Place of the number of samples in a row that were not later than one before."""
 LEVER = BACK + 1
 """Place of the share of the torque in the gauge of the wrench."""
-STATE = LEVER + 1
+DISSIPATED = LEVER + 1
+"""Place of the recent mean of the dissipated power over that of the force times the speed [-]."""
+TARED = DISSIPATED + 1
+"""Place of 1 once the bias is known: an empty hand showed it, or it is as small as the noise."""
+STATE = TARED + 1
 """Length of the state."""
 
 RESTART = 10.0
@@ -94,6 +98,15 @@ ESTIMATE = np.dtype(
 )
 """Estimate after a sample, and the sample as controllers read it: time step, grip force, wrench without its bias, and
 slip velocity."""
+
+NO_BIAS, NO_SIGN, NO_RANGE = 8, 16, 32
+"""Flags of numbers that nothing is determined by (see `update`)."""
+
+POWERS = 8.0
+"""Velocities over which the mean of the dissipated power is taken."""
+
+FAR = 4.0
+"""Standard deviations of what was assumed by which friction and radius may differ from it."""
 
 NEAR = 0.1
 """Share of more load at which a part that is about to slip does [-]."""
@@ -145,6 +158,10 @@ class Filter(NamedTuple):
     """Load [N] below which a contact says nothing of friction."""
     variance: float
     """Largest variance of the log of a number that is determined."""
+    prior: np.ndarray
+    """Assumed logs of mu_c, its ratio and the scale of the radius `[3]`."""
+    prior_spread: np.ndarray
+    """Their standard deviations `[3]`."""
 
 
 @kernel
@@ -204,7 +221,13 @@ def _learn(settings, s, h, column, jacobian):
     if count == 0.0:
         return
     load = s[OLD + 3] / count
-    before = s[SCALE]
+    before, power, force2, speed2 = s[SCALE], 0.0, 0.0, 0.0
+    for i in range(3):
+        w = load * s[OLD + i] / count - s[BIAS + i]
+        power, force2, speed2 = power + w * s[TWIST + i], force2 + w * w, speed2 + s[TWIST + i] * s[TWIST + i]
+    s[DISSIPATED] += (power / math.sqrt(max(force2 * speed2, 1e-300)) - s[DISSIPATED]) / POWERS
+    if s[DISSIPATED] < 0.0:
+        return  # friction that drives teaches nothing
     for row in range(3):
         mu, ratio, scale = math.exp(s[MU]), math.exp(s[RATIO]), _scale(settings, s, load)
         x, y, z = s[TWIST], s[TWIST + 1], scale * s[TWIST + 2]
@@ -260,6 +283,7 @@ def _see(settings, s, v, h, column, jacobian):
 @kernel
 def _tare(settings, s, wrench, load, h, column):
     """Learn the bias from a wrench of an empty hand, if it may be one."""
+    taken = 0.0
     for i in range(3):
         w = -s[BIAS + i]
         for j in range(3):
@@ -270,6 +294,9 @@ def _tare(settings, s, wrench, load, h, column):
             for k in range(N):
                 h[k] = 1.0 if k == BIAS + i else 0.0
             _measure(s, h, w, variance, column)
+            taken += 1.0
+    if taken == 3.0:
+        s[TARED] = 1.0
 
 
 @kernel
@@ -285,6 +312,17 @@ def _judge(settings, s, load, dt, best):
     against = math.exp(-0.5 * min(inside * inside, 50.0) * dt / MEMORY)
     s[SLIP] = p * against / (p * against + 1.0 - p)
     s[GAUGE] = level
+
+
+@kernel
+def _doubt(settings, s):
+    """Return the sum of the flags of numbers that contradict what was assumed."""
+    flags = (0 if s[TARED] > 0.0 else NO_BIAS) + (NO_SIGN if s[DISSIPATED] < 0.0 else 0)
+    reach = FAR * math.hypot(settings.prior_spread[0], settings.prior_spread[1])
+    far = s[GAUGE] > settings.prior[0] + settings.prior[1] + reach
+    for i in range(3):
+        far = far or abs(s[MU + i] - settings.prior[i]) > FAR * settings.prior_spread[i]
+    return flags + (NO_RANGE if far else 0)
 
 
 @kernel
@@ -306,7 +344,7 @@ def _estimate(settings, s, e):
                 total += a * b
             floor = settings.model_error * settings.model_error * (0.5 if i == 0 else 1.0) * (0.5 if k == 0 else 1.0)
             e.covariance[i, k] = total + (floor if (i < 2) == (k < 2) else 0.0)
-        e.determined[i] = 1 if e.covariance[i, i] <= settings.variance else 0
+        e.determined[i] = 1 if e.covariance[i, i] <= settings.variance and e.flags < NO_BIAS else 0
     sd = math.sqrt(e.covariance[1, 1] + SEEN_ERROR * SEEN_ERROR)
     e.slip, e.about_to_slip = s[SLIP], (1.0 - s[SLIP]) * _normal((s[GAUGE] + NEAR - log_s) / sd)
     e.margin = 1.0 - math.exp(min(s[GAUGE] - log_s, 50.0))
@@ -318,7 +356,8 @@ def update(settings, states, samples, found):
     """Update states `[P, STATE]` with a sample each; `found [P]` of dtype `ESTIMATE` gets what is known.
 
     Samples `[P, 8]` are time, wrench, load and slip velocity; NaN is none. `flags` is the sum of what was odd: 1 no or
-    bad wrench or load, 2 time that does not go on, 4 saturated sensor.
+    bad wrench or load, 2 time that does not go on, 4 saturated sensor, 8 unknown bias, 16 friction that drives the slip
+    (a sign), 32 friction or radius far from what was assumed (a unit).
     """
     h, column, jacobian, best, v = np.empty(N), np.empty(N), np.empty(9), np.empty(3), np.empty(3)
     for p in range(states.shape[0]):
@@ -371,7 +410,7 @@ def update(settings, states, samples, found):
                 h[i] = 1.0 if i in (MU, RATIO) else 0.0
             h[SCALE] = s[LEVER]
             _measure(s, h, s[PEAK] - s[MU] - s[RATIO], PEAK_ERROR * PEAK_ERROR, column)
-        e.flags, e.dt, e.normal_force = flags, dt, load
+        e.flags, e.dt, e.normal_force = flags + _doubt(settings, s), dt, load
         for i in range(3):
             e.wrench[i], e.velocity[i] = wrench[i], velocity[i]
         _estimate(settings, s, e)

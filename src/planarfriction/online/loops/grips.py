@@ -9,20 +9,28 @@ import numpy as np
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
 from planarfriction.formulas import LARGEST
+from planarfriction.online.loops.friction_filter import NO_SIGN
+
+EARLY = 32
+"""Number of samples whose medians are the first grip and the load: the last ones before the filters have settled."""
 
 STATE = np.dtype(
     [
         *((name, float) for name in ("age", "span", "since", "start", "load", "grip")),
         *((name, float, 3) for name in ("slid", "velocity")),
         *((name, float) for name in ("found", "goal", "began", "balance", "caught", "eased", "force", "torque")),
+        *((name, float) for name in ("blind", "weight", "lately", "count")),
+        *((name, float, EARLY) for name in ("forces", "loads")),
     ]
 )
 """State of a part in any controller: times since the first sample, since a slip velocity and since it slipped [s], grip
 from which it falls, largest holding load of late at mu = 1 and grip [N], displacement and velocity; then of some
 controllers: 1 once friction is found, goal, time since the slip began [s], the grip that balances the load [N], 1 once
-caught, share of the grip that is left, and filtered force and torque."""
+caught, share of the grip that is left, and filtered force and torque; of all: time for which the part falls while the
+slip sensor does not say so [s], largest holding load before that, filtered holding load, and number, grips and holding
+loads of the first samples."""
 
-FRESH = (-math.inf, -math.inf, 0.0, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -math.inf, 0.0, 0.0, 1.0, 0.0, 0.0)
+FRESH = (-math.inf, -math.inf, 0.0, math.inf, *[0.0] * 6, -math.inf, 0.0, 0.0, 1.0, *[0.0] * 6, math.inf, math.inf)
 """State before the first sample; what has not begun is infinitely far."""
 
 LOAD_TIME = 0.3
@@ -32,7 +40,15 @@ SETTLED = 0.03
 """Time after which the load of a part is known [s]."""
 
 PAUSE = 0.1
-"""Longest time between samples that grips and loads go on by [s]."""
+"""Longest time between samples that grips and loads go on by, and between slip velocities while a part is let slip [s].
+"""
+
+LOST, LATE = 0.08, 0.02
+"""Share of its load that a part loses while the grip is lowered only if it falls [-], and the time of its filter, after
+which a slip sensor that works has said so [s]."""
+
+UNSURE = 1.2
+"""Grip of a part whose friction cannot be found, over the one that its load needs at the least friction [-]."""
 
 RELEASE = 1.0
 """Rate at which a grip falls until the part slips [1/s]."""
@@ -76,6 +92,18 @@ def trapezoid(xp, time, size, duration):
 
 
 @kernel
+def _median(row, count):
+    """Return the median of the `count` numbers of a row, the larger of two; its other places are infinite."""
+    middle = 0.0
+    for i in range(EARLY):
+        rank = 0
+        for j in range(EARLY):
+            rank += 1 if row[j] < row[i] or (row[j] == row[i] and j < i) else 0
+        middle = row[i] if 2 * rank <= count < 2 * rank + 2 else middle
+    return middle
+
+
+@kernel
 def _follow(c, e, least_load):
     """Take in what an observer found; return the grip at mu = 1 that holds the present load, and the time step."""
     if c.age < 0.0 and e.normal_force <= least_load:
@@ -91,28 +119,44 @@ def _follow(c, e, least_load):
             c.slid[i] += v[i] * c.span if c.span >= 0.0 else 0.0
             c.velocity[i] = v[i]
         c.span = 0.0
+    if c.age < SETTLED and xp.in_range(force):  # one wrong sample is not the grip, nor the load
+        for i in range(EARLY - 1):
+            c.forces[i], c.loads[i] = c.forces[i + 1], c.loads[i + 1]
+        c.forces[EARLY - 1], c.loads[EARLY - 1] = force, needed
+        c.count = min(c.count + 1.0, float(EARLY))
+        c.grip, c.load = _median(c.forces, c.count), _median(c.loads, c.count)
+        c.weight, c.lately = c.load, c.load
+    if needed > 0.0:
+        c.lately += min(dt / LATE, 1.0) * (min(needed, 1.5 * c.lately) - c.lately)
     return needed, dt
 
 
 @kernel
+def _unsure(c, e, dt, seeks):
+    """Return True if friction cannot be found: it contradicts itself, no slip velocity comes, or it stays at 0."""
+    if seeks and c.age >= SETTLED and c.blind < LATE:
+        c.weight = max(c.weight, c.lately)
+        c.blind = c.blind + dt if e.slip <= 0.5 and c.lately < (1.0 - LOST) * c.weight else 0.0
+    return c.blind >= LATE or e.flags >= NO_SIGN or max(c.span, c.age if c.span < 0.0 else 0.0) >= PAUSE
+
+
+@kernel
 def _begin(c, value, most):
-    """Return the grip from which it first falls: the `value` once the filters have settled."""
-    if c.start > LARGEST and c.age >= SETTLED:
+    """Return the grip from which it first falls: the last `value` before the filters have settled."""
+    if c.start > LARGEST or c.age < SETTLED:
         c.start = value
     return min(c.start, most)
 
 
 @kernel
-def _set(c, e, asked, most):
-    """Set the grip that is asked for; before the filters have settled, leave it as it is."""
-    if c.age >= SETTLED:
-        c.grip = min(max(asked, 0.0), most)
-    elif xp.in_range(e.normal_force):
-        c.grip = min(max(e.normal_force, 0.0), most)
+def _set(c, asked, most):
+    """Set the grip that is asked for; before the filters have settled and a slip velocity may have come, leave it."""
+    ready = c.age >= SETTLED and (c.span >= 0.0 or c.age >= PAUSE)
+    c.grip = min(max(asked if ready else c.grip, 0.0), most)
 
 
 @jit
-def hold(states, found, least_load, most, z, reserve, gain, explore):
+def hold(states, found, least_load, most, least_mu, z, reserve, gain, explore):
     """Set the grips of `Hold` in states `[P]` from what an observer found `[P]`; `z` is the quantile of mu_c."""
     for p in range(states.shape[0]):
         c, e = states[p], found[p]
@@ -121,6 +165,7 @@ def hold(states, found, least_load, most, z, reserve, gain, explore):
         path = math.hypot(slid[0], slid[1]) + e.radius * abs(slid[2])
         if slips and c.age >= SETTLED and (e.determined[0] > 0 or path >= explore):
             c.found = 1.0
+        unsure = _unsure(c, e, dt, c.found == 0.0)
         low = e.mu_c * math.exp(-z * math.sqrt(e.covariance[0, 0]))
         speed = math.hypot(v[0], v[1]) + e.radius * abs(v[2]) if slips else 0.0
         held = reserve * c.load / low + gain * speed
@@ -129,11 +174,13 @@ def hold(states, found, least_load, most, z, reserve, gain, explore):
             held = min(start, c.grip if slips else c.grip * math.exp(-RELEASE * dt))
         elif slips:
             held = max(held, start)  # as if nothing were known, until it sticks
-        _set(c, e, held, most)
+        if unsure and (c.found == 0.0 or e.flags >= NO_SIGN):
+            held = UNSURE * max(c.load, c.weight) / least_mu
+        _set(c, held, most)
 
 
 @jit
-def slip(states, found, least_load, most, axis, tolerance, duration, acceleration, adapt, delay):
+def slip(states, found, least_load, most, least_mu, axis, tolerance, duration, acceleration, adapt, delay):
     """Set the grips of `SlideBy` (axis 1) and `TurnBy` (axis 2) in states `[P]` from what an observer found `[P]`."""
     for p in range(states.shape[0]):
         c, e = states[p], found[p]
@@ -144,7 +191,7 @@ def slip(states, found, least_load, most, axis, tolerance, duration, acceleratio
         c.began += dt
         if slips and c.began < 0.0 and c.age >= SETTLED:
             c.began, c.balance = 0.0, 1.05 * needed / max(e.gauge, 1e-9)
-        balance = c.balance
+        balance, unsure = c.balance, _unsure(c, e, dt, c.began < 0.0)
         time = c.began + delay if c.began >= 0.0 else 0.0
         place, speed, push = trapezoid(xp, time, goal, duration)
         there = x + v * delay
@@ -167,11 +214,13 @@ def slip(states, found, least_load, most, axis, tolerance, duration, acceleratio
             asked = min(start, c.grip) * math.exp(-RELEASE * dt)
         else:
             asked = balance * (1.0 - lead) * math.exp(-STUCK * max(c.since - STICKS, 0.0))
-        _set(c, e, asked, most)
+        if unsure and c.caught == 0.0:
+            asked = UNSURE * max(c.load, c.weight) / least_mu
+        _set(c, asked, most)
 
 
 @jit
-def hinge(states, found, least_load, most, reserve, gain):
+def hinge(states, found, least_load, most, least_mu, reserve, gain):
     """Set the grips of `Hinge` in states `[P]` from what an observer found `[P]`."""
     for p in range(states.shape[0]):
         c, e = states[p], found[p]
@@ -192,4 +241,7 @@ def hinge(states, found, least_load, most, reserve, gain):
         start = _begin(c, 2.5 * c.load / e.mu_c, most)
         speed = math.hypot(v[0], v[1]) if slips else 0.0
         carried = reserve * c.eased * c.force / e.mu_c + gain * speed
-        _set(c, e, carried if c.found > 0.0 else min(start, c.grip * math.exp(-RELEASE * dt)), most)
+        asked = carried if c.found > 0.0 else min(start, c.grip * math.exp(-RELEASE * dt))
+        if _unsure(c, e, dt, c.found == 0.0):
+            asked = UNSURE * max(c.load, c.weight) / least_mu
+        _set(c, asked, most)
