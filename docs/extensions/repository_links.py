@@ -1,4 +1,4 @@
-"""Pages as plain Markdown, dressed up: links into the repository lead to pages, lists become cards, terms and contents."""
+"""Pages are plain Markdown; here their links into the repository and their lists get words of Sphinx."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ DRESSED = {
     r"\[([^\]]+)\]\(\.\./src/planarfriction\)": r"{doc}`\1 <api/index>`",
     r"<!-- cards -->": "{.cards}",
     r"<!-- cards pictures -->": "{.cards .pictures}",
-    r"<!-- commands -->": "```{eval-rst}\n.. click:: planarfriction.cli.app:app\n   :prog: planarfriction\n   :nested: full\n```",
+    r"<!-- commands -->": "```{eval-rst}\n.. click:: planarfriction.cli.app:app\n"
+    "   :prog: planarfriction\n   :nested: full\n```",
 }
 """Plain Markdown -> words of Sphinx."""
 
