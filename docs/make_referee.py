@@ -18,7 +18,7 @@ from planarfriction_studies.referee.report import shown, table
 from planarfriction_studies.referee.run import Verdict
 
 DOCS = Path(__file__).parent
-KEPT, PAGES = DOCS / "referee.json", [DOCS.parent / "README.md", DOCS / "referee.md"]
+KEPT, PAGES = DOCS / "referee.json", [DOCS.parent / "README.md", DOCS / "index.md", DOCS / "referee.md"]
 MARK = re.compile(r"<!-- referee: (?P<name>[\w ]+) -->\n\n(?:(?:(?:\||Run on |Not in ).*\n)+\n)?")
 
 MISSING = "Not in this run.\n"
@@ -30,7 +30,7 @@ ROWS = {
     "anisotropic": ("path of a [box on grooves](docs/referee.md)", " mm", 1),
     "torsion": ("time at which a [twisted block starts to turn](docs/referee.md) between pads", " ms", 0),
 }
-"""Case -> its row of README, the unit of the row, and digits behind the point."""
+"""Case -> its row of README and first page, the unit of the row, and digits behind the point."""
 
 SCALES = {"°": math.degrees(1.0), " mm": 1e3, " ms": 1e3}
 """Unit of a row -> its factor to rad, m or s."""
@@ -100,8 +100,10 @@ def filled(page: str, stored: dict[str, Any]) -> str:
     verdicts = {(row["case"], row["engine"]): Verdict(**row) for row in stored["verdicts"]}
     for case, (words, unit, digits) in ROWS.items():
         values = (SCALES[unit] * (verdicts[case, engine].error or 0.0) for engine in IN_README)
-        row = f"| {words} | {' | '.join(f'{value:.{digits}f}{unit}' for value in values)} |"
-        page = re.sub(rf"^\| {re.escape(words)} \|.*$", lambda _, row=row: row, page, flags=re.MULTILINE)
+        cells = " | ".join(f"{value:.{digits}f}{unit}" for value in values)
+        for begin in (f"| {words} |", f"| {words.replace('docs/', '')} |"):
+            row = f"{begin} {cells} |"
+            page = re.sub(rf"^{re.escape(begin)}.*$", lambda _, row=row: row, page, flags=re.MULTILINE)
     return MARK.sub(lambda match: f"<!-- referee: {match['name']} -->\n\n{found.get(match['name'], MISSING)}\n", page)
 
 

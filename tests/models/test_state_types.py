@@ -84,7 +84,7 @@ def calls(model):
 
 
 def roll_outs(model):
-    """The same of roll-outs, with twists `[T, 3]`."""
+    """The same of rollouts, with twists `[T, 3]`."""
     yield lambda state, twist: derivatives.rollout(model, state, twist, LOAD, DT)
     if model is MODELS["reduced"] or model is MODELS["published"]:
         yield lambda state, twist: derivatives.rollout_states(model, state, twist, LOAD, DT)
