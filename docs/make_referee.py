@@ -75,7 +75,7 @@ def brief(settings: str) -> str:
     """Return the settings of an engine without the parts that the page says once for all of them."""
     for part in SAID_ONCE:
         settings = settings.replace(part, "")
-    return settings
+    return settings.replace("as it comes", "default")
 
 
 def errors(verdicts: Sequence[Verdict]) -> list[list[str]]:
