@@ -105,7 +105,7 @@ def words_of(name: str, value: Any) -> list[str]:
 
 def first_sentence(value: Any) -> str:
     text = " ".join((inspect.getdoc(value) or "").split("\n\n")[0].split())
-    return re.split(r"(?<=[.:])\s", text)[0].rstrip(":.")
+    return re.split(r"(?<=\.)\s", text)[0].rstrip(".")
 
 
 def page(name: str, documented: dict[int, str]) -> list[str]:
