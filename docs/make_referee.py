@@ -6,6 +6,7 @@ FOLDER is that of `planarfriction referee --out`; without it, the tables are mad
 from __future__ import annotations
 
 import json
+import math
 import re
 import sys
 from collections.abc import Sequence
@@ -17,17 +18,22 @@ from planarfriction_studies.referee.report import shown, table
 from planarfriction_studies.referee.run import Verdict
 
 DOCS = Path(__file__).parent
-KEPT, PAGES = DOCS / "referee.json", [DOCS.parent / "README.md", DOCS / "referee.md"]
+KEPT, PAGES = DOCS / "referee.json", [DOCS.parent / "README.md", DOCS / "index.md", DOCS / "referee.md"]
 MARK = re.compile(r"<!-- referee: (?P<name>[\w ]+) -->\n\n(?:(?:(?:\||Run on |Not in ).*\n)+\n)?")
 
 MISSING = "Not in this run.\n"
 
 ROWS = {
-    "off_centre": "Creep of a [block held off-centre](docs/referee.md) by two box pads",
-    "disc": "Largest error in where [discs that slide and spin](docs/referee.md) come to rest",
-    "in_hand": "Largest error in where a [plate that slips 23 mm in the hand](docs/referee.md) ends",
+    "in_hand": ("turn of a [plate that slips 23 mm in a gripper](docs/referee.md)", "°", 1),
+    "disc": ("turn of [discs that slide and spin to rest](docs/referee.md)", "°", 1),
+    "push": ("turn of a [box pushed beside its middle](docs/referee.md)", "°", 1),
+    "anisotropic": ("path of a [box on grooves](docs/referee.md)", " mm", 1),
+    "torsion": ("time at which a [twisted block starts to turn](docs/referee.md) between pads", " ms", 0),
 }
-"""Case -> its row of README."""
+"""Case -> its row of README and first page, the unit of the row, and digits behind the point."""
+
+SCALES = {"°": math.degrees(1.0), " mm": 1e3, " ms": 1e3}
+"""Unit of a row -> its factor to rad, m or s."""
 
 COUNTS = {"ok": "ok", "step [µs]": "median step [µs]"}
 """Heading in the table of engines -> row of the referee's table."""
@@ -44,8 +50,8 @@ SHOWN = (
 )
 """Engines in the table of cases: as they come, at the settings that pass the most cases, and with patches."""
 
-OWN, PATCHES = ("MuJoCo", "MuJoCo, stiff"), "MuJoCo, patches"
-"""Engines of these rows: as it comes, at the settings that pass the most cases, and with patches."""
+IN_README = ("MuJoCo", "MuJoCo, stiff", "MuJoCo, patches")
+"""Engines of these rows: with default settings, with those that pass the most cases, and with patches."""
 
 
 def tables(stored: dict[str, Any]) -> dict[str, str]:
@@ -69,7 +75,7 @@ def brief(settings: str) -> str:
     """Return the settings of an engine without the parts that the page says once for all of them."""
     for part in SAID_ONCE:
         settings = settings.replace(part, "")
-    return settings
+    return settings.replace("as it comes", "default")
 
 
 def errors(verdicts: Sequence[Verdict]) -> list[list[str]]:
@@ -92,10 +98,12 @@ def filled(page: str, stored: dict[str, Any]) -> str:
     """Return the page with the tables and the rows of a stored run."""
     found = tables(stored)
     verdicts = {(row["case"], row["engine"]): Verdict(**row) for row in stored["verdicts"]}
-    for case, words in ROWS.items():
-        own = "; ".join(f"{shown(verdicts[case, engine])} ({engine})" for engine in OWN)
-        row = f"| {words} | {own} | {shown(verdicts[case, PATCHES])} |"
-        page = re.sub(rf"^\| {re.escape(words)} \|.*$", lambda _, row=row: row, page, flags=re.MULTILINE)
+    for case, (words, unit, digits) in ROWS.items():
+        values = (SCALES[unit] * (verdicts[case, engine].error or 0.0) for engine in IN_README)
+        cells = " | ".join(f"{value:.{digits}f}{unit}" for value in values)
+        for begin in (f"| {words} |", f"| {words.replace('docs/', '')} |"):
+            row = f"{begin} {cells} |"
+            page = re.sub(rf"^{re.escape(begin)}.*$", lambda _, row=row: row, page, flags=re.MULTILINE)
     return MARK.sub(lambda match: f"<!-- referee: {match['name']} -->\n\n{found.get(match['name'], MISSING)}\n", page)
 
 

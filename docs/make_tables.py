@@ -3,8 +3,8 @@
 A place is the folder of `planarfriction reproduce`, or a file that holds what `planarfriction bench --json` printed. A
 table stands below a line `<!-- table: TITLE -->`, named as in the report or here; what an experiment found stands below
 `<!-- verdict: EXPERIMENT -->`. A table below `<!-- table: TITLE; selection -->` keeps the rows and columns that the
-page shows. README's row about speed is that of the benchmark. What the places do not have stays as it is. So do
-pictures, but for those of `docs/images` that the reports have drawn.
+page shows. What the places do not have stays as it is. So do pictures, but for those of `docs/images` that the reports
+have drawn.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from PIL import Image
 
 MARK = re.compile(r"<!-- table: (?P<title>.+?)(?P<selection>; selection)? -->\n\n(?:(?:\|.*\n)+\n)?")
 VERDICT = re.compile(r"<!-- verdict: (?P<name>.+?) -->\n\n(?:(?:[^\n#<!].*\n)+\n)?")
-SPEED = re.compile(r"^(?P<what>\| .*\(docs/benchmarks\.md\).* \|) .+ \| .+ \|$", re.MULTILINE)
 
 SHRUNK = 0.6
 """Pictures of the pages over those of the reports, whose dots are finer."""
@@ -128,15 +127,6 @@ def costs(lines: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {"Cost": {"headings": headings, "rows": rows}} if rows else {}
 
 
-def with_speed(readme: str, lines: Sequence[Mapping[str, Any]]) -> str:
-    """README with its row about the gradient of a rollout."""
-    found = [line for line in lines if line["name"] == "gradient.published" and "PyTorch" in line["baseline"]]
-    if not found:
-        return readme
-    theirs, ours = (shown(found[0][key], found[0]["unit"]) for key in ("baseline_value", "value"))
-    return SPEED.sub(lambda row: f"{row['what']} {theirs} (PyTorch, eager) | {ours} |", readme)
-
-
 def main(places: Sequence[Path]) -> None:
     """Rewrite every page that shows what the places hold, and say which."""
     folders = [place for place in places if place.is_dir()]
@@ -147,10 +137,9 @@ def main(places: Sequence[Path]) -> None:
     tables = {table["title"]: table for record in records for table in record["tables"]} | costs(lines)
     verdicts = {record["name"]: record["verdict"] for record in records if record["verdict"]}
     docs = Path(__file__).parent
-    for path in (docs.parent / "README.md", *sorted(docs.glob("*.md"))):
+    for path in sorted(docs.glob("*.md")):
         before = path.read_text(encoding="utf-8")
         after = with_verdicts(with_tables(before, tables), verdicts)
-        after = with_speed(after, lines) if path.name == "README.md" else after
         if after != before:
             path.write_text(after, encoding="utf-8")
             print(f"{path.name}: new numbers")

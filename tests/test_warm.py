@@ -122,7 +122,7 @@ def test_the_first_simulation_says_that_it_compiles(compiled_anew, monkeypatch, 
     assert len(said) == lines and all("compiles its solver, once after installation" in line for line in said)
 
 
-def test_roll_outs_say_that_they_compile(monkeypatch):
+def test_rollouts_say_that_they_compile(monkeypatch):
     monkeypatch.setattr(notice._Said, "done", False)
     monkeypatch.setattr(sys, "stderr", Terminal())
     model = pf.ReducedModelPublished(pf.ContactPatch.disc(radius=0.01, cells=5), pf.LuGre())

@@ -1,4 +1,4 @@
-"""One page of reference for every public module, written from `__all__`: what is made public appears by itself.
+"""A page of reference for every subject and every public module, from `__all__`: what is made public appears by itself.
 
 Also a page with the compiled loops that the pages of the documentation name, so that these names are links.
 """
@@ -26,6 +26,40 @@ OPTIONAL = ("torch", "jax", "warp", "adapters.mujoco", "adapters.mjx", "adapters
 
 COMPILED = ("compiler", "kernels", "limit_surface.loops")
 """Packages of compiled code that the pages name."""
+
+SUBJECTS = {
+    "Describe": (
+        "A contact is a patch, a friction law, and a model of both.",
+        "patch = pf.ContactPatch.disc(radius=0.01)\nmodel = pf.ReducedModel(patch, pf.LuGre(mu_c=0.8, mu_s=1.0))",
+        ("patch", "laws", "limit_surface", "models", "formulas", "families", "geometry", "errors"),
+    ),
+    "Simulate": (
+        "A scene is a body with contacts; a solution has its motion.",
+        "solution = pf.simulate(pf.scenes.in_hand(model))\nsolution.plot()",
+        ("scenes", "solvers", "sweeps", "plots", "warm"),
+    ),
+    "Embed": (
+        "Friction inside other simulators, in loops of your own, or in C.",
+        "state, wrench = model.step(model.rest(), (0.01, 0.0, 1.0), normal_force=2.0, dt=1e-3)",
+        ("coupling", "environments", "export", "adapters", "warp"),
+    ),
+    "Learn": (
+        "Rollouts and scenes have exact derivatives, in NumPy, PyTorch and JAX.",
+        "wrenches = pf.rollout(model, None, twists, normal_force=2.0, dt=1e-3).wrenches",
+        ("derivatives", "torch", "jax"),
+    ),
+    "Measure": (
+        "Logs of motion and force give the parameters of a contact.",
+        'found = pf.identify.identify_lugre(pf.Log.from_csv("log.csv"), patch)',
+        ("identify",),
+    ),
+    "Plan": (
+        "Grips that hold, turn or slide a part, pushes, and controllers that do not know the friction.",
+        "force = pf.planning.holding_load((0.0, -1.0, 0.0), patch, mu=0.8)",
+        ("planning", "online"),
+    ),
+}
+"""Subject -> a sentence, an example, and the modules and packages that belong to it."""
 
 NAMED = re.compile(rf"(?<![\w.])(?:{'|'.join(COMPILED)})(?:\.\w+){{1,2}}")
 
@@ -71,7 +105,7 @@ def words_of(name: str, value: Any) -> list[str]:
 
 def first_sentence(value: Any) -> str:
     text = " ".join((inspect.getdoc(value) or "").split("\n\n")[0].split())
-    return re.split(r"(?<=[.:])\s", text)[0].rstrip(":.")
+    return re.split(r"(?<=\.)\s", text)[0].rstrip(".")
 
 
 def page(name: str, documented: dict[int, str]) -> list[str]:
@@ -88,6 +122,23 @@ def page(name: str, documented: dict[int, str]) -> list[str]:
             elsewhere.append(f"- `{known}`")
     if elsewhere:
         lines += ["Also here, and documented elsewhere:", "", *elsewhere, ""]
+    return lines
+
+
+def subject_page(subject: str, rows: list[tuple[str, str]], documented: dict[int, str]) -> list[str]:
+    """Return a subject's page: its sentence, example and modules, and the names that `planarfriction` has of them."""
+    sentence, example, modules = SUBJECTS[subject]
+    lines = [*heading(subject), sentence, "", ".. code-block:: python", ""]
+    lines += [*(f"   {line}" for line in example.splitlines()), "", ".. list-table::", "   :widths: 25 75", ""]
+    rows = [row for row in rows if row[0].split(".")[0] in modules]
+    for file, words in rows:
+        lines += [f"   * - :doc:`{file}`", f"     - {words}"]
+    lines += ["", ".. toctree::", "   :hidden:", "", *(f"   {file}" for file, _ in rows), ""]
+    for name in public_names(planarfriction):
+        value = getattr(planarfriction, name)
+        if not isinstance(value, str) and value.__module__.split(".")[1] in modules:
+            documented[id(value)] = f"planarfriction.{name}"
+            lines += entry(f"planarfriction.{name}", value)
     return lines
 
 
@@ -132,33 +183,31 @@ def generate(app: Sphinx) -> None:
     folder.mkdir(exist_ok=True)
     documented: dict[int, str] = {}
     missing = tuple(app.config.autodoc_mock_imports)
-    written = {"index.rst", "kernels.rst"}
-    rows = []
-    for name in public_modules():
+    public = [name.removeprefix("planarfriction.") for name in public_modules()[1:]]
+    for subject in SUBJECTS:  # first, so that other pages only name what these document
+        subject_page(subject, [], documented)
+    pages, rows = {}, []
+    for file in public:
+        name = f"planarfriction.{file}"
         try:
-            lines = page(name, documented)
+            pages[file] = page(name, documented)
         except ImportError as error:
             if not missing:
                 raise error
             continue
-        file = name.replace("planarfriction.", "") if name != "planarfriction" else "planarfriction"
-        write(folder / f"{file}.rst", lines)
-        written.add(f"{file}.rst")
         rows.append((file, first_sentence(importlib.import_module(name))))
-    write(folder / "kernels.rst", kernels_page(Path(app.srcdir)))
-    index = [
-        *heading("Python"),
-        "Every public name, from its docstring.",
-        "",
-        ".. list-table::",
-        "   :widths: 25 75",
-        "",
-    ]
-    for file, words in rows:
-        index += [f"   * - :doc:`{file}`", f"     - {words}"]
-    index += ["   * - :doc:`kernels`", "     - Compiled loops that these pages name", ""]
-    index += [".. toctree::", "   :hidden:", "", *(f"   {file}" for file, _ in rows), "   kernels"]
-    write(folder / "index.rst", index)
+    lines = [*heading("Python"), "Every public name, from its docstring, by subject.", ""]
+    for subject, (sentence, *_) in SUBJECTS.items():
+        pages[subject.lower()] = subject_page(subject, rows, documented)
+        lines += [f"- :doc:`{subject.lower()}`: {sentence}"]
+    lines += ["- :doc:`kernels`: compiled loops that these pages name.", ""]
+    lines += [".. automodule:: planarfriction", "   :no-members:", ""]
+    subjects = [subject.lower() for subject in SUBJECTS]
+    lines += [".. toctree::", "   :hidden:", "", *(f"   {file}" for file in (*subjects, "kernels"))]
+    pages |= {"kernels": kernels_page(Path(app.srcdir)), "index": lines}
+    for file, lines in pages.items():
+        write(folder / f"{file}.rst", lines)
+    written = {f"{file}.rst" for file in pages}
     for old in {path.name for path in folder.glob("*.rst")} - written:
         (folder / old).unlink()
 

@@ -79,7 +79,7 @@ def _parts() -> list[Part]:
     grooved = models.DistributedModel(patch.with_friction_metric(friction_metric(0.0, along=1.0, across=0.8)), law)
     return [
         *_of(cells, "distributed", *_WORK),
-        *_of(grooved, "friction with a grain", "scenes", "roll-outs"),
+        *_of(grooved, "anisotropic", "scenes", "rollouts"),
         *_of(reduced, "reduced", "scenes", "steps", "derivatives of scenes"),
         Part("coupled patches", functools.partial(_couple, [cells, reduced, published, grooved])),
         *([Part("steps inside MuJoCo", _host)] if find_spec("mujoco") else []),
@@ -146,5 +146,5 @@ def _surfaces(patch: ContactPatch) -> None:
         surface.twist(surface.wrench((0.01, 0.0, 1.0)))
 
 
-_WORK = {"scenes": _simulate, "steps": _step, "roll-outs": _roll, "derivatives of scenes": _derive}
+_WORK = {"scenes": _simulate, "steps": _step, "rollouts": _roll, "derivatives of scenes": _derive}
 """Kinds of work with a model."""

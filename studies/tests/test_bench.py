@@ -41,16 +41,11 @@ def test_the_page_of_costs_names_benchmarks_that_there_are(pages):
     assert set(pages["COST"]) <= set(bench.BENCHMARKS)
 
 
-def test_costs_become_a_table_and_readme_has_its_row_of_them(pages):
+def test_costs_become_a_table(pages):
     missing = {"name": "import", "value": None, "unit": "", "baseline": "left out", "baseline_value": None}
     page = pages["with_tables"]("<!-- table: Cost -->\n\n| old |\n\nNext.\n", pages["costs"]([LINE, missing]))
     assert "| 93 ms | 0.67 s: LSODA over the first 0.1 s | 130 | `in_hand.distributed` |\n\nNext." in page
     assert "old" not in page and "import" not in page
-    row = "| [gradient](docs/benchmarks.md) | 1 s (PyTorch, eager) | 2 ms |\n"
-    line = LINE | {"name": "gradient.published", "baseline": "PyTorch, eager, the same rollout"}
-    assert pages["with_speed"](row, [line]) == "| [gradient](docs/benchmarks.md) | 0.67 s (PyTorch, eager) | 93 ms |\n"
-    assert pages["with_speed"](row, [LINE]) == row
-    assert pages["with_speed"]((DOCS.parent / "README.md").read_text("utf-8"), [line]).count("| 93 ms |") == 1
 
 
 def test_a_selection_of_a_table_keeps_its_rows_and_columns(pages):

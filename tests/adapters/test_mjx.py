@@ -83,7 +83,7 @@ def test_patches_that_follow_their_contact_do_so_as_in_mujoco():
 
 
 def rolled(friction, m, data, steps: int):
-    """Roll-outs of all `data` side by side: the last data, and positions `[steps + 1, E, nq]`."""
+    """Rollouts of all `data` side by side: the last data, and positions `[steps + 1, E, nq]`."""
     batch = jax.tree.map(lambda *each: jnp.stack(each), *(mjx.put_data(m, d) for d in data))
     step, mx = jax.jit(jax.vmap(friction.step, (None, 0))), mjx.put_model(m)
     path = [np.asarray(batch.qpos)]

@@ -1,4 +1,4 @@
-"""Patch friction inside MuJoCo: steps, callbacks and roll-outs that agree, whatever else is in the model."""
+"""Patch friction inside MuJoCo: steps, callbacks and rollouts that agree, whatever else is in the model."""
 
 from __future__ import annotations
 

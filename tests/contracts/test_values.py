@@ -102,7 +102,7 @@ MAKERS = {
     ),
     "published shape": lambda: MODELS["ReducedModelPublished of a finger"]().shape_at(1.0),
     "surface numbers": lambda: SURFACES["LimitSurfaceTable"]().numbers,
-    "roll-out": lambda: pf.rollout(MODELS["DistributedModel of a square"](), None, np.ones((5, 3)), 1.0, 1e-3),
+    "rollout": lambda: pf.rollout(MODELS["DistributedModel of a square"](), None, np.ones((5, 3)), 1.0, 1e-3),
     "log": lambda: identify.Log(TIMES, np.ones((30, 3)), np.ones((30, 3)), 1.0),
     "slide": lambda: identify.Slide(TIMES, np.ones((30, 3))),
     "sliding body": lambda: identify.SlidingBody(1.0, 1.0),

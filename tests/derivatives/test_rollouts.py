@@ -1,4 +1,4 @@
-"""Derivatives of steps and roll-outs: closed forms, kinks, differences, and backwards against forwards."""
+"""Derivatives of steps and rollouts: closed forms, kinks, differences, and backwards against forwards."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def drive(model, seed: int = 0, steps: int = T):
     return random.normal(size=3) * 4e-7 / scale, twists, loads
 
 
-# ---------------------------------------------------------------------- the roll-out
+# ---------------------------------------------------------------------- the rollout
 
 
 def test_parameters_take_the_place_of_the_models_own():
@@ -358,7 +358,7 @@ def test_a_shape_that_follows_the_load_is_refused_and_a_kept_one_is_not():
         ({"parameters": np.ones(12)}, r"breakaway_ratio must be in \[0, 1\), got 1.0"),
         ({"state": np.zeros((2, 3)), "twist": np.zeros((3, T, 3))}, "batch axes must broadcast"),
         ({"wrenches_bar": np.ones((T + 1, 3))}, rf"wrenches_bar must have shape \[..., {T}, 3\]"),
-        ({"model": "a"}, "model must be one that has compiled roll-outs, got str"),
+        ({"model": "a"}, "model must be one that has compiled rollouts, got str"),
     ],
 )
 def test_wrong_input_is_one_clear_line(changed, message):

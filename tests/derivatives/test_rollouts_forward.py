@@ -1,4 +1,4 @@
-"""Changes of roll-outs along changes of their inputs: forwards against backwards, differences, kinks, batches."""
+"""Changes of rollouts along changes of their inputs: forwards against backwards, differences, kinks, batches."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Derivatives of roll-outs on patches whose shape follows the load: closed forms, and the end of the range."""
+"""Derivatives of rollouts on patches whose shape follows the load: closed forms, and the end of the range."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ def distributed(patch: pf.ContactPatch, law: str, speed: str = "around") -> Case
 
 
 MANY = pf.ContactPatch.disc(0.01, cells=9)
-"""More cells than one block of compiled roll-outs holds."""
+"""More cells than one block of compiled rollouts holds."""
 
 FIXED = {
     **{f"published {surface}, {law}": published(surface, law) for surface in SURFACES for law in LAWS},

@@ -19,7 +19,7 @@ MODELS = {
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_roll_outs_of_all_models_add_to_what_comes_in(name):
+def test_rollouts_of_all_models_add_to_what_comes_in(name):
     twist = np.tile([1e-3, 0.0, 0.1], (2, 4, 1))
     inputs = checked(MODELS[name], None, twist, [1.0, 1.0, 0.0, 1.0], 1e-3, None)
     family, compiled, found = inputs.model.family, inputs.compiled(), []

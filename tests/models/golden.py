@@ -92,7 +92,7 @@ def motion(model: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def numbers_of(model: Any) -> dict[str, list[float]]:
-    """Compute rates, steps, slopes, a roll-out and its gradient, as far as a model has them."""
+    """Compute rates, steps, slopes, a rollout and its gradient, as far as a model has them."""
     state, twists, loads = motion(model)
     run, bars = derivatives.rollout(model, state, twists, loads, DT), cotangents(state.shape)
     end, wrench = model.step(state, twists[2], loads[2], DT)
@@ -116,7 +116,7 @@ def numbers_of(model: Any) -> dict[str, list[float]]:
 
 
 def cotangents(shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Make cotangents of the wrenches and of the last state of a roll-out."""
+    """Make cotangents of the wrenches and of the last state of a rollout."""
     return np.cos(np.arange(3.0 * STEPS)).reshape(STEPS, 3), 1e5 * np.sin(1.0 + np.arange(np.prod(shape))).reshape(
         shape
     )

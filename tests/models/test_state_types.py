@@ -83,8 +83,8 @@ def calls(model):
     yield lambda state, twist: model.step_jacobians(state, twist, LOAD, DT)
 
 
-def roll_outs(model):
-    """The same of roll-outs, with twists `[T, 3]`."""
+def rollouts(model):
+    """The same of rollouts, with twists `[T, 3]`."""
     yield lambda state, twist: derivatives.rollout(model, state, twist, LOAD, DT)
     if model is MODELS["reduced"] or model is MODELS["published"]:
         yield lambda state, twist: derivatives.rollout_states(model, state, twist, LOAD, DT)
@@ -100,7 +100,7 @@ def everything_is_compiled():
             state, twist = np.zeros((*count, *model.state_shape)), np.broadcast_to(TWIST, (*count, 4, 3))
             for call in calls(model):
                 call(state, twist[..., 0, :].copy())
-            for call in roll_outs(model):
+            for call in rollouts(model):
                 call(state, twist)
 
 
@@ -122,7 +122,7 @@ def test_other_types_are_converted_without_compiling(model, form, batch):
         one[:] = 0.0  # deflections are below its numbers
     state, twist = np.broadcast_to(one, (*batch, *one.shape)).copy(), np.broadcast_to(TWIST, (*batch, 3)).copy()
     sequence = np.stack([twist] * 4, -2)
-    for call, held in [(call, twist) for call in calls(model)] + [(call, sequence) for call in roll_outs(model)]:
+    for call, held in [(call, twist) for call in calls(model)] + [(call, sequence) for call in rollouts(model)]:
         wanted = call(state, held)
         before = compiled()
         found = call(convert(state), convert(held))

@@ -169,7 +169,7 @@ def test_a_patch_that_is_turned_turns_its_friction(front):
 
 
 @pytest.mark.parametrize("kind", ["discs", "turned discs"])
-def test_compiled_and_recorded_roll_outs_agree(front, kind):
+def test_compiled_and_recorded_rollouts_agree(front, kind):
     law = LAWS["elasto-plastic"]
     ours = front.model(patch(kind), law)
     _, v, f = samples((3, 7), 2)

@@ -141,7 +141,7 @@ def test_a_roll_out_refuses(front, kind, method, name, value, rule):
     given = arguments(front, model, twist=front.array([TWIST] * 4))
     if name == "twist":
         if np.ndim(value) != 1 or len(value) != 3:
-            return  # the shapes of roll-outs have tests of their own
+            return  # the shapes of rollouts have tests of their own
         value = np.ma.stack([value] * 4) if isinstance(value, np.ma.MaskedArray) else [value] * 4
     given[name] = value
     if name == "state" and method == "adjoint":

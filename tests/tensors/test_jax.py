@@ -164,7 +164,7 @@ def test_forward_values_are_those_of_numpy(kind, law):
 
 
 @every_model
-def test_roll_outs_are_those_of_numpy(kind):
+def test_rollouts_are_those_of_numpy(kind):
     numpy_model, model = pairs(kind, "elasto-plastic")
     motion, loads, state, expected = sway(300, 1e-4), np.linspace(0.5, 2.0, 300), numpy_model.rest(), []
     loads[100:110] = 0.0

@@ -75,7 +75,7 @@ def test_models_that_are_stacked_keep_each_its_own_patch(kind, method):
 
 
 class _Run(torch.nn.Module):
-    """A roll-out as what a module does."""
+    """A rollout as what a module does."""
 
     def __init__(self, model, method: str) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""Forward mode and second derivatives of PyTorch roll-outs: the adjoint forwards, or one line that says what else."""
+"""Forward mode and second derivatives of PyTorch rollouts: the adjoint forwards, or one line that says what else."""
 
 from __future__ import annotations
 

@@ -243,7 +243,7 @@ def test_gradients_are_those_of_central_differences(surface):
     assert gradient == pytest.approx((ends[0] - ends[1]) / 2e-7, rel=1e-5)
 
 
-def test_roll_outs_take_the_compiled_adjoint(monkeypatch):
+def test_rollouts_take_the_compiled_adjoint(monkeypatch):
     from planarfriction.torch import adjoint
 
     calls = []

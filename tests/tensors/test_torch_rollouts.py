@@ -1,4 +1,4 @@
-"""Roll-outs of the PyTorch modules: eager against the adjoint, batches, training, clear refusals."""
+"""Rollouts of the PyTorch modules: eager against the adjoint, batches, training, clear refusals."""
 
 from __future__ import annotations
 

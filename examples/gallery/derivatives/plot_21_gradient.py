@@ -1,9 +1,9 @@
 """
-The slope of a roll-out
+The slope of a rollout
 =======================
 
 How does the work of friction depend on each twist of a motion? One pass back through the steps (the adjoint) says so
-for all of them; differences need a roll-out for each.
+for all of them; differences need a rollout for each.
 """
 
 import matplotlib.pyplot as plt

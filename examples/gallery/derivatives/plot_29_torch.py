@@ -3,7 +3,7 @@ Friction learnt with PyTorch
 ============================
 
 The models are PyTorch modules. Here friction coefficients are learnt from measured wrenches by gradient descent;
-the backward pass goes through every step of the roll-out.
+the backward pass goes through every step of the rollout.
 """
 
 import matplotlib.pyplot as plt

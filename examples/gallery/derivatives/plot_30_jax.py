@@ -2,7 +2,7 @@
 Which parameter shows when, with JAX
 ====================================
 
-In JAX the models are pytrees and roll-outs are functions like any other. Forward derivatives of a whole roll-out say
+In JAX the models are pytrees and rollouts are functions like any other. Forward derivatives of a whole rollout say
 when each parameter of the law shows in the torque of a disc that is spun up from rest.
 """
 

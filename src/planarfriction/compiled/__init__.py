@@ -1,7 +1,7 @@
 """Machine forms of friction models: the numbers and addresses that compiled code reads, made once for each model.
 
 `model.compiled` is one cached object. Its `step_one` and `step_batch` are the fast doors of a step from Python;
-`packed` is read by the solver, `with_all_states` by `coupling`, `at_loads` by roll-outs. Addresses hold in one process:
+`packed` is read by the solver, `with_all_states` by `coupling`, `at_loads` by rollouts. Addresses hold in one process:
 copies of a model make their own machine form.
 """
 

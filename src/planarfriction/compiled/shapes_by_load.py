@@ -1,4 +1,4 @@
-"""Cells at many loads with the slopes of their weights by the load, as compiled roll-outs read them."""
+"""Cells at many loads with the slopes of their weights by the load, as compiled rollouts read them."""
 
 from __future__ import annotations
 

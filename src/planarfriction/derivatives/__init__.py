@@ -1,4 +1,4 @@
-"""Roll-outs with exact derivatives, on which the tensor front ends and identification are built.
+"""Rollouts with exact derivatives, on which the tensor front ends and identification are built.
 
 `rollout` steps a model through given twists and loads. `rollout_vjp` is its discrete adjoint, `rollout_jvp` its
 directional derivative, and `rollout_jacobian` gives the derivatives of each wrench with respect to the parameters. All

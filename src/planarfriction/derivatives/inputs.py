@@ -1,4 +1,4 @@
-"""Checked inputs of roll-outs, contact by contact, as compiled loops read them; and threads."""
+"""Checked inputs of rollouts, contact by contact, as compiled loops read them; and threads."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def sequences(twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.nd
 def checked(
     model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, parameters: Any, more: Sequence[tuple] = ()
 ) -> RolloutInputs:
-    """Check the inputs of a roll-out; `more` are batch axes of other arrays that belong to it."""
+    """Check the inputs of a rollout; `more` are batch axes of other arrays that belong to it."""
     packed = pack(model, parameters)
     inner = packed.inner
     state = np.zeros(inner) if state is None else validation.numbers("state", state)

@@ -49,7 +49,7 @@ WORTH_A_THREAD = 20_000
 
 
 class Family(NamedTuple):
-    """Parameters and compiled roll-outs of one kind of model."""
+    """Parameters and compiled rollouts of one kind of model."""
 
     names: tuple[str, ...]
     """Names of its parameters."""
@@ -75,7 +75,7 @@ PUBLISHED = Family(
 
 @functools.cache
 def _cells(size: int, turned: bool) -> Family:
-    """Return the roll-outs of `DistributedModel` of points, size 2, or of discs, 3; `turned` with a metric."""
+    """Return the rollouts of `DistributedModel` of points, size 2, or of discs, 3; `turned` with a metric."""
     entries, forwards = rollouts_of_cells(size, turned)
 
     def sensitivities(
@@ -131,7 +131,7 @@ def parameter_names(model: Any) -> tuple[str, ...]:
 
     Those of `ReducedModelPublished` are `PARAMETERS`, those of `DistributedModel` the parameters of the law.
 
-    Raises InvalidValueError for a model that has no roll-outs.
+    Raises InvalidValueError for a model that has no rollouts.
     """
     return _family(model).names
 
@@ -139,7 +139,7 @@ def parameter_names(model: Any) -> tuple[str, ...]:
 def parameters_of(model: Any) -> np.ndarray:
     """Return the parameters of a model `[P]`; the breakaway ratio of plain bristles has no effect.
 
-    Raises InvalidValueError for a model that has no roll-outs.
+    Raises InvalidValueError for a model that has no rollouts.
     """
     packed = pack(model)
     return packed.rows[packed.family.columns]
@@ -167,11 +167,11 @@ def _family(model: Any) -> Family:
     if isinstance(model, DistributedModel) and not (is_rate_law(model.law) or model.patch.asymmetric):
         return _cells(model.patch.bristles, model.patch.anisotropic)
     given = "cells with a RateLaw or an asymmetry" if isinstance(model, DistributedModel) else type(model).__name__
-    raise InvalidValueError("model", "be one that has compiled roll-outs", given)
+    raise InvalidValueError("model", "be one that has compiled rollouts", given)
 
 
 def is_compiled(model: Any) -> bool:
-    """Return True for a model that compiled roll-outs know."""
+    """Return True for a model that compiled rollouts know."""
     try:
         _family(model)
     except InvalidValueError:
@@ -180,7 +180,7 @@ def is_compiled(model: Any) -> bool:
 
 
 def _refusal(model: Any) -> tuple[str, str, Any] | None:
-    """Return the rule that keeps a model from compiled roll-outs, as `InvalidValueError` takes it, or None."""
+    """Return the rule that keeps a model from compiled rollouts, as `InvalidValueError` takes it, or None."""
     if isinstance(model, DistributedModel) or not model.depends_on_load:
         return None
     return (
@@ -219,14 +219,14 @@ def _on_surface(row: np.ndarray, kind: int, size: int, data: np.ndarray, axes: n
 def pack_surface(
     elasto_plastic: bool, kind: int, size: int, data: np.ndarray, root: np.ndarray | None = None
 ) -> Packed:
-    """Return a `ReducedModelPublished` by its limit surface, for roll-outs at given parameters of law and shape."""
+    """Return a `ReducedModelPublished` by its limit surface, for rollouts at given parameters of law and shape."""
     row = np.array([*_any_law(elasto_plastic), *np.zeros(len(published_step.NAMES) - LAW)])
     axes = None if root is None else axes_of(root)
     return _on_surface(row, kind, size, np.ascontiguousarray(data, dtype=float), axes)
 
 
 def pack_cells(elasto_plastic: bool, positions: np.ndarray, weights: np.ndarray) -> Packed:
-    """Return a `DistributedModel` by its cells and their weights `[N]`, for roll-outs at given parameters.
+    """Return a `DistributedModel` by its cells and their weights `[N]`, for rollouts at given parameters.
 
     `positions` are `[2, N]`, or levers `[5, N]`; of discs `[3, N]` or `[6, N]`, with `kappa a` behind them.
     """

@@ -1,4 +1,4 @@
-"""Roll-outs with a fixed step, and their reverse and forward derivatives."""
+"""Rollouts with a fixed step, and their reverse and forward derivatives."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Rollout(NamedTuple, Generic[ArrayT]):
 
 @by_parts
 class RolloutStates(NamedTuple):
-    """A roll-out together with its intermediate states."""
+    """A rollout together with its intermediate states."""
 
     state: np.ndarray
     """State after the last step, as in `Rollout`."""
@@ -43,7 +43,7 @@ class RolloutStates(NamedTuple):
 
 @by_parts
 class RolloutJacobian(NamedTuple):
-    """A roll-out with the derivatives of its wrenches with respect to P parameters."""
+    """A rollout with the derivatives of its wrenches with respect to P parameters."""
 
     state: np.ndarray
     """State after the last step, as in `Rollout`."""
@@ -55,7 +55,7 @@ class RolloutJacobian(NamedTuple):
 
 @by_parts
 class RolloutTangent(NamedTuple):
-    """Changes of the inputs of a roll-out, each of the shape of that input; leading axes broadcast."""
+    """Changes of the inputs of a rollout, each of the shape of that input; leading axes broadcast."""
 
     state: Any = 0.0
     """Change of the state before the first step."""
@@ -69,7 +69,7 @@ class RolloutTangent(NamedTuple):
 
 @by_parts
 class RolloutJVP(NamedTuple):
-    """A roll-out and its change for given changes of the inputs."""
+    """A rollout and its change for given changes of the inputs."""
 
     state: np.ndarray
     """State after the last step, as in `Rollout`."""
@@ -83,7 +83,7 @@ class RolloutJVP(NamedTuple):
 
 @by_parts
 class RolloutVJP(NamedTuple):
-    """Gradient of a scalar with respect to the inputs of a roll-out, each of the shape of that input."""
+    """Gradient of a scalar with respect to the inputs of a rollout, each of the shape of that input."""
 
     state: np.ndarray
     """Gradient with respect to the state before the first step, of its shape [1/unit of the state]."""
@@ -144,7 +144,7 @@ def rollout_vjp(
 ) -> RolloutVJP:
     """Compute the gradient of `sum(wrenches_bar wrenches) + sum(state_bar state)` of a `rollout` by its inputs.
 
-    This is the discrete adjoint: exact for the steps taken, and a few times as expensive as the roll-out whatever the
+    This is the discrete adjoint: exact for the steps taken, and a few times as expensive as the rollout whatever the
     number of inputs. `wrenches_bar` `[..., T, 3]` and `state_bar` `[..., *state_shape]` (None: zero) broadcast. The
     gradient of an input that several contacts share is the sum over these contacts. `states` are those of
     `rollout_states`, if available. At zero load the gradient with respect to that load is one-sided.
@@ -152,7 +152,7 @@ def rollout_vjp(
     If the weights of cells depend on the load, they are differentiated too, by central differences with a step of 1e-5
     of the load (relative error 1e-10).
 
-    Raises `InvalidValueError` as `rollout` does, and for a model that has no compiled roll-out.
+    Raises `InvalidValueError` as `rollout` does, and for a model that has no compiled rollout.
     """
     inputs = checked(model, state, twist, normal_force, dt, parameters)
     (count, size), steps, packed = inputs.state.shape, len(inputs.dt), inputs.model

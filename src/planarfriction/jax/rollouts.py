@@ -54,7 +54,7 @@ def rollout(
     `parameters`, a record like `model.parameters` or an array `[P]` in the same order, replaces the model's own.
 
     `method` is `"eager"`, JAX operations step by step (any model and device, all kinds and orders of derivatives), or
-    `"adjoint"`, the much faster compiled roll-out with forward and reverse derivatives (on the CPU, float64 inside,
+    `"adjoint"`, the much faster compiled rollout with forward and reverse derivatives (on the CPU, float64 inside,
     first derivatives with respect to the parameters, `state`, `twist` and `normal_force`). None uses the adjoint if
     JAX's default device is the CPU, and JAX operations for whatever the adjoint cannot do: higher derivatives, and
     those with respect to `dt` and the numbers of the patch.

@@ -1,4 +1,4 @@
-"""Roll-outs of kinds of cells, their adjoint and their derivatives (see `cells_rollout`)."""
+"""Rollouts of kinds of cells, their adjoint and their derivatives (see `cells_rollout`)."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Rollouts(NamedTuple):
 
 @functools.cache
 def rollouts_of_cells(size: int, turned: bool) -> Rollouts:
-    """Return the roll-outs of a kind of cells without asymmetry (see `KINDS`); they are written on first use."""
+    """Return the rollouts of a kind of cells without asymmetry (see `KINDS`); they are written on first use."""
     kind = KINDS[size, turned, False]
     step, reader = kind.element.step, reader_of(size)
     advance, retreat = _advance_of(forward_passes(kind)), _retreat_of(backward_passes(kind))

@@ -1,4 +1,4 @@
-"""Roll-outs of cells, their discrete adjoint and their derivatives, in vector code (see `rollouts` for the inputs).
+"""Rollouts of cells, their discrete adjoint and their derivatives, in vector code (see `rollouts` for the inputs).
 
 The cells of a contact lie in blocks (see `cell_blocks`). `shapes` are the weights of its cells at each load `[L, M]`, M
 that of all their blocks; `data` holds the numbers of their levers, block after block.
@@ -143,7 +143,7 @@ def _bring_back_push(kind, law, by, block, lanes):
         scatter(block, BAR + i, LANES, change)
 
 
-# ---------------------------------------------------------------------- roll-outs
+# ---------------------------------------------------------------------- rollouts
 
 
 @kernel
@@ -193,7 +193,7 @@ def rollout(inputs, span, z, wrench, states, *, kind):
 
 @kernel
 def _pull(kind, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
-    """Carry the cotangents of a roll-out back, and return that of the law."""
+    """Carry the cotangents of a rollout back, and return that of the law."""
     twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
     which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shapes, -1
     (blocks, lanes), by_law = divided(weights.shape[1]), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -300,7 +300,7 @@ def _tangent(kind, inputs, span, z, changes, wrenches, slopes, scratch):
 
 
 def tangent(inputs, span, z, changes, wrenches, slopes, *, kind):
-    """Run roll-outs with their change along given ones of the inputs, added to `wrenches` and `slopes` [B, T, 3].
+    """Run rollouts with their change along given ones of the inputs, added to `wrenches` and `slopes` [B, T, 3].
 
     `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state in place.
     """

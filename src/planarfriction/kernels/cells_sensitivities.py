@@ -1,4 +1,4 @@
-"""Derivatives of roll-outs of cells by all numbers of their law, forward in time, in one pass.
+"""Derivatives of rollouts of cells by all numbers of their law, forward in time, in one pass.
 
 A step and what its derivatives share is computed once: for each number of the law a bristle carries its change. Those
 of `sigma_1` and `sigma_2` move no bristle.
@@ -137,7 +137,7 @@ def _sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes, scra
 
 
 def sensitivities(inputs, span, z, wanted, wrenches, slopes, *, kind, pushed):
-    """Run roll-outs with their derivatives by the numbers `wanted` of `PARAMETERS`.
+    """Run rollouts with their derivatives by the numbers `wanted` of `PARAMETERS`.
 
     They are added to `wrenches` [B, T, 3] and `slopes` [B, T, 3, len(wanted)]; `z` [B, size n] in place.
     """

@@ -1,4 +1,4 @@
-"""Roll-outs of the published reduced model: with their adjoint, `LANES` contacts abreast in vector code.
+"""Rollouts of the published reduced model: with their adjoint, `LANES` contacts abreast in vector code.
 
 The limit surface is read contact by contact; the rest of a step is one loop over the lanes. Their numbers lie in one
 flat array, in fields of `LANES` numbers: offsets are constants, so that the compiler sees that no two fields meet.
@@ -227,7 +227,7 @@ def _along(here, i, d, changes, b, t):
 
 @kernel
 def _forward(seed, inputs, span, z, given, moved, results, work):
-    """Roll-outs with their changes along D directions, forward in time: `dz' = d new/dz dz + seed`.
+    """Rollouts with their changes along D directions, forward in time: `dz' = d new/dz dz + seed`.
 
     `seed(here, i, d, given, b, t)` is the part of the change of row i that does not come from the state; `moved`
     [B, 3, D] are the changes of the state, and `z`, in place. `results`, to which is added: wrenches [B, T, 3] and
@@ -255,7 +255,7 @@ def _forward(seed, inputs, span, z, given, moved, results, work):
 
 @jit
 def sensitivities(inputs, span, z, columns, wrenches, slopes):
-    """Roll-outs with the derivatives of the wrenches by the numbers `columns` [D]; see `_forward`."""
+    """Rollouts with the derivatives of the wrenches by the numbers `columns` [D]; see `_forward`."""
     work = np.empty(SCRATCH), np.empty((6, 7 + inputs.rows.shape[1]))
     moved, results = np.zeros((z.shape[0], 3, columns.shape[0])), (wrenches, slopes)
     _forward(_by_number, inputs, span, z, columns, moved, results, work)
@@ -263,7 +263,7 @@ def sensitivities(inputs, span, z, columns, wrenches, slopes):
 
 @jit
 def tangent(inputs, span, z, changes, wrenches, slopes):
-    """Roll-outs with their change along given ones of the inputs; see `_forward`.
+    """Rollouts with their change along given ones of the inputs; see `_forward`.
 
     `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state in place.
     """

@@ -1,4 +1,4 @@
-"""Inputs of roll-outs, and their cotangents or changes, as compiled loops read them.
+"""Inputs of rollouts, and their cotangents or changes, as compiled loops read them.
 
 A step without load forgets its state: it passes on no gradient but that of the load, the wrench per unit load that the
 smallest load would have.
@@ -14,7 +14,7 @@ from planarfriction.compiler import kernel
 
 
 class Inputs(NamedTuple):
-    """Roll-outs of B contacts through T steps, of cells at L different loads where their weights follow the load."""
+    """Rollouts of B contacts through T steps, of cells at L different loads where their weights follow the load."""
 
     rows: np.ndarray
     """Numbers of law and shape, [B or 1, N]."""
@@ -39,7 +39,7 @@ class Inputs(NamedTuple):
 
 
 class Bars(NamedTuple):
-    """Cotangents of the inputs of B roll-outs, or changes of them."""
+    """Cotangents of the inputs of B rollouts, or changes of them."""
 
     state: np.ndarray
     """Comes in as that of the state at the end, [B, S]."""

@@ -170,7 +170,7 @@ class FrictionModel(ByValue):
 
     @property
     def compiled(self) -> CompiledModel:
-        """Machine form of the model, made once: fast steps, and what the solver, `coupling` and roll-outs read.
+        """Machine form of the model, made once: fast steps, and what the solver, `coupling` and rollouts read.
 
         Raises InvalidValueError for a model whose steps are not compiled.
         """

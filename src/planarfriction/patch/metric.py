@@ -1,4 +1,4 @@
-"""Friction that depends on the direction: a metric for each cell (grain, grooves) and an asymmetry (a brushed surface).
+"""Friction that depends on the direction: a metric for each cell (grooves) and an asymmetry (a brushed surface).
 
 A cell with the metric `M`, whose symmetric root is `L`, sees `u = L v` and pulls with `L` times the traction that a
 cell without a metric would have: in steady sliding `-g L (u/|u| + a)`. It then dissipates the power `g (|u| + a . u)`.
@@ -26,10 +26,10 @@ _PatchT = TypeVar("_PatchT", bound="Anisotropy")
 
 
 def friction_metric(angle: float, along: float, across: float) -> np.ndarray:
-    """Return the metric `[2, 2]` of a grain: `R diag(along^2, across^2) R'` with R the rotation by `angle` [rad].
+    """Return the metric `[2, 2]` of grooves: `R diag(along^2, across^2) R'` with R the rotation by `angle` [rad].
 
-    `along` and `across` are the friction coefficients along and across the grain relative to those of the law, > 0;
-    `angle` is that of the grain from the contact frame's x axis. Sliding along `e` dissipates `sqrt(e' M e)`.
+    `along` and `across` are the friction coefficients along and across the grooves, relative to those of the law, > 0;
+    `angle` is measured to the grooves from the contact frame's x axis. Sliding along `e` dissipates `sqrt(e' M e)`.
 
     Raises InvalidValueError for an angle that is not finite, and for frictions that are not > 0.
     """
@@ -54,7 +54,7 @@ class Anisotropy(ByValue):
         `metric` `M`: sliding along a unit vector e meets the coefficient `mu sqrt(e' M e)`; see `friction_metric`.
         `asymmetry`
         `a`: sliding along e, a principal axis of M, meets `1 + a . e` times that, so that it is easiest against a. Both
-        are in the axes of the contact frame and turn with it: the grain belongs to the patch.
+        are in the axes of the contact frame and turn with it: the grooves belong to the patch.
 
         Raises `InvalidValueError` unless every metric is symmetric and positive definite and every `|a| < 1`.
         """

@@ -154,7 +154,7 @@ def _loop(model: Any, made: ctypes.CDLL, state: np.ndarray, wrench: np.ndarray) 
     twists = mixed_twists(20_000)
     ours = median(lambda: made.loop(len(twists), *_pointers(state, twists, wrench)), 9) / len(twists)
     theirs = median(lambda: rollout(model, None, twists, 1.0, 1e-4), 9) / len(twists)
-    return line(ours * 1e6, "us", "the same step in a roll-out", theirs * 1e6)
+    return line(ours * 1e6, "us", "the same step in a rollout", theirs * 1e6)
 
 
 def _body(model: Any, made: ctypes.CDLL, state: np.ndarray, wrench: np.ndarray) -> Measurement:

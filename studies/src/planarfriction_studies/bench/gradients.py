@@ -1,4 +1,4 @@
-"""Costs of derivatives of roll-outs and scenes."""
+"""Costs of derivatives of rollouts and scenes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from planarfriction_studies.bench.measurement import (
 )
 
 STEPS = 2000
-"""Steps of the single roll-out."""
+"""Steps of the single rollout."""
 
 TIGHT: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-9}
 OPTIONS = SolverOptions(**TIGHT)
@@ -36,14 +36,14 @@ SIGNALS = {"fingers.normal_force": KNOTS}
 
 
 def reduced(full: bool) -> Measurement:
-    """Measure a roll-out with its gradient, as `gradient.published`."""
+    """Measure a rollout with its gradient, as `gradient.published`."""
     models = ReducedModel(disc(), law()), ReducedModelPublished(disc(), law())
     ours, theirs = (_value_and_gradient(model, (STEPS,), 15) for model in models)
     return line(ours, "s", AGAINST_PUBLISHED, theirs)
 
 
 def _value_and_gradient(model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...], repeats: int) -> float:
-    """Measure half the squared wrenches of roll-outs with their gradient to all inputs [s]; steps are the last axis."""
+    """Measure half the squared wrenches of rollouts with their gradient to all inputs [s]; steps are the last axis."""
     inputs = model.rest(), *_inputs(shape)
 
     def value_and_gradient() -> None:
@@ -54,7 +54,7 @@ def _value_and_gradient(model: ReducedModel | ReducedModelPublished, shape: tupl
 
 
 def _alone(model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...], repeats: int) -> float:
-    """Measure the time of the roll-outs alone [s]."""
+    """Measure the time of the rollouts alone [s]."""
     inputs = model.rest(), *_inputs(shape)
     return median(lambda: derivatives.rollout(model, *inputs), repeats)
 
@@ -65,14 +65,14 @@ def _inputs(shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def published(full: bool) -> Measurement:
-    """Measure half the squared wrenches of a roll-out, with their gradient to parameters, twists, loads and state."""
+    """Measure half the squared wrenches of a rollout, with their gradient to parameters, twists, loads and state."""
     model = ReducedModelPublished(disc(), law())
     value = _value_and_gradient(model, (STEPS,), 15)
     try:
         return line(value, "s", "PyTorch, eager, the same rollout", _eager_gradient(model, full))
     except ImportError:
         inputs, once = len(derivatives.PARAMETERS) + 3 + 4 * STEPS, _alone(model, (STEPS,), 15)
-        words = f"central differences, 2 x {inputs} roll-outs of {once * 1e3:.2g} ms (PyTorch is not installed)"
+        words = f"central differences, 2 x {inputs} rollouts of {once * 1e3:.2g} ms (PyTorch is not installed)"
         return line(value, "s", words, 2 * inputs * once)
 
 
@@ -94,22 +94,22 @@ def _eager_gradient(model: ReducedModelPublished, full: bool) -> float:
 
 
 def published_batch(full: bool) -> Measurement:
-    """Measure a thousand roll-outs with their gradient beside the roll-outs alone."""
+    """Measure a thousand rollouts with their gradient beside the rollouts alone."""
     both, once = _batch(ReducedModelPublished(disc(), law()))
-    words = "the roll-out alone (the ratio is the share of its speed)"
+    words = "the rollout alone (the ratio is the share of its speed)"
     return line(both, "million contact-steps/s", words, once, both / once)
 
 
 def reduced_batch(full: bool) -> Measurement:
-    """Measure 1000 roll-outs with their gradient, as `gradient.published.batch`; fewer steps of them are kept."""
+    """Measure 1000 rollouts with their gradient, as `gradient.published.batch`; fewer steps of them are kept."""
     models = ReducedModel(disc(), law()), ReducedModelPublished(disc(), law())
     (both, once), (theirs, alone) = (_batch(model, 250) for model in models)
-    words = f"{AGAINST_PUBLISHED} (the roll-outs alone: {once:.3g} and {alone:.3g})"
+    words = f"{AGAINST_PUBLISHED} (the rollouts alone: {once:.3g} and {alone:.3g})"
     return line(both, "million contact-steps/s", words, theirs, both / theirs)
 
 
 def reduced_batch_alone(full: bool) -> Measurement:
-    """Measure 1000 roll-outs."""
+    """Measure 1000 rollouts."""
     shape = 1000, 250
     models = ReducedModel(disc(), law()), ReducedModelPublished(disc(), law())
     ours, theirs = (1e-6 * math.prod(shape) / _alone(model, shape, 5) for model in models)
@@ -117,7 +117,7 @@ def reduced_batch_alone(full: bool) -> Measurement:
 
 
 def _batch(model: ReducedModel | ReducedModelPublished, count: int = 1000) -> tuple[float, float]:
-    """Return millions of contact-steps per second of a thousand roll-outs with their gradient, and of these alone."""
+    """Return millions of contact-steps per second of a thousand rollouts with their gradient, and of these alone."""
     shape = 1000, count
     steps = 1e-6 * math.prod(shape)
     return steps / _value_and_gradient(model, shape, 5), steps / _alone(model, shape, 5)

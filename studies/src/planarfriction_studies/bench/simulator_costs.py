@@ -22,7 +22,7 @@ ROUNDS, STEPS = 15, 300
 """Rounds in turns, and steps of each, in MuJoCo."""
 
 ENVIRONMENTS, THREADS = 16, 2
-"""Environments of roll-outs in MuJoCo and in MJX, and threads."""
+"""Environments of rollouts in MuJoCo and in MJX, and threads."""
 
 
 def mujoco_tray(full: bool, blocks: int) -> Measurement:
@@ -36,7 +36,7 @@ def mujoco_grip(full: bool) -> Measurement:
 
 
 def mujoco_rollout(full: bool) -> Measurement:
-    """Measure a step of a tray of two blocks, in roll-outs on threads."""
+    """Measure a step of a tray of two blocks, in rollouts on threads."""
     return _beside_own(mujoco_scenes.tray, 2, rolled=True)
 
 
@@ -106,7 +106,7 @@ def _rollouts(scene: MujocoScene, m: Any, d: Any, _: Any) -> Callable[[], float]
 
 
 MJX_STEPS, MJX_ROUNDS = 100, 5
-"""Steps of a timed roll-out (0.2 s, in which all discs slide), and rounds in which both ways take turns."""
+"""Steps of a timed rollout (0.2 s, in which all discs slide), and rounds in which both ways take turns."""
 
 
 def mjx_discs(full: bool) -> Measurement:
@@ -178,7 +178,7 @@ def mujoco_warp(full: bool, scene: MujocoScene) -> Measurement:
 
 
 def _rolled(step: Callable[..., Any], m: Any, d: Any) -> Callable[[], None]:
-    """Return a compiled roll-out of discs with different starts, whose contact has settled."""
+    """Return a compiled rollout of discs with different starts, whose contact has settled."""
     import jax
     import jax.numpy as jnp
     import mujoco

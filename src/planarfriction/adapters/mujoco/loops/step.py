@@ -73,7 +73,7 @@ def _recall(host, kept, d):
         _copy(kept.centre, kept.held, 3 * host.count)
         _copy(kept.axis, kept.before, 3 * host.count)
     else:
-        # other times than those of the last step, or a roll-out, which clears where the solver starts but not this
+        # other times than those of the last step, or a rollout, which clears where the solver starts but not this
         _clear(kept.state, host.states)
         _clear(kept.guess, 3 * host.count)
         _clear(kept.held, 3 * host.count)
