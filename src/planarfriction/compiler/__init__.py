@@ -19,13 +19,13 @@ Inner: Any = part("planarfriction.compiler.inner", "Inner", Compiler)
 """Numba's compiler for inner functions, or its own for all."""
 
 kept: Any = part("planarfriction.compiler.machine_code", "kept", lambda dispatcher, sources: dispatcher)
-"""Function that keeps what a dispatcher compiles on disk, as far as Numba lets it."""
+"""Function that keeps the machine code of a dispatcher on disk, as far as Numba lets it."""
 
 missing: Any = part("planarfriction.compiler.machine_code", "missing", lambda dispatcher, signature: False)
 """Function that tells if something has yet to be compiled that can be kept on disk."""
 
 FOLDERS = ("compiler", "kernels", "limit_surface/loops", "online/loops", "adapters/mujoco/loops")
-"""Folders of the package with compiled code; a compiled function of the package stands in one of them."""
+"""Folders of the package with all of its compiled functions."""
 
 
 def sources_of(package: Path) -> Sources:
