@@ -58,16 +58,16 @@ from planarfriction.kernels.vectors import Vector, applied_back, dot, plus, put,
 
 @kernel
 def _pulled(
-    system: SystemRecord, piece: int, c: int, y: Doubles, given: Doubles, wrench: Vector, w: Workspace
+    system: SystemRecord, piece: int, c: int, y: Doubles, rates: Doubles, wrench: Vector, w: Workspace
 ) -> tuple[Vector, Vector]:
-    """Pull back `given` of the bristle rates and `wrench` of the wrench per unit load of contact c.
+    """Pull back `rates` of the bristles and `wrench` of the wrench per unit load of contact c.
 
     Pointers to all states; the cotangent of the bristles goes to `w.forcing`. Returns the cotangents of the body's
     velocity and pose.
     """
     first, rows, (a, g, _) = system.contacts.state[c], arrays_at(ROWS, system.work.rows), maps_of(system, c)
     put(rows.d_wrench, wrench)
-    states = at(y, first), linearisation_of(system, c), at(given, first), system.work.rows, at(w.forcing, first)
+    states = at(y, first), linearisation_of(system, c), at(rates, first), system.work.rows, at(w.forcing, first)
     call(function_of(system, c, PULL_BACK), (record_of(system, piece, c), *states))
     return applied_back(a, rows.d_twist), applied_back(g, rows.d_twist)
 

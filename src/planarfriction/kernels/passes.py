@@ -120,9 +120,9 @@ def _parts(block: Block, inputs: Mapping[str, str], stores: Sequence[str], count
         made[k] = len(spans) - 1 if place in inputs.values() else made[k]
     parts = []
     for k, span in enumerate(spans):
-        here, ends = kept[slice(*span)], [each for each, part in enumerate(made) if part == k]
-        names = _names_needed([*here, *_as_operations([block.results[each] for each in ends])], again)
-        inside = {each.name for each in here} | (names & again.keys())
+        span_operations, ends = kept[slice(*span)], [each for each, part in enumerate(made) if part == k]
+        names = _names_needed([*span_operations, *_as_operations([block.results[each] for each in ends])], again)
+        inside = {each.name for each in span_operations} | (names & again.keys())
         parts.append(Part([each for each in operations if each.name in inside], names - inside, ends))
     return parts
 

@@ -46,8 +46,8 @@ class Rewriting:
         for name in _global_names(function.__code__):
             if name in function.__globals__:
                 space[name] = self(function.__globals__[name])
-        for cell, given in zip(cells, function.__closure__ or (), strict=True):
-            cell.cell_contents = self(given.cell_contents)
+        for cell, outer in zip(cells, function.__closure__ or (), strict=True):
+            cell.cell_contents = self(outer.cell_contents)
         return twin
 
 
@@ -55,10 +55,10 @@ class _Module:
     """A module whose functions are twins."""
 
     def __init__(self, original: ModuleType, rewriting: Rewriting) -> None:
-        self._own, self._rewriting = original, rewriting
+        self._module, self._rewriting = original, rewriting
 
     def __getattr__(self, name: str) -> Any:
-        return self._rewriting(getattr(self._own, name))
+        return self._rewriting(getattr(self._module, name))
 
 
 def _global_names(code: CodeType) -> set[str]:
