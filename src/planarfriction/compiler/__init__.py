@@ -25,7 +25,7 @@ missing: Any = part("planarfriction.compiler.machine_code", "missing", lambda di
 """Function that tells if something has yet to be compiled that can be kept on disk."""
 
 FOLDERS = ("compiler", "kernels", "limit_surface/loops", "online/loops", "adapters/mujoco/loops")
-"""Folders of the package with all of its compiled functions."""
+"""Folders of the package with compiled code; a compiled function of the package stands in one of them."""
 
 
 def sources_of(package: Path) -> Sources:
