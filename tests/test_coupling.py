@@ -14,7 +14,7 @@ from planarfriction.compiler import jit
 from planarfriction.compiler.calls import address_of, call
 from planarfriction.compiler.memory import place_of
 from planarfriction.coupling import CoupledPatches, CoupledStep, HostStep
-from planarfriction.kernels.steps import SLOPES, WORDS
+from planarfriction.kernels.steps import SLOPES
 from planarfriction.patch import friction_metric
 from tests.support.coupling_problems import random_bodies, random_patches, random_run
 from tests.support.rate_laws import BoucWen
@@ -55,7 +55,7 @@ def _called(function, record, z, v, dt, new, out):
 @pytest.mark.parametrize("name", MODELS)
 def test_compiled_steps_and_their_slopes_are_those_of_the_model(name):
     model, generator = MODELS[name], np.random.default_rng(1)
-    packed, function = model.compiled.with_all_states([None]), address_of(model.compiled.functions.slopes, WORDS)
+    packed, function = model.compiled.with_all_states([None]), address_of(model.compiled.functions.slopes)
     for _ in range(40):
         twist = generator.normal(size=3) * [1.0, 1.0, 100.0] * 10.0 ** generator.uniform(-5.0, -1.0)
         dt = 10.0 ** generator.uniform(-5.0, -2.0)

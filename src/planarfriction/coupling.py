@@ -27,7 +27,6 @@ from planarfriction.formulas import LARGEST
 from planarfriction.kernels import coupling as kernels
 from planarfriction.kernels.coupling_rows import Patches, layout
 from planarfriction.kernels.following import Followers
-from planarfriction.kernels.steps import WORDS
 from planarfriction.models import FrictionModel
 
 TOLERANCE = 1e-9
@@ -332,8 +331,8 @@ class _PackedPatches(NamedTuple):
 
 def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatches:
     functions = [model.compiled.functions for model in models]
-    steps = np.array([address_of(each.step, WORDS) for each in functions], np.int64)
-    slopes = np.array([address_of(each.slopes, WORDS) for each in functions], np.int64)
+    steps = np.array([address_of(each.step) for each in functions], np.int64)
+    slopes = np.array([address_of(each.slopes) for each in functions], np.int64)
     (records, sizes), known = np.zeros((2, len(models)), np.int64), {}
     following = [p for p, model in enumerate(models) if model.depends_on_load]
     for p, model in enumerate(models):

@@ -3,6 +3,7 @@
 from typing import Any, NamedTuple
 
 LARGEST: float
+LIGHTEST: float
 PARAMETERS: tuple[str, ...]
 DISC_A: float
 DISC_REST: float

@@ -61,7 +61,7 @@ def sources(tmp_path, monkeypatch) -> Path:
     monkeypatch.setattr(sys, "dont_write_bytecode", True)  # Python's own cache goes by time and size
     monkeypatch.setattr(config, "CACHE_DIR", "")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
-    monkeypatch.setattr(machine_code.MachineCode, "told", False)
+    monkeypatch.setattr(machine_code.MachineCode, "warned", False)
     for name in ("own_formula", "own_loops"):
         monkeypatch.setitem(sys.modules, name, None)
     return folder

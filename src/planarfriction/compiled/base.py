@@ -1,7 +1,7 @@
-"""Machine form of a friction model: steps, rates, and what compiled loops of others need of it.
+"""Machine form of a friction model: steps, rates, and records for the compiled loops of others.
 
-The fast doors of a step pass plain numbers and arrays of them directly to compiled code, where every check in Python
-would take longer than the step. The compiled function checks what it is given and says no to the rest.
+The fast doors of a step pass plain numbers and arrays of numbers directly to compiled code, where every check in Python
+would take longer than the step. The compiled function checks its arguments and refuses the rest.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ class StepJacobians(NamedTuple):
     """d wrench / d normal_force, `[..., 3]`."""
 
 
-def _seen(twist: np.ndarray, moved: np.ndarray | None) -> np.ndarray:
-    """Return the twists that patches see which have moved, in C order."""
-    return twist if moved is None else np.ascontiguousarray(twist_at(twist, moved))
+def _seen(twist: np.ndarray, offset: np.ndarray | None) -> np.ndarray:
+    """Return the twists that patches see at an offset, in C order."""
+    return twist if offset is None else np.ascontiguousarray(twist_at(twist, offset))
 
 
 def driven(contact: PackedModel, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
@@ -62,17 +62,17 @@ def driven(contact: PackedModel, twist: np.ndarray, load: np.ndarray) -> np.ndar
     return np.concatenate([twist, factor[:, None]], axis=1)
 
 
-def _pull(wrench: np.ndarray, moved: np.ndarray | None) -> np.ndarray:
-    """Return their wrenches about the origin."""
-    return wrench if moved is None else wrench_at(wrench, -moved)
+def _pull(wrench: np.ndarray, offset: np.ndarray | None) -> np.ndarray:
+    """Return the wrenches of patches at an offset about the origin."""
+    return wrench if offset is None else wrench_at(wrench, -offset)
 
 
 class CompiledModel:
-    """Machine form of a model: steps, rates, and what compiled loops of others need of it.
+    """Machine form of a model: steps, rates, and records for the compiled loops of others.
 
     `evaluate`, `step` and `step_jacobians` take inputs that `FrictionModel` has checked: contiguous arrays of doubles
     with the same batch axes. `step_one`, `step_batch` and `jacobians_one` take inputs as they come and return None for
-    those that are not plain and in order; then the checks of the model decide.
+    inputs that are not plain and in order; then the checks of the model decide.
     """
 
     def __init__(self, functions: StepFunctions, state_shape: tuple[int, ...], square_shape: tuple[int, ...]) -> None:
@@ -80,13 +80,13 @@ class CompiledModel:
         self._size, self._square, self._flat = math.prod(state_shape), math.prod(square_shape), len(state_shape) == 1
         """Number of states, and numbers of d new state / d state, whose shape is `square_shape`."""
         n = self._size
-        self._new, self._wrench, self._room, self._table = slice(n), slice(n, n + 3), n + 9, None
+        self._new, self._wrench, self._result, self._table = slice(n), slice(n, n + 3), n + 9, None
         shapes = square_shape, (*state_shape, 3), state_shape, (3, *state_shape), (3, 3), (3,)
         ends = [0, *itertools.accumulate(map(math.prod, shapes))]
         self._derivatives = [
             (slice(*span), shape) for span, shape in zip(itertools.pairwise(ends), shapes, strict=True)
         ]
-        """Places and shapes of `StepJacobians` in what `kernels.steps.jacobians` writes for a contact."""
+        """Places and shapes of `StepJacobians` in the numbers that `kernels.steps.jacobians` writes for a contact."""
         self._per_contact, self._scratch = ends[-1], 7 * n + self._square + 12
 
     # ------------------------------------------------------------------ at given loads
@@ -97,7 +97,7 @@ class CompiledModel:
         raise NotImplementedError
 
     def at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, PackedModel]]:
-        """Yield rows of the flat batch, and the model at the load of each of them or at the one load of all of them.
+        """Yield rows of the flat batch, and the model at the load of each row or at the one load of all.
 
         Rows without load may be left out; their results are zero.
         """
@@ -106,7 +106,7 @@ class CompiledModel:
     def pressed(
         self, load: np.ndarray, centre: np.ndarray | None
     ) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
-        """Yield what `at_each_load` does, with pressures about the centres `[..., 2]` [m], and how far patches moved.
+        """Yield as `at_each_load`, with pressures about the centres `[..., 2]` [m], and the offsets of patches.
 
         Patches move `[rows, 2]` [m] whose pressure keeps its shape; None if none does.
         """
@@ -156,15 +156,15 @@ class CompiledModel:
         """Step one contact, or return None; the compiled step checks its numbers, but takes True for 1.0."""
         kind = type(twist)
         if kind is tuple or kind is list:
-            held = twist
+            numbers = twist
         elif kind is _ARRAY and twist.ndim == 1 and twist.dtype is _FLOAT:
-            held = twist.tolist()
+            numbers = twist.tolist()
         else:
             return None
         if type(state) is not _ARRAY or ((table := self._table) is None and (table := self._opened()) is None):
             return None
         try:
-            vx, vy, omega = held
+            vx, vy, omega = numbers
             if (
                 bool is type(vx)
                 or bool is type(vy)
@@ -173,7 +173,7 @@ class CompiledModel:
                 or bool is type(dt)
             ):
                 return None
-            result = _EMPTY(self._room)
+            result = _EMPTY(self._result)
             if self._flat:
                 if step_one(table, state, vx, vy, omega, normal_force, dt, result):
                     return result[self._new], result[self._wrench]
@@ -216,12 +216,12 @@ class CompiledModel:
             return None
         if type(twist) not in (tuple, list) or len(twist) != 3 or (table := self._slopes) is None:
             return None
-        given = *twist, normal_force, dt
-        if not _PLAIN.issuperset(map(type, given)):
+        inputs = *twist, normal_force, dt
+        if not _PLAIN.issuperset(map(type, inputs)):
             return None
         result = _EMPTY(self._per_contact + self._scratch)
         try:
-            if not jacobians(table, state if state.ndim == 1 else state.ravel(), _MAKE(given, float), result):
+            if not jacobians(table, state if state.ndim == 1 else state.ravel(), _MAKE(inputs, float), result):
                 return None
         except _REFUSED:
             return None
@@ -235,9 +235,9 @@ class CompiledModel:
         """Return the rates of the states, and wrenches per unit load `[..., 3]`; `centre` as in `pressed`."""
         z, v = state.reshape(-1, self._size), twist.reshape(-1, 3)
         rate, unit = np.zeros(z.shape), np.zeros(v.shape)
-        for rows, contact, moved in self.pressed(load, centre):
-            rate[rows], pull = rates(contact, z[rows], driven(contact, _seen(v[rows], moved), load.reshape(-1)[rows]))
-            unit[rows] = _pull(pull, moved)
+        for rows, contact, offset in self.pressed(load, centre):
+            rate[rows], pull = rates(contact, z[rows], driven(contact, _seen(v[rows], offset), load.reshape(-1)[rows]))
+            unit[rows] = _pull(pull, offset)
         return rate.reshape(state.shape), unit.reshape(twist.shape)
 
     def step(
@@ -251,11 +251,11 @@ class CompiledModel:
         """Return new states and wrenches `[..., 3]`; `centre` as in `pressed`."""
         z, v, f, h = state.reshape(-1, self._size), twist.reshape(-1, 3), load.reshape(-1), dt.reshape(-1)
         new, wrench = np.zeros(z.shape), np.zeros(v.shape)
-        for rows, contact, moved in self.pressed(load, centre):
+        for rows, contact, offset in self.pressed(load, centre):
             end, pull = np.empty_like(z[rows]), np.empty_like(v[rows])
-            table, seen = self.step_table(contact), _seen(v[rows], moved)
+            table, seen = self.step_table(contact), _seen(v[rows], offset)
             ready(step_many)(table, z[rows], seen, f[rows], h[rows], end, pull, np.empty(3))
-            new[rows], wrench[rows] = end, _pull(pull, moved)
+            new[rows], wrench[rows] = end, _pull(pull, offset)
         return new.reshape(state.shape), wrench.reshape(twist.shape)
 
     def step_jacobians(
@@ -267,28 +267,28 @@ class CompiledModel:
         centre: np.ndarray | None = None,
     ) -> StepJacobians:
         """Differentiate steps, with the pressure held; `centre` as in `pressed`."""
-        given = np.concatenate([twist, load[..., None], dt[..., None]], axis=-1).reshape(load.size, 5)
-        z, found = state.reshape(-1, self._size), np.zeros((load.size, self._per_contact))
-        for rows, contact, moved in self.pressed(load, centre):
-            held = given[rows]
-            held[:, :3] = _seen(held[:, :3], moved)
-            result = np.empty(len(held) * self._per_contact + self._scratch)
-            ready(jacobians)(self._jacobian_table(contact), z[rows].ravel(), held.ravel(), result)
-            found[rows] = result[: -self._scratch].reshape(len(held), self._per_contact)
-            if moved is not None and len(moved) > 0:
-                self._move(found, rows, moved)
-        return StepJacobians(*(found[:, place].reshape(*load.shape, *shape) for place, shape in self._derivatives))
+        inputs = np.concatenate([twist, load[..., None], dt[..., None]], axis=-1).reshape(load.size, 5)
+        z, results = state.reshape(-1, self._size), np.zeros((load.size, self._per_contact))
+        for rows, contact, offset in self.pressed(load, centre):
+            numbers = inputs[rows]
+            numbers[:, :3] = _seen(numbers[:, :3], offset)
+            result = np.empty(len(numbers) * self._per_contact + self._scratch)
+            ready(jacobians)(self._jacobian_table(contact), z[rows].ravel(), numbers.ravel(), result)
+            results[rows] = result[: -self._scratch].reshape(len(numbers), self._per_contact)
+            if offset is not None and len(offset) > 0:
+                self._move(results, rows, offset)
+        return StepJacobians(*(results[:, place].reshape(*load.shape, *shape) for place, shape in self._derivatives))
 
-    def _move(self, found: np.ndarray, rows: Any, moved: np.ndarray) -> None:
-        """Bring the derivatives of patches that have moved to the twist and the wrench about the origin, in place."""
-        at = np.tile(np.eye(3), (len(moved), 1, 1))
-        at[:, 0, 2], at[:, 1, 2] = -moved[:, 1], moved[:, 0]
+    def _move(self, results: np.ndarray, rows: Any, offset: np.ndarray) -> None:
+        """Bring the derivatives of patches at an offset to the twist and the wrench about the origin, in place."""
+        at = np.tile(np.eye(3), (len(offset), 1, 1))
+        at[:, 0, 2], at[:, 1, 2] = -offset[:, 1], offset[:, 0]
         back, (_, state_twist, _, wrench_state, wrench_twist, wrench_load) = at.mT, (p for p, _ in self._derivatives)
         for place, left, right in ((state_twist, None, at), (wrench_state, back, None), (wrench_twist, back, at)):
-            block = found[rows, place].reshape(len(moved), *((-1, 3) if left is None else (3, -1)))
+            block = results[rows, place].reshape(len(offset), *((-1, 3) if left is None else (3, -1)))
             block = block if right is None else block @ right
-            found[rows, place] = (block if left is None else left @ block).reshape(len(moved), -1)
-        found[rows, wrench_load] = (back @ found[rows, wrench_load][..., None])[..., 0]
+            results[rows, place] = (block if left is None else left @ block).reshape(len(offset), -1)
+        results[rows, wrench_load] = (back @ results[rows, wrench_load][..., None])[..., 0]
 
     # ------------------------------------------------------------------ for the loops of others
 

@@ -23,7 +23,7 @@ from planarfriction.kernels.steps import StepFunctions
 from planarfriction.patch.tilt import tilted
 
 LOAD_STEP = 1e-5
-"""Step of the central differences of weights by the load, as a share of it [-]; their relative error is 1e-10."""
+"""Step of the central differences of weights by the load, as a share of the load [-]; their relative error is 1e-10."""
 
 
 class CompiledDistributed(CompiledModel):
@@ -48,10 +48,8 @@ class CompiledDistributed(CompiledModel):
 
     def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         """Return the record of a contact, and how many numbers of a linearisation each cell has."""
-        rows = LINEAR * self.size**2
-        if self.reference > 0.0:
-            rows = MATRICES * self.size**2 + 1  # the factor on the stiffness behind
-        return CellsContact(self.law.numbers, numbers.shape[1], numbers, weights), rows
+        matrices = MATRICES if self.reference > 0.0 else LINEAR
+        return CellsContact(self.law.numbers, numbers.shape[1], numbers, weights), matrices * self.size**2
 
     # ------------------------------------------------------------------ at given loads
 
@@ -87,8 +85,6 @@ class CompiledDistributed(CompiledModel):
         Four arrays `[..., d, d, N]` of d bristles a cell; the velocity is that which a cell sees.
         """
         law, d, lin = self.law.numbers, self.size, self.linearisation(state, twist, load)
-        if self.reference > 0.0:
-            lin = lin[..., : MATRICES * d * d, :]
         matrices = np.moveaxis(lin.reshape(*load.shape, lin.shape[-2] // d**2, d, d, lin.shape[-1]), -4, 0)
         by_state, by_velocity, identity = matrices[A], matrices[F], np.eye(d)[:, :, None]
         if len(matrices) == MATRICES:

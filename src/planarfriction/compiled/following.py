@@ -12,8 +12,8 @@ from planarfriction.kernels.following_cells import FUNCTIONS, OWN, FollowingCont
 from planarfriction.kernels.tilt import NARROW
 
 LAG = 1e-3
-"""Time [s] with which the pressure follows the load: about a step of a simulator, whose patches follow that of the step
-before."""
+"""Time [s] with which the pressure follows the load: about a step of a simulator, whose patches follow the load
+of the step before."""
 
 STATES = 2
 """States behind the bristles: how far the centre of pressure is from the centre of mass, along x and y [m]."""
@@ -25,11 +25,11 @@ def following(
     """Return packed cells whose pressure follows a load at `centre` [m] in the contact frame, `height` [m] above it."""
     (weights, numbers), positions = packed.keepalive, compiled.patch.positions[packed.cells]
     count, (x, y) = weights.shape[1], np.ascontiguousarray(positions.T)
-    middle, slopes, radius = _moved(weights, positions)
+    middle, slopes, radius = _statics_of(weights, positions)
     pressed, trial, scratch, zero, rows = (
         np.zeros(size) for size in (count, count, *(packed.states + STATES,) * 2, 12)
     )
-    held, tried = (row_of(compiled.record(numbers, each)[0]) for each in (pressed, trial))
+    cells, trial_cells = (row_of(compiled.record(numbers, each)[0]) for each in (pressed, trial))
     calls = calls_of(packed.functions, change=True)
     record = FollowingContact(
         count=count,
@@ -41,8 +41,8 @@ def following(
         slope_x=slopes[0],
         slope_y=slopes[1],
         calls=calls,
-        held=place_of(held),
-        tried=place_of(tried),
+        cells=place_of(cells),
+        trial_cells=place_of(trial_cells),
         pressed=pressed,
         trial=trial,
         scratch=scratch,
@@ -61,11 +61,25 @@ def following(
         states=packed.states + STATES,
         workspace=OWN + packed.workspace,
         state_scale=np.append(packed.state_scale, np.full(STATES, radius / np.sqrt(count + 1))),
-        keepalive=(*packed.keepalive, x, y, middle, slopes, calls, held, tried, pressed, trial, scratch, zero, rows),
+        keepalive=(
+            *packed.keepalive,
+            x,
+            y,
+            middle,
+            slopes,
+            calls,
+            cells,
+            trial_cells,
+            pressed,
+            trial,
+            scratch,
+            zero,
+            rows,
+        ),
     )
 
 
-def _moved(weights: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def _statics_of(weights: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Return the centres of pressure `[R, 2]` of rows of weights, their slopes by it `[2, R, n]`, and a radius [m].
 
     A plane over cells along a line does not tilt them across it.

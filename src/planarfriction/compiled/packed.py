@@ -9,7 +9,7 @@ import numpy as np
 from planarfriction.compiler.calls import address_of
 from planarfriction.compiler.memory import place_of, row_of
 from planarfriction.equality import by_parts
-from planarfriction.kernels.steps import WORDS, Stepped
+from planarfriction.kernels.steps import Stepped
 
 MAX_PACK_BYTES = 64e6
 """Bytes of shapes that a model packs at a time, if that is more than one shape."""
@@ -40,7 +40,7 @@ class PackedModel(NamedTuple):
     keepalive: tuple[np.ndarray, ...]
     """Arrays whose addresses are in the records; the caller of the functions must keep them alive."""
     cells: np.ndarray | None = None
-    """Mask of the cells of the model that have bristles here, bool `[N]`, where states are those of cells."""
+    """Mask of the cells of the model that have bristles here, bool `[N]`, where states belong to cells."""
     velocity_scale: float = VELOCITY_SCALE
     """Natural scale of the body's velocity, as a share of v_s [-].
 
@@ -57,6 +57,6 @@ class PackedModel(NamedTuple):
     def table(self, function: Any, square: int) -> np.ndarray:
         """Return the words of `kernels.steps.Stepped`, which hold as long as the records; `square` as there."""
         loads, words = self.records.shape
-        address = address_of(function, WORDS)
-        own = address, self.states, square, loads, place_of(self.records), words
-        return row_of(Stepped(*own, self.reference, self.bristle))
+        address = address_of(function)
+        fields = address, self.states, square, loads, place_of(self.records), words
+        return row_of(Stepped(*fields, self.reference, self.bristle))

@@ -16,16 +16,16 @@ from planarfriction.kernels.general_cells import MATRICES
 from planarfriction.kernels.steps import StepFunctions
 
 
-def _finite(door: Callable) -> Callable:
+def _finite(method: Callable) -> Callable:
     """Return a door of steps or rates that raises where the law's functions leave the range of numbers."""
 
-    @functools.wraps(door)
+    @functools.wraps(method)
     def checked(self: CompiledDistributed, *inputs: Any) -> Any:
-        found = door(self, *inputs)
-        if found is not None and not all(np.isfinite(each).all() for each in found):
+        results = method(self, *inputs)
+        if results is not None and not all(np.isfinite(each).all() for each in results):
             rule = "give finite rates and tractions at these inputs"
             raise InvalidValueError("law", rule, type(self.law).__name__)
-        return found
+        return results
 
     return checked
 

@@ -7,7 +7,6 @@ import numpy as np
 from planarfriction.compiled.packed import PackedModel
 from planarfriction.compiler.calls import address_of
 from planarfriction.kernels import batched_rates as kernels
-from planarfriction.kernels.contacts import WORDS
 
 
 def rates(packed: PackedModel, state: np.ndarray, twist: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -16,14 +15,14 @@ def rates(packed: PackedModel, state: np.ndarray, twist: np.ndarray) -> tuple[np
     `packed` has one record, or one for each contact.
     """
     rate, wrench = np.empty((len(twist), packed.states)), np.empty((len(twist), 3))
-    function = address_of(packed.functions.evaluate, WORDS[0])
+    function = address_of(packed.functions.evaluate)
     kernels.evaluate(function, packed.records, state.reshape(rate.shape), twist, rate, wrench)
     return rate.reshape(state.shape), wrench
 
 
 def linearised(packed: PackedModel, state: np.ndarray, twist: np.ndarray) -> np.ndarray:
-    """Return linearisations `[B, workspace]`; the kernels of each kind of model say what they hold."""
+    """Return linearisations `[B, workspace]`; the kernels of each kind of model describe the numbers."""
     lin = np.empty((len(twist), packed.workspace))
-    function = address_of(packed.functions.linearise, WORDS[1])
+    function = address_of(packed.functions.linearise)
     kernels.linearise(function, packed.records, state.reshape(len(twist), packed.states), twist, lin)
     return lin

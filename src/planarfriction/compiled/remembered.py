@@ -1,4 +1,4 @@
-"""A memory of bounded length for what a model builds, which any number of threads may use."""
+"""Memory of bounded length for parts that a model builds, for any number of threads."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ T = TypeVar("T")
 
 
 class Remembered(Generic[T]):
-    """Results for the last `most` keys; none of them changes, and nothing that someone holds is taken away.
+    """Results for the last `most` keys; none changes, and none that someone holds is taken away.
 
-    Threads build at the same time. Where two of them build for one key, both get what the first one has put in.
+    Threads build at the same time. Where two build for one key, both get the result of the first.
     """
 
     def __init__(self, most: int) -> None:
@@ -25,11 +25,11 @@ class Remembered(Generic[T]):
 
     def get(self, key: Hashable, build: Callable[[], T]) -> T:
         """Return the result for `key`; `build` makes it if it is missing."""
-        found = self._results.get(key)
-        if found is None:
+        result = self._results.get(key)
+        if result is None:
             built = build()
             with self._lock:
-                found = self._results.setdefault(key, built)
+                result = self._results.setdefault(key, built)
                 while len(self._results) > self._most:
                     del self._results[next(iter(self._results))]
-        return found
+        return result

@@ -19,7 +19,7 @@ Inner: Any = part("planarfriction.compiler.inner", "Inner", Compiler)
 """Numba's compiler for inner functions, or its own for all."""
 
 kept: Any = part("planarfriction.compiler.machine_code", "kept", lambda dispatcher, sources: dispatcher)
-"""Function that keeps what a dispatcher compiles on disk, as far as Numba lets it."""
+"""Function that keeps the machine code of a dispatcher on disk, as far as Numba lets it."""
 
 missing: Any = part("planarfriction.compiler.machine_code", "missing", lambda dispatcher, signature: False)
 """Function that tells if something has yet to be compiled that can be kept on disk."""

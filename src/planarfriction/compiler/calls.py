@@ -1,4 +1,4 @@
-"""Compiled functions called by their addresses, so that the caller is compiled once for all of them.
+"""Compiled functions called by their addresses, so that the caller is compiled once for all.
 
 Such a function takes addresses (int64), pointers to doubles and numbers (float64) and returns nothing: arguments stay
 in registers. Its machine code is cached on disk; its address is looked up anew in each process.
@@ -7,6 +7,7 @@ in registers. Its machine code is cached on disk; its address is looked up anew 
 from __future__ import annotations
 
 import functools
+import inspect
 from typing import Any
 
 import numpy as np
@@ -17,17 +18,15 @@ from numba.extending import intrinsic
 
 from planarfriction.compiler.memory import place_of
 
-_ARGUMENTS = {"p": types.int64, "d": types.CPointer(types.float64), "f": types.float64}
-"""Types of the letters of `words`: place (address), doubles (pointer), number."""
+_POINTER = types.CPointer(types.float64)
+_ARGUMENTS = {"Place": types.int64, "int": types.int64, "Doubles": _POINTER, "float": types.float64}
+"""Types of arguments by their annotations."""
 
 
-Function = tuple[Any, str]
-"""A compiled function and a letter for each of its arguments: p, d or f."""
-
-
-def signature_of(words: str) -> tuple:
-    """Return the types of the arguments with these letters."""
-    return tuple(_ARGUMENTS[word] for word in words)
+def signature_of(function: Any) -> tuple:
+    """Return the types of the arguments of a compiled function, which its annotations declare; none is an address."""
+    annotations = function.py_func.__annotations__
+    return tuple(_ARGUMENTS[annotations.get(name, "Place")] for name in inspect.signature(function.py_func).parameters)
 
 
 def _compiled(function: Any, signature: tuple) -> Any:
@@ -36,39 +35,39 @@ def _compiled(function: Any, signature: tuple) -> Any:
 
 
 @functools.cache
-def address_of(function: Any, words: str) -> int:
-    """Return the address of a compiled function in this process; `words` has a letter for each argument: p, d or f."""
-    compiled = _compiled(function, signature_of(words))
+def address_of(function: Any) -> int:
+    """Return the address in this process of a compiled function whose arguments are annotated."""
+    compiled = _compiled(function, signature_of(function))
     return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
 
 
-def c_address_of(function: Any, words: int) -> int:
-    """Return the address of a compiled `kernels.callback` for C libraries, which give it `words` addresses."""
-    compiled = _compiled(function, (types.int64,) * words)
+def c_address_of(function: Any, count: int) -> int:
+    """Return the address of a compiled `kernels.callback` for C libraries, which give it `count` addresses."""
+    compiled = _compiled(function, (types.int64,) * count)
     return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
 
 
 @intrinsic
-def call(typingctx, address, arguments):
+def call(typingctx: Any, address: types.Type, arguments: types.Type) -> Any:
     """Call the function at `address` with a tuple of arguments; an array passes the address of its first number."""
-    if any(isinstance(given, types.Array) and given.layout != "C" for given in arguments):
+    if any(isinstance(argument, types.Array) and argument.layout != "C" for argument in arguments):
         return None
 
-    def passed(given):
-        if isinstance(given, (types.CPointer, types.Array)):
-            return _ARGUMENTS["d"]
-        return types.float64 if isinstance(given, types.Float) else types.int64
+    def type_of(argument: types.Type) -> types.Type:
+        if isinstance(argument, (types.CPointer, types.Array)):
+            return _POINTER
+        return types.float64 if isinstance(argument, types.Float) else types.int64
 
-    kinds = tuple(passed(given) for given in arguments)
+    kinds = tuple(type_of(argument) for argument in arguments)
 
-    def generate(context, builder, signature, args):
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         target, packed = args
         values = []
-        for i, given in enumerate(signature.args[1]):
+        for i, argument in enumerate(signature.args[1]):
             value = builder.extract_value(packed, i)
-            if isinstance(given, types.Array):
-                value = context.make_array(given)(context, builder, value).data
-            if kinds[i] == _ARGUMENTS["d"]:
+            if isinstance(argument, types.Array):
+                value = context.make_array(argument)(context, builder, value).data
+            if kinds[i] == _POINTER:
                 value = builder.bitcast(value, ir.DoubleType().as_pointer())
             values.append(value)
         kind = context.call_conv.get_function_type(types.none, kinds)
@@ -81,32 +80,32 @@ def call(typingctx, address, arguments):
 
 
 @intrinsic
-def pointer(typingctx, array):
+def pointer(typingctx: Any, array: types.Type) -> Any:
     """Return the pointer to the first number of a contiguous array."""
     if not (isinstance(array, types.Array) and array.layout == "C"):
         return None
 
-    def generate(context, builder, signature, args):
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return context.make_array(signature.args[0])(context, builder, args[0]).data
 
     return types.CPointer(array.dtype)(array), generate
 
 
 @intrinsic
-def call_c(typingctx, address, arguments):
+def call_c(typingctx: Any, address: types.Type, arguments: types.Type) -> Any:
     """Call the function of a C library at `address` with a tuple of integers, doubles and pointers; return its word."""
-    if any(not isinstance(given, (types.Integer, types.Float, types.CPointer)) for given in arguments):
+    if any(not isinstance(argument, (types.Integer, types.Float, types.CPointer)) for argument in arguments):
         return None
     word = ir.IntType(64)
 
-    def generate(context, builder, signature, args):
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         target, packed = args
         values = []
-        for i, given in enumerate(signature.args[1]):
-            wanted = types.float64 if isinstance(given, types.Float) else types.int64
+        for i, argument in enumerate(signature.args[1]):
+            wanted = types.float64 if isinstance(argument, types.Float) else types.int64
             value = builder.extract_value(packed, i)
-            pointer = isinstance(given, types.CPointer)
-            values.append(builder.ptrtoint(value, word) if pointer else context.cast(builder, value, given, wanted))
+            pointer = isinstance(argument, types.CPointer)
+            values.append(builder.ptrtoint(value, word) if pointer else context.cast(builder, value, argument, wanted))
         kind = ir.FunctionType(word, [value.type for value in values])
         return builder.call(builder.inttoptr(target, kind.as_pointer()), values)
 
@@ -119,8 +118,8 @@ def shared_word(name: str) -> tuple[np.ndarray, Any]:
     add_symbol(name, place_of(word))
 
     @intrinsic
-    def read_word(typingctx):
-        def generate(context, builder, signature, args):
+    def read_word(typingctx: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             place = builder.module.globals.get(name) or ir.GlobalVariable(builder.module, ir.IntType(64), name)
             place.linkage = "external"
             return builder.load(place)

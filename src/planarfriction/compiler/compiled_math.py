@@ -3,11 +3,13 @@
 The C library's `exp` and `sin` keep the compiler from vectorising a loop; these polynomials do not (measured on 317
 cells: a third of the time). Each states its domain and error; the tests check both.
 Polynomials are summed in pairs (Estrin), which keeps the chain of dependent operations short where a single bristle is
-stepped. Their coefficients are those with the least largest error over the domain (Remez), which needs two or three
+stepped. The coefficients have the least largest error over the domain (Remez), which needs two or three
 terms less than the series.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 from llvmlite import ir
 from numba import njit, types
@@ -36,7 +38,7 @@ _EXP_LARGEST = 708.0  # beyond it the result leaves the range of normal doubles
 
 
 @intrinsic
-def _bits_to_float(typingctx, bits):
+def _bits_to_float(typingctx: Any, bits: types.Type) -> Any:
     """Return the double that has the 64 bits of an integer."""
     return types.float64(types.int64), lambda context, builder, signature, args: builder.bitcast(
         args[0], ir.DoubleType()
@@ -44,7 +46,7 @@ def _bits_to_float(typingctx, bits):
 
 
 @intrinsic
-def _float_to_bits(typingctx, x):
+def _float_to_bits(typingctx: Any, x: types.Type) -> Any:
     """Return the integer that has the 64 bits of a double."""
     return types.int64(types.float64), lambda context, builder, signature, args: builder.bitcast(
         args[0], ir.IntType(64)
@@ -52,38 +54,38 @@ def _float_to_bits(typingctx, x):
 
 
 @_inline
-def where(condition, a, b):
+def where(condition: bool, a: float, b: float) -> float:
     """Return `a` where the condition holds, else `b`."""
     return a if condition else b
 
 
 @_inline
-def in_range(x):
+def in_range(x: float) -> bool:
     """Return True for a number not beyond the largest that is taken: products of three and their squares stay
     finite."""
     return abs(x) <= LARGEST
 
 
 @_inline
-def is_finite(x):
+def is_finite(x: float) -> bool:
     """Return True unless a number is NaN or infinite. (`math.isfinite` takes x - x, which reordering turns into 0.)"""
     return abs(x) <= 1.7976931348623157e308
 
 
 @_inline
-def minimum(a, b):
+def minimum(a: float, b: float) -> float:
     """Return the smaller of two numbers."""
     return a if a < b else b
 
 
 @_inline
-def maximum(a, b):
+def maximum(a: float, b: float) -> float:
     """Return the larger of two numbers."""
     return a if a > b else b
 
 
 @_inline
-def in_order(x):
+def in_order(x: float) -> int:
     """Return an integer for a double, larger for larger ones: the largest of many integers is found in vector code.
 
     Of negative numbers only that they are less than the others.
@@ -92,7 +94,7 @@ def in_order(x):
 
 
 @_inline
-def rounded(x):
+def rounded(x: float) -> tuple[float, float]:
     """Return the integer k that is nearest to a number below 1000, and `2^k`.
 
     k stands in the last bits of a sum: processors before AVX-512 have no vector code that makes integers of doubles.
@@ -102,7 +104,7 @@ def rounded(x):
 
 
 @_inline
-def _halved(x):
+def _halved(x: float) -> tuple[float, float]:
     """Return `2^k` and `e^r - 1` of the rest r, with `e^x = 2^k e^r` and `|r| <= ln(2)/2`; x is limited to +-708."""
     x = minimum(maximum(x, -_EXP_LARGEST), _EXP_LARGEST)
     k, scale = rounded(x * _LOG2_E)
@@ -118,21 +120,21 @@ def _halved(x):
 
 
 @_inline
-def exp(x):
+def exp(x: float) -> float:
     """Return `e^x`, relative error below 6e-16, argument limited to +-708."""
     scale, rest = _halved(x)
     return scale + scale * rest
 
 
 @_inline
-def expm1(x):
+def expm1(x: float) -> float:
     """Return `e^x - 1`, relative error below 6e-16, argument limited to +-708."""
     scale, rest = _halved(x)
     return (scale - 1.0) + scale * rest
 
 
 @_inline
-def log(x):
+def log(x: float) -> float:
     """Return the natural logarithm of a normal double x > 0, relative error below 1e-15; about -709 at x = 0."""
     bits = _float_to_bits(x)
     exponent = (bits >> 52) - 1023
@@ -156,7 +158,7 @@ def log(x):
 
 
 @_inline
-def power(x, exponent):
+def power(x: float, exponent: float) -> float:
     """Return `x^exponent` for x >= 0 and exponent > 0; the square, the usual Stribeck exponent, is exact."""
     if exponent == 2.0:
         return x * x
@@ -164,7 +166,7 @@ def power(x, exponent):
 
 
 @_inline
-def sin(x):
+def sin(x: float) -> float:
     """Return the sine for |x| <= pi/2, absolute error below 4e-16."""
     q = x * x
     q2 = q * q
@@ -175,7 +177,7 @@ def sin(x):
 
 
 @_inline
-def cos(x):
+def cos(x: float) -> float:
     """Return the cosine for |x| <= pi/2, absolute error below 4e-16."""
     q = x * x
     q2 = q * q
@@ -186,7 +188,7 @@ def cos(x):
 
 
 @_inline
-def atan2(y, x):
+def atan2(y: float, x: float) -> float:
     """Return the angle of the vector (x, y) in (-pi, pi], absolute error below 1e-15; 0 for the zero vector."""
     across, along = abs(y), abs(x)
     small, large = minimum(across, along), maximum(across, along)

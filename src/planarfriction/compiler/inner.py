@@ -36,7 +36,7 @@ _NEEDLESS = {
     "NoPythonSupportedFeatureValidation",
     "DumpParforDiagnostics",
 }
-"""Passes of Numba for what inner functions do not contain: closures, `with`, expressions of arrays, parallel loops."""
+"""Passes of Numba for features that inner functions lack: closures, `with`, expressions of arrays, parallel loops."""
 
 
 _REFUSE = ctypes.cast(ctypes.pythonapi.PyErr_BadArgument, ctypes.c_void_p).value
@@ -44,7 +44,7 @@ _REFUSE = ctypes.cast(ctypes.pythonapi.PyErr_BadArgument, ctypes.c_void_p).value
 
 
 class _Linked(JITCodeLibrary):
-    """Code that is only ever linked into that of callers: simplified, with its own inner functions in place."""
+    """Code that is only ever linked into the code of callers: simplified, with its own inner functions in place."""
 
     def _optimize_final_module(self) -> None:
         made = self._codegen._module_pass_manager(opt=0, loop_vectorize=False, slp_vectorize=False, cost="cheap")
@@ -78,7 +78,7 @@ class Inner(CompilerBase):
     """Compiler of inner functions."""
 
     def define_pipelines(self) -> list[PassManager]:
-        """Return Numba's passes without those that find nothing here, and with another lowering."""
+        """Return Numba's passes without the needless ones, and with another lowering."""
         passes = PassManager("inner")
         for each, words in DefaultPassBuilder.define_nopython_pipeline(self.state).passes:
             if each.__name__ not in _NEEDLESS:

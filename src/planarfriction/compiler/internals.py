@@ -1,4 +1,4 @@
-"""Parts that lean on internals of Numba, each with what stands in for it where the installed Numba lacks them."""
+"""Parts that lean on internals of Numba, each with a substitute where the installed Numba lacks them."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any
 import llvmlite
 import numba
 
-_told = False
+_warned = False
 
 
 def part(module: str, name: str, instead: Any) -> Any:
-    """Return a part by its name, or what replaces it if the installed Numba lacks something that it needs.
+    """Return a part by its name, or `instead` if the installed Numba lacks something that the part needs.
 
     Everything then works as before, but slower: the user is told once in a process.
     """
@@ -32,9 +32,9 @@ def need(owner: Any, *names: str) -> None:
 
 
 def _tell(error: Exception) -> None:
-    global _told
-    if not _told:
-        _told = True
+    global _warned
+    if not _warned:
+        _warned = True
         warnings.warn(
             f"Numba {numba.__version__} with llvmlite {llvmlite.__version__} differs from the versions that were "
             f"tested ({error}): compiling takes longer, and may take place in each process",

@@ -18,9 +18,9 @@ from numba.core import event
 class _Keyboard(event.Listener):
     """Listener that holds Ctrl-C back and hands it on between passes, where an exception does no harm."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.hear: Callable[..., Any] | None = None
-        """Handler of the signal that is to hear of it."""
+        """Handler of the signal, which hears of Ctrl-C later."""
         self.pressed = False
 
     def hold(self, number: int, frame: Any) -> None:
@@ -28,7 +28,7 @@ class _Keyboard(event.Listener):
         self.pressed = True
 
     def hand_on(self) -> None:
-        """Do now what Ctrl-C would have done then."""
+        """Call the handler that Ctrl-C would have called."""
         if self.pressed and self.hear is not None and _in_main_thread():
             self.pressed = False
             self.hear(signal.SIGINT, inspect.currentframe())

@@ -50,12 +50,12 @@ def kept(dispatcher: Any, sources: Sources) -> Any:
     if config.DISABLE_JIT:
         return dispatcher
     function = dispatcher.py_func
-    own = digest_of(Path(function.__code__.co_filename))
-    if own is not None and sources.digest is not None and function.__closure__ is None:
-        dispatcher._cache = MachineCode(function, own, sources)
+    digest = digest_of(Path(function.__code__.co_filename))
+    if digest is not None and sources.digest is not None and function.__closure__ is None:
+        dispatcher._cache = MachineCode(function, digest, sources)
     compile_deaf = dispatcher.compile
 
-    def compile_hearing(signature):
+    def compile_hearing(signature: Any) -> Any:
         wait_for(dispatcher)
         with heard_between_passes():
             return compile_deaf(signature)
@@ -85,13 +85,13 @@ def folders(sources: Sources) -> Iterator[Path]:
 class MachineCode(NullCache):
     """Machine code of one function on disk, with the interface that Numba expects of a cache."""
 
-    told = False
-    """True once the user has been told that nothing can be kept."""
+    warned = False
+    """True once the user was warned that nothing can be kept."""
 
-    def __init__(self, function: Any, own: str, sources: Sources):
+    def __init__(self, function: Any, digest: str, sources: Sources) -> None:
         path, name = Path(function.__code__.co_filename), function.__qualname__
         self._sources, self._name = sources, f"{path.stem}.{name}"
-        self._identity = (sources.name_of(path), name, own)
+        self._identity = (sources.name_of(path), name, digest)
 
     @property
     def cache_path(self) -> str:
@@ -153,8 +153,8 @@ class MachineCode(NullCache):
     @classmethod
     def _tell(cls, reason: str) -> None:
         """Warn the user, once in a process."""
-        if not cls.told:
-            cls.told = True
+        if not cls.warned:
+            cls.warned = True
             warnings.warn(
                 f"compiled code is not kept, each process compiles anew ({reason}): "
                 "name a folder that can be written in NUMBA_CACHE_DIR",
@@ -178,7 +178,7 @@ def target() -> tuple[str, set[str]]:
 
 
 def whole(file: Path) -> bool:
-    """Return True if the content of a file of machine code is what its checksum says."""
+    """Return True if the content of a file of machine code fits its checksum."""
     read = file.read_bytes()
     return read[:_SEAL].endswith(_checksum(read[_SEAL:]))
 
@@ -194,7 +194,7 @@ def _unpacked(file: bytes, origin: bytes, arguments: tuple, target_context: Any)
 
 
 def _make(folder: Path) -> None:
-    """Make a folder for machine code, and delete the oldest of those beside it that hold other versions."""
+    """Make a folder for machine code, and delete the oldest folders beside it that hold other versions."""
     if folder.is_dir():
         return
     folder.mkdir(parents=True, exist_ok=True)

@@ -2,7 +2,7 @@
 
 A record is a `NamedTuple` whose fields are numbers (`float`), counts and addresses of functions (`int`), arrays
 (`Doubles`, `Integers`) or records. In memory it is a row of 8-byte words, an array being the address of its
-first number; compiled code reads the row as the same `NamedTuple`, whose arrays are then pointers: `own.twist[i]`.
+first number; compiled code reads the row as the same `NamedTuple`, whose arrays are then pointers: `record.twist[i]`.
 """
 
 from __future__ import annotations
@@ -27,6 +27,9 @@ Doubles = Annotated[np.ndarray, types.float64]
 
 Integers = Annotated[np.ndarray, types.int64]
 """Field of a record that holds a contiguous array of 64-bit integers."""
+
+Place = int
+"""Argument of a compiled function that is an address."""
 
 _WORD = 8
 """Bytes of a word."""
@@ -113,9 +116,9 @@ def _write(row: np.ndarray, record: Any) -> None:
 
 
 def rows_of(record: Any, count: int, **columns: np.ndarray) -> np.ndarray:
-    """Return the words of `count` records `[count, size]`: those of `record` but for the fields in `columns`.
+    """Return the words of `count` records `[count, size]`: copies of `record` but for the fields in `columns`.
 
-    A column holds one row for each record; that of an array holds addresses.
+    A column holds one row for each record; the column of an array holds addresses.
     """
     rows = np.tile(row_of(record), (count, 1))
     at = 0
@@ -149,7 +152,7 @@ def _type_of(record: Any) -> Any:
     return types.BaseTuple.from_types(parts, record)
 
 
-def _load(context, builder, kind, words, at, constant=False):
+def _load(context: Any, builder: Any, kind: Any, words: Any, at: int, constant: bool = False) -> tuple[Any, int]:
     """Load a value of a type whose words begin at number `at`; return it and where the next begins.
 
     Words that are `constant` as long as the function runs may be loaded once for a whole loop.
@@ -167,7 +170,7 @@ def _load(context, builder, kind, words, at, constant=False):
     return value, at + 1
 
 
-def _pointer(context, builder, kind, value, target):
+def _pointer(context: Any, builder: Any, kind: Any, value: Any, target: Any) -> Any:
     """Return an address, a pointer or an array as a pointer to numbers of another type."""
     if isinstance(kind, types.Array):
         value = context.make_array(kind)(context, builder, value).data
@@ -211,7 +214,7 @@ class _Fields(AttributeTemplate):
 
 
 @lower_getattr_generic(_View)
-def _load_field(context, builder, view, value, name):
+def _load_field(context: Any, builder: Any, view: _View, value: Any, name: str) -> Any:
     words, first = builder.bitcast(value, ir.DoubleType().as_pointer()), 0
     for field, kind in _fields(view.record):
         if field == name:
@@ -233,8 +236,8 @@ def reader(record: Any) -> Any:
     result = _type_in_view(record)
 
     @intrinsic
-    def read(typingctx, row):
-        def generate(context, builder, signature, args):
+    def read(typingctx: Any, row: types.Type) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             words = _pointer(context, builder, row, args[0], types.float64)
             if isinstance(result, _View):
                 return builder.bitcast(words, context.get_value_type(result))
@@ -249,11 +252,11 @@ def _view(number: Any) -> Any:
     """Make the compiled function that takes an address or a pointer for one to numbers of a type."""
 
     @intrinsic
-    def view(typingctx, place):
+    def view(typingctx: Any, place: types.Type) -> Any:
         if not isinstance(place, (types.Integer, types.CPointer)):
             return None
 
-        def generate(context, builder, signature, args):
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             return _pointer(context, builder, place, args[0], number)
 
         return types.CPointer(number)(place), generate
@@ -267,26 +270,26 @@ doubles, floats, integers, integers32 = (
 
 
 @intrinsic
-def at(typingctx, place, i):
+def at(typingctx: Any, place: types.Type, i: types.Type) -> Any:
     """Return the place, pointer or address, of the number i of 8 bytes from a place on."""
     if not isinstance(i, types.Integer) or not isinstance(place, (types.Integer, types.CPointer)):
         return None
     if isinstance(place, types.CPointer):
         return place(place, types.int64), lambda context, builder, signature, args: builder.gep(args[0], [args[1]])
 
-    def generate(context, builder, signature, args):
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.add(args[0], builder.mul(args[1], ir.Constant(ir.IntType(64), _WORD)))
 
     return types.int64(types.int64, types.int64), generate
 
 
 @intrinsic
-def exists(typingctx, place):
-    """Return True unless a pointer is that of an array without numbers."""
+def exists(typingctx: Any, place: types.Type) -> Any:
+    """Return True unless a pointer belongs to an array without numbers."""
     if not isinstance(place, types.CPointer):
         return None
 
-    def generate(context, builder, signature, args):
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return cgutils.is_not_null(builder, args[0])
 
     return types.boolean(place), generate
@@ -320,13 +323,13 @@ class Layout:
         """Bytes at which the arrays begin, -1 for those without numbers."""
         self._integers = {name for name, kind in _fields(record) if _number_of(kind) == types.int64}
 
-    def made(self, **given: np.ndarray) -> Any:
-        """Return the record with its arrays in a new block of zeros, but for those that are `given`."""
+    def made(self, **known: np.ndarray) -> Any:
+        """Return the record with its arrays in a new block of zeros, except arrays that are `known`."""
         block, arrays = np.zeros(self.size), {}
         for name, shape in self._shapes.items():
             flat = block[self.slices[name]]
             arrays[name] = (flat.view(np.int64) if name in self._integers else flat).reshape(shape)
-        return self._record(**{**arrays, **given})
+        return self._record(**{**arrays, **known})
 
     def placed(self, block: np.ndarray) -> Any:
         """Return the words of the record whose arrays lie in a block, which the caller keeps alive."""
@@ -338,11 +341,11 @@ layout = functools.lru_cache(64)(Layout)
 
 
 @intrinsic
-def arrays_at(typingctx, offsets, place):
+def arrays_at(typingctx: Any, offsets: types.Type, place: types.Type) -> Any:
     """Return the record of a `Layout` whose block begins at a place, from the offsets of its arrays."""
     result = _type_of(offsets.instance_class.record)
 
-    def generate(context, builder, signature, args):
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         first, fields = _pointer(context, builder, place, args[1], types.float64), []
         for kind, offset in zip(result, cgutils.unpack_tuple(builder, args[0]), strict=True):
             fields.append(builder.bitcast(builder.gep(first, [offset]), context.get_value_type(kind)))

@@ -23,7 +23,7 @@ def watched() -> bool:
 
 
 class _Said(Listener):
-    """Listener that says it when the first function is compiled; what is read from the cache needs no words."""
+    """Listener that prints a line when the first function is compiled; machine code from the cache needs none."""
 
     done = False
 

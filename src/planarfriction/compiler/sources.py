@@ -1,4 +1,4 @@
-"""Sources that machine code may be made from, with one digest of all of them."""
+"""Sources that machine code may be made from, with one digest of all."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def digest_of(file: Path) -> str | None:
 
 
 class Sources:
-    """Files of a package whose functions any function of it may call, as they were when they were imported."""
+    """Files of a package that machine code depends on, as they were when they were imported."""
 
-    def __init__(self, root: Path, files: Iterable[Path]):
+    def __init__(self, root: Path, files: Iterable[Path]) -> None:
         self.root, self.files = root, sorted(files)
         self.digest = self._digest_now()
 

@@ -23,7 +23,7 @@ _PATIENCE = 0.5
 class Crew:
     """Processes that do jobs, numbered, from the last to the first, while this process takes them from the first on.
 
-    Each process runs `code`, which calls `serve`. A job whose process ends goes back to those that are left.
+    Each process runs `code`, which calls `serve`. A job whose process ends is done by another.
     """
 
     def __init__(self, code: str, jobs: Iterable[int], processes: int) -> None:

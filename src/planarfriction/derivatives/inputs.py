@@ -12,12 +12,15 @@ from planarfriction import validation
 from planarfriction.compiled.shapes_by_load import ShapesByLoad
 from planarfriction.compiler import threads
 from planarfriction.compiler.notice import said_when_compiling
-from planarfriction.derivatives.parameters import WORTH_A_THREAD, Packed, pack
+from planarfriction.derivatives.parameters import Packed, pack
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.rollouts import Inputs
 
+_WORTH_A_THREAD = 20_000
+"""Steps [-] below which starting a thread costs more than it saves."""
+
 LIGHTEST = 1e-9
-"""Load [N] whose shape stands for that of a load that fades in, of which the slope at no load is."""
+"""Load [N] whose shape stands for the shape of a load that fades in, for the slope at no load."""
 
 
 class RolloutInputs(NamedTuple):
@@ -132,4 +135,4 @@ def sum_to(shape: tuple[int, ...], gradient: np.ndarray) -> np.ndarray:
 def share(inputs: Inputs, count: int, work: Callable[[int, int], None]) -> None:
     """Run `work(first, last)` over all contacts, on several threads where that pays."""
     with said_when_compiling():
-        threads.share(count, count * len(inputs.dt) // WORTH_A_THREAD, work)
+        threads.share(count, count * len(inputs.dt) // _WORTH_A_THREAD, work)

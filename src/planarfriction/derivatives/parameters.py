@@ -10,16 +10,13 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.compiled.shapes_by_load import ShapesByLoad, cells_by_load
-from planarfriction.compiler import threads
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
-from planarfriction.kernels import cells_rollout, cells_sensitivities, published_step
-from planarfriction.kernels.cell_blocks import divided
+from planarfriction.kernels import cells_rollout, published_step
 from planarfriction.kernels.cell_kinds import rollouts_of_cells
 from planarfriction.kernels.law import LAW
 from planarfriction.kernels.published_rollouts import gradient, rollout, sensitivities, tangent
-from planarfriction.kernels.rollouts import Inputs
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModelPublished
 from planarfriction.models.reduced_published import PublishedShape, axes_of
@@ -44,10 +41,6 @@ _POSITIVE = ("sigma_0", "mu_c", "mu_s", "v_s", "gamma", "contact_radius")
 _NON_NEGATIVE = ("sigma_1", "sigma_2", "second_moment")
 
 
-WORTH_A_THREAD = 20_000
-"""Steps [-] below which starting a thread costs more than it saves."""
-
-
 class Family(NamedTuple):
     """Parameters and compiled rollouts of one kind of model."""
 
@@ -59,7 +52,7 @@ class Family(NamedTuple):
     gradient: Callable[..., None]
     sensitivities: Callable[..., None]
     tangent: Callable[..., None]
-    """Compiled loops (see `kernels.rollouts`), which add to what comes in but for the state."""
+    """Compiled loops (see `kernels.rollouts`), which add to their outputs but write the state."""
 
 
 PUBLISHED = Family(
@@ -76,34 +69,9 @@ PUBLISHED = Family(
 @functools.cache
 def _cells(size: int, turned: bool) -> Family:
     """Return the rollouts of `DistributedModel` of points, size 2, or of discs, 3; `turned` with a metric."""
-    entries, forwards = rollouts_of_cells(size, turned)
-
-    def sensitivities(
-        inputs: Inputs, span: Any, z: np.ndarray, columns: np.ndarray, wrenches: np.ndarray, slopes: np.ndarray
-    ) -> None:
-        """Step the contacts; the blocks of a single one on several threads."""
-        wanted = np.array([cells_sensitivities.PARAMETERS.index(LawNumbers._fields[i]) for i in columns], dtype=int)
-        blocks, lanes = divided.py_func(inputs.shapes.shape[1])
-        if blocks == 1 or len(wrenches) > 1:
-            forwards(inputs, span, z, wanted, wrenches, slopes)
-            return
-        state, data = z.reshape(1, size, -1), inputs.data.reshape(blocks, -1)
-
-        def one(k: int) -> tuple[np.ndarray, np.ndarray]:
-            cells = slice(k * lanes, (k + 1) * lanes)
-            own, found = state[..., cells].reshape(1, -1), (np.zeros_like(wrenches), np.zeros_like(slopes))
-            shapes, by_load = (np.ascontiguousarray(each[..., cells]) for each in (inputs.shapes, inputs.by_load))
-            part = inputs._replace(data=data[k], shapes=shapes, by_load=by_load)
-            forwards(part, span, own, wanted, *found)
-            state[..., cells] = own.reshape(1, size, -1)
-            return found
-
-        for found, change in threads.each(one, range(blocks)):
-            wrenches += found
-            slopes += change
-
+    loops, sensitivities = rollouts_of_cells(size, turned)
     names, columns = cells_rollout.PARAMETERS, np.array(cells_rollout.COLUMNS)
-    return Family(names, columns, entries.rollout, entries.gradient, sensitivities, entries.tangent)
+    return Family(names, columns, loops.rollout, loops.gradient, sensitivities, loops.tangent)
 
 
 class Packed(NamedTuple):
@@ -111,7 +79,7 @@ class Packed(NamedTuple):
 
     family: Family
     rows: np.ndarray
-    """Numbers of law and shape `[..., N]`, batch axes as those of the parameters."""
+    """Numbers of law and shape `[..., N]`, with the batch axes of the parameters."""
     shapes: ShapesByLoad | Callable[[np.ndarray, bool], ShapesByLoad]
     """Limit surface or cells; a function of loads where cells follow the load (see `CompiledDistributed.at_loads`)."""
     axes: np.ndarray | None = None
@@ -122,14 +90,14 @@ class Packed(NamedTuple):
     """Reference load [N] of a law whose stiffness does not grow with the load; 0 of others."""
 
     def turned(self, vectors: np.ndarray) -> np.ndarray:
-        """Turn twists into the axes of the compiled loops, or wrenches out of them, `[..., 3]`."""
+        """Turn twists into the axes of the compiled loops, or wrenches back, `[..., 3]`."""
         return vectors if self.axes is None else transformed(self.axes, vectors)
 
 
 def parameter_names(model: Any) -> tuple[str, ...]:
     """Return the names of the P parameters of a model, in the order of the parameter vector.
 
-    Those of `ReducedModelPublished` are `PARAMETERS`, those of `DistributedModel` the parameters of the law.
+    `ReducedModelPublished` has `PARAMETERS`, `DistributedModel` the parameters of the law.
 
     Raises InvalidValueError for a model that has no rollouts.
     """
@@ -166,8 +134,8 @@ def _family(model: Any) -> Family:
         return PUBLISHED
     if isinstance(model, DistributedModel) and not (is_rate_law(model.law) or model.patch.asymmetric):
         return _cells(model.patch.bristles, model.patch.anisotropic)
-    given = "cells with a RateLaw or an asymmetry" if isinstance(model, DistributedModel) else type(model).__name__
-    raise InvalidValueError("model", "be one that has compiled rollouts", given)
+    kind = "cells with a RateLaw or an asymmetry" if isinstance(model, DistributedModel) else type(model).__name__
+    raise InvalidValueError("model", "be one that has compiled rollouts", kind)
 
 
 def is_compiled(model: Any) -> bool:

@@ -16,7 +16,7 @@ from planarfriction.kernels import adjoint, rosenbrock, tangent
 from planarfriction.kernels import path as paths
 from planarfriction.kernels.body import System
 from planarfriction.kernels.integration import Output
-from planarfriction.kernels.path import Path
+from planarfriction.kernels.path import Path, Stretch, Tolerances
 from planarfriction.kernels.sdirk import workspace_for
 from planarfriction.kernels.tangent import Drives
 from planarfriction.scenes.options import SolverOptions
@@ -62,7 +62,7 @@ class SceneDerivatives(ByValue):
 
 
 class MotionPath:
-    """A motion of a scene on its way, with what it records."""
+    """A motion of a scene on its way, with its recorded samples."""
 
     def __init__(self, scene: Scene, inputs: SceneInputs, options: SolverOptions | None) -> None:
         options = SolverOptions() if options is None else options
@@ -89,17 +89,17 @@ class MotionPath:
         Raises SolverError if the solver fails, or takes too many steps.
         """
         now, outcome, n, (left, too_many) = start_of(self.batches.state), rosenbrock.DONE, len(self.scale), self._limit
-        room = paths.path_for(max(int(min(NUMBERS / n, most)), LEAST_NODES), n)
+        path = paths.path_for(max(int(min(NUMBERS / n, most)), LEAST_NODES), n)
         for system in self.batches:
             run = rosenbrock.Run(system, RODAS4, self._output, now, rtol=self._rtol, atol=self._atol)
             now.cursor[0], outcome = 0, rosenbrock.PAUSED
             while outcome == rosenbrock.PAUSED:
-                nodes, outcome = paths.follow(run.address, room)
+                nodes, outcome = paths.follow(run.address, path)
                 self.reached = int(now.cursor[1])
                 left -= nodes - 1
                 if left < 0:
                     raise SolverError(too_many)
-                yield system, Path(*(each[:nodes] for each in room))
+                yield system, Path(*(each[:nodes] for each in path))
             del system, run
             if outcome != rosenbrock.DONE:
                 break
@@ -181,33 +181,34 @@ class _Adjoint:
         drives, place = self._inputs.at(system, piece), (system, path, first, last)
         self._moments[:] = 0.0
         while (m := self._next) >= 0 and (self._time[m] > begin + reach or self._time[m] == begin == 0.0 == reach):
-            here = min(float(self._time[m]) - begin, since)
+            instant = min(float(self._time[m]) - begin, since)
             if self._bars[m].any() or self._wrench_bars[m].any():
-                self._propagate(*place, drives, since, here)
-                self._jump(*place, drives, here)
-                since, self._known = here, 0.0
+                self._propagate(*place, drives, since, instant)
+                self._jump(*place, drives, instant)
+                since, self._known = instant, 0.0
             self._next -= 1
         self._propagate(*place, drives, since, reach)
         self._gain[: len(drives.kind)] += self._inputs.gained(drives, self._moments)
         if reach == 0.0:
             tangent.settle(system.address, piece, self._state[None, :])
         if reach == 0.0 and system.motion.body_axes:
-            here = np.flatnonzero(drives.kind == tangent.VELOCITY)
-            self._gain[here] += drives.weight[here, 0] * self._state[drives.place[here] - 6]
+            columns = np.flatnonzero(drives.kind == tangent.VELOCITY)
+            self._gain[columns] += drives.weight[columns, 0] * self._state[drives.place[columns] - 6]
             self._state[-6:-3], self._known = 0.0, 0.0
 
-    def _jump(self, system: System, path: Path, first: int, last: int, drives: Drives, here: float) -> None:
-        """Add the cotangents at the next instant, `here` seconds into the piece."""
+    def _jump(self, system: System, path: Path, first: int, last: int, drives: Drives, instant: float) -> None:
+        """Add the cotangents at the next instant, `instant` seconds into the piece."""
         wrenches = self._wrench_bars[self._next]
         if wrenches.any():
-            paths.state_at(path, first, last, here, self._space.record.state)
-            at = system.address, int(path.piece[first]), here, wrenches
+            paths.state_at(path, first, last, instant, self._space.record.state)
+            at = system.address, int(path.piece[first]), instant, wrenches
             adjoint.jump(*at, self._state, drives, self._moments, self._space.address)
         self._state[-6:] += self._bars[self._next]
 
     def _propagate(self, system: System, path: Path, first: int, last: int, drives: Drives, *span: float) -> None:
         since, until = span
         if until < since:
-            numbers = self._state, drives, self._moments, self._known, self._accuracy, self._atol, self._space.address
-            adjoint.propagate_back(system.address, path, first, last, since, until, *numbers)
+            stretch, tolerances = Stretch(first, last, since, until), Tolerances(self._accuracy, self._atol)
+            numbers = self._state, drives, self._moments, self._known, tolerances, self._space.address
+            adjoint.propagate_back(system.address, path, stretch, *numbers)
             self._known = 1.0

@@ -8,12 +8,15 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.compiler import threads
+from planarfriction.compiler.notice import said_when_compiling
 from planarfriction.derivatives.inputs import RolloutInputs, checked, rows_of, sequences, share, sum_to
 from planarfriction.derivatives.parameters import Packed, is_compiled, pack
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
-from planarfriction.kernels.rollouts import Bars
+from planarfriction.kernels.cell_blocks import divided
+from planarfriction.kernels.rollouts import Bars, Derivatives, Inputs
 from planarfriction.models import FrictionModel
 
 ArrayT = TypeVar("ArrayT")
@@ -55,7 +58,7 @@ class RolloutJacobian(NamedTuple):
 
 @by_parts
 class RolloutTangent(NamedTuple):
-    """Changes of the inputs of a rollout, each of the shape of that input; leading axes broadcast."""
+    """Changes of the inputs of a rollout, each of the shape of its input; leading axes broadcast."""
 
     state: Any = 0.0
     """Change of the state before the first step."""
@@ -83,7 +86,7 @@ class RolloutJVP(NamedTuple):
 
 @by_parts
 class RolloutVJP(NamedTuple):
-    """Gradient of a scalar with respect to the inputs of a rollout, each of the shape of that input."""
+    """Gradient of a scalar with respect to the inputs of a rollout, each of the shape of its input."""
 
     state: np.ndarray
     """Gradient with respect to the state before the first step, of its shape [1/unit of the state]."""
@@ -100,9 +103,9 @@ def rollout(
 ) -> Rollout[np.ndarray]:
     """Step a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
 
-    The steps are those of `model.step`. `normal_force` broadcasts with `[..., T]`: one number, one for each step, or
+    Each step is a `model.step`. `normal_force` broadcasts with `[..., T]`: one number, one for each step, or
     one for each contact `[..., 1]`; `dt` is one number or `[T]`; leading axes broadcast. `parameters` `[..., P]` (see
-    `parameter_names`) replace those of the model; the limit surface stays as it is, in scaled coordinates.
+    `parameter_names`) replace the model's own; the limit surface stays as it is, in scaled coordinates.
     Models run in compiled code, batches on all processors; cells with a `RateLaw` or an asymmetry step in Python, as
     does `ReducedModelPublished` where its shape follows the load.
 
@@ -146,7 +149,7 @@ def rollout_vjp(
 
     This is the discrete adjoint: exact for the steps taken, and a few times as expensive as the rollout whatever the
     number of inputs. `wrenches_bar` `[..., T, 3]` and `state_bar` `[..., *state_shape]` (None: zero) broadcast. The
-    gradient of an input that several contacts share is the sum over these contacts. `states` are those of
+    gradient of an input that several contacts share is the sum over these contacts. `states` come from
     `rollout_states`, if available. At zero load the gradient with respect to that load is one-sided.
 
     If the weights of cells depend on the load, they are differentiated too, by central differences with a step of 1e-5
@@ -168,13 +171,13 @@ def rollout_vjp(
     rows_bar = np.zeros((count, inputs.rows.shape[-1]))
     bars, compiled = Bars(z_bar, np.zeros((count, steps, 3)), np.zeros((count, steps)), rows_bar), inputs.compiled(True)
     share(compiled, count, lambda *span: family.gradient(compiled, on_the_way, cotangents, span, bars))
-    given = parameters if parameters is not None else packed.rows[..., family.columns]
+    vector = parameters if parameters is not None else packed.rows[..., family.columns]
     start = np.empty(inner) if state is None else state
     return RolloutVJP(
         sum_to(np.shape(start), inputs.shaped(z_bar)),
         sum_to(np.shape(twist), inputs.of_all(turned(bars.twist))),
         sum_to(np.shape(normal_force), inputs.of_all(bars.load)),
-        sum_to(np.shape(given), inputs.of_all(rows_bar[:, family.columns])),
+        sum_to(np.shape(vector), inputs.of_all(rows_bar[:, family.columns])),
     )
 
 
@@ -203,7 +206,7 @@ def rollout_jacobian(
     columns = family.columns[np.array(chosen, dtype=int)]
     end, compiled = inputs.state.copy(), inputs.compiled()
     wrenches, slopes = np.zeros((count, steps, 3)), np.zeros((count, steps, 3, len(columns)))
-    share(compiled, count, lambda *span: family.sensitivities(compiled, span, end, columns, wrenches, slopes))
+    _differentiate(inputs.model, compiled, end, Derivatives(columns, wrenches, slopes))
     slopes = np.swapaxes(turned(np.swapaxes(inputs.of_all(slopes), -1, -2)), -1, -2)
     return RolloutJacobian(inputs.shaped(end), turned(inputs.of_all(wrenches)), slopes)
 
@@ -236,18 +239,18 @@ def rollout_jvp(
     changes = [validation.finite_numbers(name, value) for name, value in zip(names, tangent, strict=True)]
     more = [value.shape[: max(value.ndim - len(shape), 0)] for value, shape in zip(changes, inner, strict=True)]
     inputs = checked(packed, state, twist, normal_force, dt, None, more)
-    given = zip(names, changes, inner, strict=True)
-    z, twists, loads, values = (rows_of(*each, inputs.batch) for each in given)
+    rows = zip(names, changes, inner, strict=True)
+    z, twists, loads, values = (rows_of(*each, inputs.batch) for each in rows)
     numbers = np.zeros((len(values), inputs.rows.shape[-1]))
     numbers[:, family.columns] = values
     end, count = inputs.state.copy(), len(inputs.state)
-    moved = np.zeros_like(end)
-    moved[:] = z.reshape(len(z), -1)
-    changed, compiled = Bars(moved, turned(twists), loads, numbers), inputs.compiled(slopes=bool(loads.any()))
+    d_state = np.zeros_like(end)
+    d_state[:] = z.reshape(len(z), -1)
+    changed, compiled = Bars(d_state, turned(twists), loads, numbers), inputs.compiled(slopes=bool(loads.any()))
     both = [np.zeros((count, *steps, 3)) for _ in range(2)]
     share(compiled, count, lambda *span: family.tangent(compiled, span, end, changed, *both))
     wrenches, slopes = (turned(inputs.of_all(values)) for values in both)
-    return RolloutJVP(inputs.shaped(end), wrenches, inputs.shaped(moved), slopes)
+    return RolloutJVP(inputs.shaped(end), wrenches, inputs.shaped(d_state), slopes)
 
 
 def _roll(inputs: RolloutInputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -262,6 +265,28 @@ def _roll(inputs: RolloutInputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.
     return end, inputs.of_all(inputs.model.turned(wrenches)), states
 
 
+def _differentiate(model: Packed, inputs: Inputs, z: np.ndarray, out: Derivatives) -> None:
+    """Run rollouts with their derivatives by numbers of the model: contacts, or the blocks of one, on threads."""
+    run, (blocks, lanes) = model.family.sensitivities, divided.py_func(max(inputs.shapes.shape[1], 1))
+    if blocks == 1 or len(z) > 1:
+        share(inputs, len(z), lambda *span: run(inputs, span, z, out))
+        return
+    state, data = z.reshape(1, model.inner[0], -1), inputs.data.reshape(blocks, -1)
+
+    def one(k: int) -> Derivatives:
+        cells = slice(k * lanes, (k + 1) * lanes)
+        part, sums = state[..., cells].reshape(1, -1), Derivatives(out.columns, *map(np.zeros_like, out[1:]))
+        shapes, by_load = (np.ascontiguousarray(each[..., cells]) for each in (inputs.shapes, inputs.by_load))
+        run(inputs._replace(data=data[k], shapes=shapes, by_load=by_load), (0, 1), part, sums)
+        state[..., cells] = part.reshape(1, model.inner[0], -1)
+        return sums
+
+    with said_when_compiling():
+        for sums in threads.each(one, range(blocks)):
+            out.wrenches[:] += sums.wrenches
+            out.slopes[:] += sums.slopes
+
+
 def _stepped(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any) -> Rollout[np.ndarray]:
     """Step any model, which checks the numbers itself."""
     state = model.rest() if state is None else validation.numbers("state", state)
@@ -274,6 +299,6 @@ def _stepped(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any) -> 
         shapes = ", ".join(str(list(a.shape)) for a in (state, twist, load))
         raise InvalidValueError("state, twist and normal_force", "broadcast", f"shapes {shapes}") from None
     wrenches = np.empty((*batch, len(dt), 3))
-    for t, held in enumerate(dt):
-        state, wrenches[..., t, :] = model.step(state, twist[..., t, :], load[..., t], held)
+    for t, step in enumerate(dt):
+        state, wrenches[..., t, :] = model.step(state, twist[..., t, :], load[..., t], step)
     return Rollout(np.array(state), wrenches)

@@ -27,11 +27,11 @@ _OF_BODY = ("force", "velocity")
 
 
 class SceneFunction:
-    """The motion `[M, 6]` and the wrenches `[M, C, 3]` of a scene as a function of P numbers, for B sets of them.
+    """The motion `[M, 6]` and the wrenches `[M, C, 3]` of a scene as a function of P numbers, for B sets of numbers.
 
     The numbers are factors of parameters, components of the start, and the values of signals at their knots (all
     components of a knot together), in the order in which they are named. A motion that ends early stays as it ended.
-    Different sets are simulated at the same time, in as many threads as there are processors. `options` are those of
+    Different sets are simulated at the same time, in as many threads as there are processors. `options` are
     `SolverOptions`.
     """
 
@@ -67,8 +67,14 @@ class SceneFunction:
 
         return self._stacked(threads.each(one, list(values)))
 
-    def pull(self, values, of_motion, of_wrenches, kept: dict[bytes, KeptMotion] | None = None) -> np.ndarray:
-        """Return derivatives `[B, P]` of costs from those by motion and wrenches, shaped as these."""
+    def pull(
+        self,
+        values: np.ndarray,
+        of_motion: np.ndarray,
+        of_wrenches: np.ndarray,
+        kept: dict[bytes, KeptMotion] | None = None,
+    ) -> np.ndarray:
+        """Return derivatives `[B, P]` of costs from their derivatives by motion and by wrenches, shaped as these."""
         different, which = np.unique(values, axis=0, return_inverse=True)
         gradient = np.empty_like(values)
 
@@ -83,14 +89,14 @@ class SceneFunction:
         return gradient
 
     def push(self, values: np.ndarray, changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return changes of motion and wrenches with those of the values `[B, P]`."""
+        """Return changes of motion and wrenches for changes of the values `[B, P]`."""
 
         def one(pair: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
             row, change = pair
-            given: dict[str, Any] = {"signals": self._knots, "initial": self._initial, "options": self._options}
-            found = scene_sensitivities(self._scene_at(row), self._parameters, **given)
+            options: dict[str, Any] = {"signals": self._knots, "initial": self._initial, "options": self._options}
+            result = scene_sensitivities(self._scene_at(row), self._parameters, **options)
             change = change * self._per_factor(row)
-            return self._filled(found.d_motion @ change), self._filled(found.d_wrenches @ change)
+            return self._filled(result.d_motion @ change), self._filled(result.d_wrenches @ change)
 
         return self._stacked(threads.each(one, list(zip(values, changes, strict=True))))
 
@@ -106,7 +112,7 @@ class SceneFunction:
         return motion, wrenches
 
     def _filled(self, values: np.ndarray) -> np.ndarray:
-        """Return values at all instants, from those up to the end of the motion."""
+        """Return values at all instants, from the values up to the end of the motion."""
         return values[np.minimum(np.arange(len(self.time)), len(values) - 1)]
 
     def _folded(self, bar: np.ndarray, count: int) -> np.ndarray:
@@ -116,7 +122,7 @@ class SceneFunction:
         return result
 
     def _per_factor(self, row: np.ndarray) -> np.ndarray:
-        """Return the derivative by each number per derivative by a factor that is 1, as those of scenes are."""
+        """Return the derivative by each number per derivative by a factor that is 1, as derivatives of scenes are."""
         slopes, factors = np.ones(self.count), dict(zip(self._parameters, row, strict=False))
         slopes[: len(factors)] = 1.0 / row[: len(factors)]
         first = len(factors) + len(self._initial)

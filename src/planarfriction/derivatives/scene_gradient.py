@@ -39,7 +39,7 @@ def scene_gradient(
 ) -> SceneGradient:
     """Compute the gradient of a cost of a motion by parameters, signals and initial state.
 
-    `parameters`, `signals`, `initial` and `options` are those of `scene_sensitivities`. `cotangent(time, motion)` takes
+    `parameters`, `signals`, `initial` and `options` are as in `scene_sensitivities`. `cotangent(time, motion)` takes
     the times `[M]` and the motion `[M, 6]` and returns `dcost/dmotion` `[M, 6]`; `wrench_cotangent(time, wrenches)`
     adds `dcost/dwrenches` `[M, C, 3]` for the wrench of one of the identical contacts. The adjoint `-l' = J' l` runs
     backwards over the accepted steps, jumps by these cotangents at each instant, and accumulates `int l' df/dp dt`. It

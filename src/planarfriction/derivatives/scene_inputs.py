@@ -99,11 +99,11 @@ class SceneInputs:
         numbers += [(name, tangent.INITIAL, STATES.index(name)) for name in initial]
         begins, sources = [np.zeros(len(numbers))], [np.full((len(numbers), 2), -1)]
         self.columns = {name: slice(i, i + 1) for i, (name, _, _) in enumerate(numbers)}
-        """Derivatives with respect to each name, in the order of `names`; those of a signal knot by knot."""
+        """Derivatives with respect to each name, in the order of `names`; of a signal knot by knot."""
         for s, knots in enumerate(self._knots):
-            own, each = knots.numbers(), np.repeat(np.arange(len(knots.times)), len(knots.components))
-            self.columns[knots.name] = slice(len(numbers), len(numbers) + len(own))
-            numbers += own
+            values, each = knots.numbers(), np.repeat(np.arange(len(knots.times)), len(knots.components))
+            self.columns[knots.name] = slice(len(numbers), len(numbers) + len(values))
+            numbers += values
             begins.append(knots.begins[each])
             sources.append(np.stack([np.full(len(each), s), each], axis=1))
         self.names = tuple(name for name, _, _ in numbers)
@@ -151,20 +151,20 @@ class SceneInputs:
         return slopes
 
     def _bristles_at_start(self, batches: SegmentBatches) -> np.ndarray:
-        """Return the derivatives of bristles that carry the load at the start; refuse those of others."""
+        """Return the derivatives of bristles that carry the load at the start; refuse other bristles."""
         scene, drives, count = self._scene, self._drives, len(self.names)
-        moved = drives.kind != tangent.INERTIA
+        moves = drives.kind != tangent.INERTIA
         for (columns, knot), knots in zip(self._sources, self._knots, strict=True):
-            moved[columns] = knots.hats(0.0)[knot] != 0.0
+            moves[columns] = knots.hats(0.0)[knot] != 0.0
         kinds = _OF_EQUILIBRIUM if scene.start == "equilibrium" else ()
-        refused = np.flatnonzero(moved & ~np.isin(drives.kind, kinds))
+        refused = np.flatnonzero(moves & ~np.isin(drives.kind, kinds))
         if len(refused):
             name = self.names[self._order[refused[0]]]
             rule = f"be 'rest' for the derivative with respect to {name}, on which the initial bristles depend"
             raise InvalidValueError("start", rule, scene.start)
         d_loads, d_pull = np.zeros((count, len(scene.contacts))), np.zeros((count, 3))
-        d_loads[moved & (drives.kind == tangent.LOAD)] = [float(each.normal_force(0.0)) for each in scene.contacts]
-        d_pull[moved & (drives.kind == tangent.MASS), :2] = scene.body.mass * np.array(scene.body.gravity)
+        d_loads[moves & (drives.kind == tangent.LOAD)] = [float(each.normal_force(0.0)) for each in scene.contacts]
+        d_pull[moves & (drives.kind == tangent.MASS), :2] = scene.body.mass * np.array(scene.body.gravity)
         for (columns, knot), knots in zip(self._sources, self._knots, strict=True):
             changes = d_loads if knots.kind == tangent.NORMAL_FORCE else d_pull
             changes[columns, drives.place[columns]] = self._scale[columns] * knots.hats(0.0)[knot]
@@ -184,7 +184,7 @@ class SceneInputs:
         return drives._replace(**{name: getattr(drives, name)[:count] for name in ("kind", "place", "weight", "input")})
 
     def begin(self, drives: Drives, slopes: np.ndarray) -> None:
-        """Write the derivatives of a prescribed velocity into those `[P, n]` with which a piece begins."""
+        """Write the derivatives of a prescribed velocity into the derivatives `[P, n]` at the start of a piece."""
         for p in np.flatnonzero(drives.kind == tangent.VELOCITY):
             slopes[p, drives.place[p] - 6] = drives.weight[p, 0]
 

@@ -13,7 +13,7 @@ from planarfriction.derivatives.scene_inputs import SceneInputs
 from planarfriction.kernels import path as paths
 from planarfriction.kernels import tangent
 from planarfriction.kernels.body import System
-from planarfriction.kernels.path import Path
+from planarfriction.kernels.path import Path, Stretch, Tolerances
 from planarfriction.kernels.sdirk import workspace_for
 from planarfriction.kernels.tangent import Drives
 from planarfriction.scenes.options import SolverOptions
@@ -70,7 +70,7 @@ def scene_sensitivities(
 
 
 class _Tangents:
-    """Derivatives of a motion `[P, n]`, carried along its steps, and those that are recorded."""
+    """Derivatives of a motion `[P, n]`, carried along its steps and recorded at instants."""
 
     def __init__(self, motion: MotionPath) -> None:
         self._motion, self._inputs = motion, motion.inputs
@@ -95,18 +95,18 @@ class _Tangents:
                 self._inputs.begin(drives, self._slopes)
                 tangent.settle(system.address, piece, self._slopes)
             while self._next < len(instants) and instants[self._next] <= time:
-                instant = instants[self._next]
-                here = reach if instant == time else float(instant - begin)
-                self._propagate(system, path, drives, first, last, since, here)
-                self._record(system, path, drives, first, last, here)
-                since = here
-            self._propagate(system, path, drives, first, last, since, reach)
+                goal = instants[self._next]
+                instant = reach if goal == time else float(goal - begin)
+                self._propagate(system, path, drives, Stretch(first, last, since, instant))
+                self._record(system, path, drives, first, last, instant)
+                since = instant
+            self._propagate(system, path, drives, Stretch(first, last, since, reach))
             if reach == length:
                 tangent.forget(system.address, piece, self._slopes)
 
-    def _propagate(self, system: System, path: Path, drives: Drives, *span: float) -> None:
-        along = self._slopes, drives, self._motion.accuracy, self._atol, self._space.address
-        tangent.propagate(system.address, path, *span, *along)
+    def _propagate(self, system: System, path: Path, drives: Drives, stretch: Stretch) -> None:
+        tolerances = Tolerances(self._motion.accuracy, self._atol)
+        tangent.propagate(system.address, path, stretch, self._slopes, drives, tolerances, self._space.address)
 
     def _record(self, system: System, path: Path, drives: Drives, first: int, last: int, since: float) -> None:
         d_motion, d_wrenches = (values[self._next] for values in self.recorded)

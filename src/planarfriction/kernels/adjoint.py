@@ -1,26 +1,29 @@
 """The adjoint of the variational equation of `kernels.tangent`, backwards along a computed motion.
 
 With a cost that depends on motion and wrenches at some instants, `l = dcost/dy` obeys `-l' = J(t)' l` between them and
-jumps by the cost's own slope at each. The method is that of `tangent`, in transposed matrices and backwards in time,
+jumps by the cost's own slope at each. The method of `tangent` runs in transposed matrices, backwards in time,
 
     b_i = l + h sum_{j<i} a_ij G_j,   (I/(h gamma) - J_i') S_i = b_i/(h gamma),   G_i = (S_i - b_i)/(h gamma)
 
-What the cost gains per number is the integral of `q = l' df/dp`, with the weights of the method. A signal that is
-linear on a piece, in any number of knots, needs no more of it than its two moments `int q dt` and `int q t dt`.
+The cost gains the integral of `q = l' df/dp` per number, with the weights of the method. A signal that is linear on a
+piece, in any number of knots, needs only the two moments `int q dt` and `int q t dt`.
 
-The equations of a stage are solved as those of the motion are, contact by contact: what the bristles pull back to the
-body, 3 x 3 for the velocity with the inverse that `factor` made, what the body sends to the bristles.
+The equations of a stage are solved contact by contact, as in the motion: the bristles pull back to the body, the
+velocity solves a system [3, 3] with the inverse that `factor` made, and the body sends its share to the bristles.
 """
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.calls import call, pointer
-from planarfriction.compiler.memory import arrays_at, at
+from planarfriction.compiler.memory import Doubles, Place, arrays_at, at
 from planarfriction.kernels.body import (
+    SystemRecord,
     function_of,
     linearisation_of,
     load_of,
@@ -30,7 +33,7 @@ from planarfriction.kernels.body import (
     total_load,
 )
 from planarfriction.kernels.contacts import PULL_BACK, ROWS, SOLVE_TRANSPOSED
-from planarfriction.kernels.path import hold, node_before
+from planarfriction.kernels.path import Path, Stretch, Tolerances, hold, node_before
 from planarfriction.kernels.sdirk import (
     AGAIN,
     ERROR,
@@ -38,6 +41,8 @@ from planarfriction.kernels.sdirk import (
     PLACES,
     STAGES,
     START,
+    Variation,
+    Workspace,
     accept,
     error_of,
     keep_stage,
@@ -47,47 +52,54 @@ from planarfriction.kernels.sdirk import (
 )
 from planarfriction.kernels.small_matrices import applied
 from planarfriction.kernels.step_control import judged, length
-from planarfriction.kernels.tangent import MOST, partial_of, wrench_by_input
-from planarfriction.kernels.vectors import applied_back, dot, plus, put, three, times
+from planarfriction.kernels.tangent import MOST, Drives, partial_of, wrench_by_input
+from planarfriction.kernels.vectors import Vector, applied_back, dot, plus, put, three, times
 
 
 @kernel
-def _pulled(own, piece, c, y, given, wrench, w):
-    """Pull back `given` of the bristle rates and `wrench` of the wrench per unit load of contact c.
+def _pulled(
+    system: SystemRecord, piece: int, c: int, y: Doubles, rates: Doubles, wrench: Vector, w: Workspace
+) -> tuple[Vector, Vector]:
+    """Pull back `rates` of the bristles and `wrench` of the wrench per unit load of contact c.
 
-    Pointers to all states; that by the bristles goes to `w.forcing`. Returns that by the body's velocity and pose.
+    Pointers to all states; the cotangent of the bristles goes to `w.forcing`. Returns the cotangents of the body's
+    velocity and pose.
     """
-    first, rows, (a, g, _) = own.contacts.state[c], arrays_at(ROWS, own.work.rows), maps_of(own, c)
+    first, rows, (a, g, _) = system.contacts.state[c], arrays_at(ROWS, system.work.rows), maps_of(system, c)
     put(rows.d_wrench, wrench)
-    states = at(y, first), linearisation_of(own, c), at(given, first), own.work.rows, at(w.forcing, first)
-    call(function_of(own, c, PULL_BACK), (record_of(own, piece, c), *states))
+    states = at(y, first), linearisation_of(system, c), at(rates, first), system.work.rows, at(w.forcing, first)
+    call(function_of(system, c, PULL_BACK), (record_of(system, piece, c), *states))
     return applied_back(a, rows.d_twist), applied_back(g, rows.d_twist)
 
 
 @kernel
-def _solve_bristles(own, piece, c, y, b, out):
-    first = own.contacts.state[c]
-    states = record_of(own, piece, c), at(y, first), at(b, first), linearisation_of(own, c), at(out, first)
-    call(function_of(own, c, SOLVE_TRANSPOSED), states)
+def _solve_bristles(system: SystemRecord, piece: int, c: int, y: Doubles, b: Doubles, out: Doubles) -> None:
+    first = system.contacts.state[c]
+    states = record_of(system, piece, c), at(y, first), at(b, first), linearisation_of(system, c), at(out, first)
+    call(function_of(system, c, SOLVE_TRANSPOSED), states)
 
 
 @kernel
-def _body_solved(own, shift, body, velocity, pose, out):
+def _body_solved(
+    system: SystemRecord, shift: float, body: Doubles, velocity: Vector, pose: Vector, out: Doubles
+) -> Vector:
     """Solve the equations of velocity and pose (see `_solve`); return the velocity."""
     (x, y, s), per_shift, cos, sin = pose, 1.0 / shift, 1.0, 0.0
-    if own.motion.body_axes:
+    if system.motion.body_axes:
         cos, sin = math.cos(body[5]), math.sin(body[5])
         s -= per_shift * (sin * body[0] + cos * body[1]) * x
         s += per_shift * (cos * body[0] - sin * body[1]) * y
     velocity = plus(velocity, per_shift, (cos * x + sin * y, cos * y - sin * x, s))
-    u = applied_back(own.work.inverse, velocity)
+    u = applied_back(system.work.inverse, velocity)
     put(out, u)
-    put(at(out, 3), plus(applied_back(own.work.to_pose, u), per_shift, (x, y, s)))
+    put(at(out, 3), plus(applied_back(system.work.to_pose, u), per_shift, (x, y, s)))
     return u
 
 
 @kernel
-def _solve(own, piece, since, shift, b, w, out):
+def _solve(
+    system: SystemRecord, piece: int, since: float, shift: float, b: Doubles, w: Workspace, out: Doubles
+) -> None:
     """Solve `(shift I - J') out = b` with the matrix that `factor` prepared at the state `w.state`.
 
     With the wrench `e = (d z'/dV)' D^-T b_z` and S = dW/dV of each contact, its load `f` and the mass matrix M,
@@ -97,38 +109,46 @@ def _solve(own, piece, since, shift, b, w, out):
 
     whose second for a free body holds the transpose of what `factor` kept as `to_pose`.
     """
-    o, y, inverse_mass, none = own.bristles, w.state, own.motion.inverse_mass, (0.0, 0.0, 0.0)
+    o, y, inverse_mass, none = system.bristles, w.state, system.motion.inverse_mass, (0.0, 0.0, 0.0)
     velocity, pose = three(at(b, o)), three(at(b, o + 3))
-    for c in range(own.size):
-        _solve_bristles(own, piece, c, y, b, out)
-        by_velocity, by_pose = _pulled(own, piece, c, y, out, none, w)
+    for c in range(system.size):
+        _solve_bristles(system, piece, c, y, b, out)
+        by_velocity, by_pose = _pulled(system, piece, c, y, out, none, w)
         velocity, pose = plus(velocity, 1.0, by_velocity), plus(pose, 1.0, by_pose)
-    u = _body_solved(own, shift, at(y, o), velocity, pose, at(out, o))
-    if own.motion.body_axes:  # the wrench does not move the body
+    u = _body_solved(system, shift, at(y, o), velocity, pose, at(out, o))
+    if system.motion.body_axes:  # the wrench does not move the body
         return
-    for c in range(own.size):
+    for c in range(system.size):
         pull = inverse_mass[0] * u[0], inverse_mass[1] * u[1], inverse_mass[2] * u[2]
-        wrench = times(total_load(own, piece, since, c), applied(maps_of(own, c)[0], pull))
-        _pulled(own, piece, c, y, w.zero, wrench, w)
-        for m in range(own.contacts.state[c], own.contacts.state[c + 1]):
+        wrench = times(total_load(system, piece, since, c), applied(maps_of(system, c)[0], pull))
+        _pulled(system, piece, c, y, w.zero, wrench, w)
+        for m in range(system.contacts.state[c], system.contacts.state[c + 1]):
             w.forcing[m] += b[m]
-        _solve_bristles(own, piece, c, y, w.forcing, out)
+        _solve_bristles(system, piece, c, y, w.forcing, out)
 
 
 @kernel
-def _step(system, own, path, k, first, since, h, d, drives, w):
+def _step(
+    address: Place, path: Path, k: int, first: int, since: float, h: float, d: Variation, drives: Drives, w: Workspace
+) -> None:
     """Carry the adjoint back over `h` seconds into `w.new`, as `tangent` does its slopes forwards."""
-    piece, n, shift, inputs = path.piece[k], path.state.shape[1], 1.0 / (h * GAMMA), drives.input_kind.shape[0]
+    system, piece, n, shift, inputs = (
+        read(address),
+        path.piece[k],
+        path.state.shape[1],
+        1.0 / (h * GAMMA),
+        drives.input_kind.shape[0],
+    )
     for i in range(PLACES.shape[0]):
         time = since - h * PLACES[i]
-        hold(system, own, path, node_before(path, k, first, time), time, shift, w)
+        hold(address, path, node_before(path, k, first, time), time, shift, w)
         stage_base(i, h, n, d, w.base)
         for m in range(n):
             w.right[m] = shift * w.base[m]
-        _solve(own, piece, time, shift, w.right, w, d.new)
+        _solve(system, piece, time, shift, w.right, w, d.new)
         keep_stage(i, shift, n, d, w.base)
         for u in range(inputs):
-            partial_of(own, piece, time, w, drives.input_kind[u], drives.input_place[u], w.forcing)
+            partial_of(system, piece, time, w, drives.input_kind[u], drives.input_place[u], w.forcing)
             gain = 0.0
             for m in range(n):
                 gain += d.new[m] * w.forcing[m]
@@ -136,14 +156,14 @@ def _step(system, own, path, k, first, since, h, d, drives, w):
 
 
 @kernel
-def _weight(i):
+def _weight(i: int) -> float:
     """Return the weight of stage i in the solution."""
     return STAGES[4, i] if i < 4 else GAMMA
 
 
 @kernel
-def _error_of_gains(inputs, h, known, rtol, w):
-    """Return the larger error estimate of what the cost gains in a step, per tolerance."""
+def _error_of_gains(inputs: int, h: float, known: float, rtol: float, w: Workspace) -> float:
+    """Return the larger error estimate of the cost's gain in a step, per tolerance."""
     largest = 0.0
     for u in range(inputs):
         one, other, gained = 0.0, START * w.gain_before[u], 0.0
@@ -160,8 +180,8 @@ def _error_of_gains(inputs, h, known, rtol, w):
 
 
 @kernel
-def _gain(since, h, moments, w):
-    """Add what the cost gains in a step to the moments of the inputs."""
+def _gain(since: float, h: float, moments: np.ndarray, w: Workspace) -> None:
+    """Add the cost's gain in a step to the moments of the inputs."""
     inputs = moments.shape[0]
     for u in range(inputs):
         w.gain_before[u] = w.gain[4 * inputs + u]
@@ -173,22 +193,25 @@ def _gain(since, h, moments, w):
 
 
 @jit
-def propagate_back(system, path, first, last, begin, until, adjoint, drives, moments, known, rtol, atol, workspace):
-    """Carry `adjoint` [n] from `begin` back to `until` seconds into a piece; add to the `moments` [U, 2] of its inputs.
+def propagate_back(
+    address: Place, path: Path, stretch: Stretch, adjoint: np.ndarray, drives: Drives, moments: np.ndarray,
+    known: float, tolerances: Tolerances, workspace: Place,
+) -> int:  # fmt: skip
+    """Carry `adjoint` [n] back along a stretch of a path, and add to the `moments` [U, 2] of the inputs.
 
-    The nodes of the piece are `first` to `last` of a path; `known` is 0 where the adjoint has just jumped. Returns the
-    number of steps.
+    `known` is 0 where the adjoint has just jumped. Returns the number of steps.
     """
-    own, w, n, atol = read(system), read_workspace(workspace), adjoint.shape[0], pointer(atol)
-    d, taken, k, since = variation_of(w, pointer(adjoint), 0, 0, n), 0, last - 1, begin
+    system, w, n, first = read(address), read_workspace(workspace), adjoint.shape[0], stretch.first
+    until, rtol, atol = stretch.until, tolerances.rtol, pointer(tolerances.atol)
+    d, taken, k, since = variation_of(w, pointer(adjoint), 0, 0, n), 0, stretch.last - 1, stretch.begin
     while since > until:
         k = node_before(path, k, first, since)
         local, remaining = path.since[k + 1] - path.since[k], since - until
         h = length(w.pace[0], local, since - path.since[xp.maximum(k + 1 - MOST, first)], remaining)
-        _step(system, own, path, k, first, since, h, d, drives, w)
+        _step(address, path, k, first, since, h, d, drives, w)
         taken += 1
         of_gains = _error_of_gains(moments.shape[0], h, known, rtol, w)
-        error = xp.maximum(error_of(own, n, d, h, known, rtol, atol), of_gains)
+        error = xp.maximum(error_of(system, n, d, h, known, rtol, atol), of_gains)
         accepted, w.pace[0] = judged(w.pace[0], error, h, local)
         if accepted:
             _gain(since, h, moments, w)
@@ -198,24 +221,29 @@ def propagate_back(system, path, first, last, begin, until, adjoint, drives, mom
 
 
 @jit
-def jump(system, piece, since, seeds, adjoint, drives, moments, workspace):
+def jump(
+    address: Place, piece: int, since: float, seeds: np.ndarray, adjoint: np.ndarray, drives: Drives,
+    moments: np.ndarray, workspace: Place,
+) -> None:  # fmt: skip
     """Add the jump of `adjoint` [n], and of `moments` [U, 2], where a cost sees wrenches: `seeds` [C, 3] are its slope.
 
-    The held state is in the workspace.
+    The workspace holds the state.
     """
-    own, w = read(system), read_workspace(workspace)
-    y, o = w.state, own.bristles
-    call(own.rates, (system, piece, since, y, w.rate))
-    call(own.linearise, (system, piece, y))
-    for c in range(own.size):
-        load = load_of(own, piece, since, c)
+    system, w = read(address), read_workspace(workspace)
+    y, o = w.state, system.bristles
+    call(system.rates, (address, piece, since, y, w.rate))
+    call(system.linearise, (address, piece, y))
+    for c in range(system.size):
+        load = load_of(system, piece, since, c)
         seed = seeds[c, 0], seeds[c, 1], seeds[c, 2]
         for u in range(moments.shape[0]):
-            slope = wrench_by_input(own, piece, since, c, y, w, drives.input_kind[u], drives.input_place[u], w.forcing)
+            slope = wrench_by_input(
+                system, piece, since, c, y, w, drives.input_kind[u], drives.input_place[u], w.forcing
+            )
             moments[u, 0] += dot(seed, slope)
             moments[u, 1] += dot(seed, slope) * since
-        by_velocity, by_pose = _pulled(own, piece, c, y, w.zero, times(load, seed), w)
-        for m in range(own.contacts.state[c], own.contacts.state[c + 1]):
+        by_velocity, by_pose = _pulled(system, piece, c, y, w.zero, times(load, seed), w)
+        for m in range(system.contacts.state[c], system.contacts.state[c + 1]):
             adjoint[m] += w.forcing[m]
         for i in range(3):
             adjoint[o + i] += by_velocity[i]

@@ -16,7 +16,7 @@ import numpy as np
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import address_of, call
-from planarfriction.compiler.memory import Doubles, Integers, Packed, at, exists, layout, reader
+from planarfriction.compiler.memory import Doubles, Integers, Packed, Place, at, exists, layout, reader
 from planarfriction.kernels.contacts import (
     BACK_SUBSTITUTE,
     CALLS,
@@ -33,7 +33,7 @@ from planarfriction.kernels.law import law_of
 from planarfriction.kernels.settle import bring_back, factor_at
 from planarfriction.kernels.small_matrices import applied, inverse
 from planarfriction.kernels.springs import add_spring_slopes, spring_wrench
-from planarfriction.kernels.vectors import applied_back, plus, put, put_all, three
+from planarfriction.kernels.vectors import Vector, applied_back, plus, put, put_all, three
 
 NO_LOAD = 1e-6
 """Share of the reference load below which a fixed stiffness is fixed no longer: limits of 1e-12 m are not followed."""
@@ -89,7 +89,7 @@ class Work(NamedTuple):
     twist: Doubles
     """Twist of one contact and the factor on its stiffness, [4]."""
     factor: Doubles
-    """That factor of each contact (see `settle.factor_at`), as `rates` left it, [C]."""
+    """Factor on the stiffness of each contact (see `settle.factor_at`), as `rates` left it, [C]."""
     stiffness: Doubles
     """d wrench / d twist of one contact, [3, 3]."""
     matrix: Doubles
@@ -102,7 +102,7 @@ class Work(NamedTuple):
     """A vector of the body, [3]."""
     rows: Doubles
     """Twist and wrench of one contact and their changes (see `contacts.Rows`), [4, 3]."""
-    moved: Doubles
+    frame: Doubles
     """Place of each contact frame, as in `Contacts.place`, and the velocity that it sees (see `place_at`), with the
     spin of the world's side, where something moves, [C, 8]."""
 
@@ -118,7 +118,7 @@ class SystemRecord(NamedTuple):
     bristles: int
     """Number of states of contacts."""
     pressures: int
-    """Number of these, at their end, that are the place of a pressure."""
+    """Number of states at the end of the bristles that are the place of a pressure."""
     pieces: int
     """Number S of pieces."""
     springs: int
@@ -145,9 +145,9 @@ class System(Packed):
         n, square = len(contacts.count), (3, 3)
         work = layout(
             Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=4, factor=n,
-            stiffness=square, matrix=square, inverse=square, to_pose=square, body=3, rows=(4, 3), moved=(n, 8),
+            stiffness=square, matrix=square, inverse=square, to_pose=square, body=3, rows=(4, 3), frame=(n, 8),
         )  # fmt: skip
-        self._block, addresses = np.zeros(work.size), [address_of(*each) for each in BODY_FUNCTIONS]
+        self._block, addresses = np.zeros(work.size), [address_of(each) for each in BODY_FUNCTIONS]
         sizes = n, int(contacts.state[n]), pressures, len(motion.breaks) - 1, len(motion.spring)
         super().__init__(SystemRecord(contacts, motion, work.placed(self._block), *sizes, *addresses))
         self.contacts, self.motion, self.keepalive = contacts, motion, keepalive
@@ -156,211 +156,220 @@ class System(Packed):
 
 
 @kernel
-def load_of(own, piece, since, c):
+def load_of(system: SystemRecord, piece: int, since: float, c: int) -> float:
     """Return the normal force of one of the identical contacts that contact c stands for."""
-    load, first = own.motion.load, 2 * piece * own.size + c
-    return load[first] + since * load[first + own.size]
+    load, first = system.motion.load, 2 * piece * system.size + c
+    return load[first] + since * load[first + system.size]
 
 
 @kernel
-def total_load(own, piece, since, c):
+def total_load(system: SystemRecord, piece: int, since: float, c: int) -> float:
     """Return the normal force of all identical contacts that contact c stands for."""
-    return own.contacts.count[c] * load_of(own, piece, since, c)
+    return system.contacts.count[c] * load_of(system, piece, since, c)
 
 
 @kernel
-def record_of(own, piece, c):
+def record_of(system: SystemRecord, piece: int, c: int) -> Place:
     """Return the address of the record of contact c with the shape that it has on a piece."""
-    return own.contacts.record[own.motion.row[piece * own.size + c]]
+    return system.contacts.record[system.motion.row[piece * system.size + c]]
 
 
 @kernel
-def hardly_loaded(own, piece, c):
+def hardly_loaded(system: SystemRecord, piece: int, c: int) -> bool:
     """Return True if contact c has a fixed stiffness and starts a piece with hardly any load."""
-    return load_of(own, piece, 0.0, c) < NO_LOAD * own.contacts.reference[c]
+    return load_of(system, piece, 0.0, c) < NO_LOAD * system.contacts.reference[c]
 
 
 @kernel
-def settle_all(own, piece, y):
+def settle_all(system: SystemRecord, piece: int, y: Doubles) -> None:
     """Bring bristles back onto their limits where a piece starts with hardly any load.
 
-    Elsewhere they return by themselves, too fast to be followed only there.
+    Elsewhere bristles return by themselves, too fast to be followed only where they are heavily loaded.
     """
-    for c in range(own.size):
-        if hardly_loaded(own, piece, c):
-            first, size = own.contacts.state[c], own.contacts.bristle[c]
-            count, factor = (own.contacts.state[c + 1] - first) // size, 1.0 / NO_LOAD
-            bring_back(law_of(record_of(own, piece, c)), size, at(y, first), factor, count)
+    for c in range(system.size):
+        if hardly_loaded(system, piece, c):
+            first, size = system.contacts.state[c], system.contacts.bristle[c]
+            count, factor = (system.contacts.state[c + 1] - first) // size, 1.0 / NO_LOAD
+            bring_back(law_of(record_of(system, piece, c)), size, at(y, first), factor, count)
 
 
 @kernel
-def function_of(own, c, which):
+def function_of(system: SystemRecord, c: int, which: int) -> Place:
     """Return the address of one of the functions of contact c, `EVALUATE` to `PULL_BACK`."""
-    return own.contacts.calls[CALLS * c + which]
+    return system.contacts.calls[CALLS * c + which]
 
 
 @kernel
-def maps_of(own, c):
+def maps_of(system: SystemRecord, c: int) -> tuple[Doubles, Doubles, Doubles]:
     """Return the places of A, G and H of contact c."""
-    maps = at(own.work.maps, 27 * c)
+    maps = at(system.work.maps, 27 * c)
     return maps, at(maps, 9), at(maps, 18)
 
 
 @kernel
-def linearisation_of(own, c):
+def linearisation_of(system: SystemRecord, c: int) -> Doubles:
     """Return the workspace of the linearisation of contact c."""
-    return at(own.work.workspace, own.contacts.linear[c])
+    return at(system.work.workspace, system.contacts.linear[c])
 
 
 @kernel
-def place_at(own, piece, since, c, body):
+def place_at(system: SystemRecord, piece: int, since: float, c: int, body: Doubles) -> tuple[Doubles, Doubles]:
     """Return the place of the frame of contact c (see `Contacts.place`), and the velocity [3] that the contact sees.
 
-    That is the body's at `body` (velocity and pose), less the one that the world's side of the contact would have
-    there. What carries the frame moves and turns it; ground under a patch on the body turns about the world's origin.
+    It is the velocity at `body` (velocity and pose), less the velocity that the world's side of the contact would have
+    at that place. A mover moves and turns the frame; ground under a patch on the body turns about the world's origin.
     """
-    if not exists(own.motion.mover):
-        return at(own.contacts.place, 4 * c), body
-    place, moved = at(own.contacts.place, 4 * c), at(own.work.moved, 8 * c)
-    mover = at(own.motion.mover, 9 * (piece * own.size + c))
+    if not exists(system.motion.mover):
+        return at(system.contacts.place, 4 * c), body
+    place, frame = at(system.contacts.place, 4 * c), at(system.work.frame, 8 * c)
+    mover = at(system.motion.mover, 9 * (piece * system.size + c))
     vx, vy, omega = mover[3] + since * mover[6], mover[4] + since * mover[7], mover[5] + since * mover[8]
     dx, dy = body[3], body[4]
     for i in range(4):
-        moved[i] = place[i]
-    if own.contacts.mount[c] == WORLD:
+        frame[i] = place[i]
+    if system.contacts.mount[c] == WORLD:
         half = 0.5 * since
         turned = mover[2] + since * (mover[5] + half * mover[8])
         cos, sin = math.cos(turned), math.sin(turned)
-        moved[0] += mover[0] + since * (mover[3] + half * mover[6])
-        moved[1] += mover[1] + since * (mover[4] + half * mover[7])
-        moved[2], moved[3] = cos * place[2] - sin * place[3], sin * place[2] + cos * place[3]
-        dx, dy = dx - moved[0], dy - moved[1]
-    moved[4], moved[5], moved[6] = body[0] - (vx - omega * dy), body[1] - (vy + omega * dx), body[2] - omega
-    moved[7] = omega
-    return moved, at(moved, 4)
+        frame[0] += mover[0] + since * (mover[3] + half * mover[6])
+        frame[1] += mover[1] + since * (mover[4] + half * mover[7])
+        frame[2], frame[3] = cos * place[2] - sin * place[3], sin * place[2] + cos * place[3]
+        dx, dy = dx - frame[0], dy - frame[1]
+    frame[4], frame[5], frame[6] = body[0] - (vx - omega * dy), body[1] - (vy + omega * dx), body[2] - omega
+    frame[7] = omega
+    return frame, at(frame, 4)
 
 
 @kernel
-def seen_by(own, c, y):
+def seen_by(system: SystemRecord, c: int, y: Doubles) -> Doubles:
     """Return the velocity [3] that contact c sees, as `rates` of the state `y` left it."""
-    return at(own.work.moved, 8 * c + 4) if exists(own.motion.mover) else at(y, own.bristles)
+    return at(system.work.frame, 8 * c + 4) if exists(system.motion.mover) else at(y, system.bristles)
 
 
 @entry
-def rates(system, piece, since, y, dy):
+def rates(address: Place, piece: int, since: float, y: Doubles, dy: Doubles) -> None:
     """Write the right-hand side `dy` at `since` seconds into a piece, and wrenches per unit load into the workspace."""
-    own = read(system)
-    work, body, out, a = own.work, at(y, own.bristles), at(dy, own.bristles), own.work.stiffness
-    force = at(own.motion.force, 6 * piece)
+    system = read(address)
+    work, body, out, a = system.work, at(y, system.bristles), at(dy, system.bristles), system.work.stiffness
+    force = at(system.motion.force, 6 * piece)
     total = plus(three(force), since, three(at(force, 3)))
-    total = plus(total, 1.0, spring_wrench(own.motion, own.springs, piece, since, body))
-    for c in range(own.size):
-        first, w = own.contacts.state[c], at(work.wrench, 3 * c)
-        place, seen = place_at(own, piece, since, c, body)
-        contact_map(own.contacts.mount[c], place, at(body, 3), a)
+    total = plus(total, 1.0, spring_wrench(system.motion, system.springs, piece, since, body))
+    for c in range(system.size):
+        first, w = system.contacts.state[c], at(work.wrench, 3 * c)
+        place, seen = place_at(system, piece, since, c, body)
+        contact_map(system.contacts.mount[c], place, at(body, 3), a)
         put(work.twist, applied(a, seen))
-        reference = own.contacts.reference[c]
-        work.factor[c] = factor_at(reference, xp.maximum(load_of(own, piece, since, c), NO_LOAD * reference))
+        reference = system.contacts.reference[c]
+        work.factor[c] = factor_at(reference, xp.maximum(load_of(system, piece, since, c), NO_LOAD * reference))
         work.twist[3] = work.factor[c]
-        call(function_of(own, c, EVALUATE), (record_of(own, piece, c), at(y, first), work.twist, at(dy, first), w))
-        total = plus(total, total_load(own, piece, since, c), applied_back(a, w))
+        call(
+            function_of(system, c, EVALUATE), (record_of(system, piece, c), at(y, first), work.twist, at(dy, first), w)
+        )
+        total = plus(total, total_load(system, piece, since, c), applied_back(a, w))
     for i in range(3):
-        out[i] = own.motion.acceleration[3 * piece + i] + own.motion.inverse_mass[i] * total[i]
-    put(at(out, 3), _turned(own, body, three(body)))
+        out[i] = system.motion.acceleration[3 * piece + i] + system.motion.inverse_mass[i] * total[i]
+    put(at(out, 3), _turned(system, body, three(body)))
 
 
 @kernel
-def _turned(own, body, u):
+def _turned(system: SystemRecord, body: Doubles, u: Vector) -> Vector:
     """Return a velocity of the body in world axes."""
     x, y, s = u
-    if own.motion.body_axes:
+    if system.motion.body_axes:
         cos, sin = math.cos(body[5]), math.sin(body[5])
         x, y = cos * x - sin * y, sin * x + cos * y
     return x, y, s
 
 
 @entry
-def linearise(system, piece, y):
+def linearise(address: Place, piece: int, y: Doubles) -> None:
     """Linearise every contact about `y`, whose `rates` were evaluated last."""
-    own = read(system)
-    work, moves = own.work, exists(own.motion.mover)
-    for c in range(own.size):
-        mount, (a, g, h) = own.contacts.mount[c], maps_of(own, c)
-        seen = seen_by(own, c, y)
-        place = at(work.moved, 8 * c) if moves else at(own.contacts.place, 4 * c)
-        contact_map(mount, place, at(y, own.bristles + 3), a)
+    system = read(address)
+    work, moves = system.work, exists(system.motion.mover)
+    for c in range(system.size):
+        mount, (a, g, h) = system.contacts.mount[c], maps_of(system, c)
+        seen = seen_by(system, c, y)
+        place = at(work.frame, 8 * c) if moves else at(system.contacts.place, 4 * c)
+        contact_map(mount, place, at(y, system.bristles + 3), a)
         contact_map_slopes(mount, a, seen, at(work.wrench, 3 * c), g, h)
         if moves:
-            omega = work.moved[8 * c + 7]  # elsewhere, the other side has another velocity
+            omega = work.frame[8 * c + 7]  # elsewhere, the other side has another velocity
             for i in range(3):
                 g[3 * i] -= omega * a[3 * i + 1]
                 g[3 * i + 1] += omega * a[3 * i]
         put(work.twist, applied(a, seen))
         work.twist[3] = work.factor[c]
-        z = at(y, own.contacts.state[c])
-        call(function_of(own, c, LINEARISE), (record_of(own, piece, c), z, work.twist, linearisation_of(own, c)))
+        z = at(y, system.contacts.state[c])
+        call(
+            function_of(system, c, LINEARISE), (record_of(system, piece, c), z, work.twist, linearisation_of(system, c))
+        )
 
 
 @entry
-def factor(system, piece, since, y, shift):
+def factor(address: Place, piece: int, since: float, y: Doubles, shift: float) -> None:
     """Eliminate bristles and pose from `shift I - J`, and invert the 3 x 3 matrix that is left for the velocity.
 
     A free body's pose follows from its velocity, `pose = (r_pose + u)/shift`, so that the twist of a contact changes by
     `(A + G/shift) u + G r_pose/shift`. (A prescribed velocity does not see the pose at all.)
     """
-    own = read(system)
-    s, m, to_pose = own.work.stiffness, own.work.matrix, own.work.to_pose
+    system = read(address)
+    s, m, to_pose = system.work.stiffness, system.work.matrix, system.work.to_pose
     for i in range(9):
         m[i], to_pose[i] = 0.0, 0.0
-    for c in range(own.size):
-        z, (a, g, h) = at(y, own.contacts.state[c]), maps_of(own, c)
-        call(function_of(own, c, FACTOR), (record_of(own, piece, c), z, shift, linearisation_of(own, c), s))
-        load = total_load(own, piece, since, c)
+    for c in range(system.size):
+        z, (a, g, h) = at(y, system.contacts.state[c]), maps_of(system, c)
+        call(function_of(system, c, FACTOR), (record_of(system, piece, c), z, shift, linearisation_of(system, c), s))
+        load = total_load(system, piece, since, c)
         for j in range(3):
             by_u = applied_back(a, applied(s, (a[j], a[3 + j], a[6 + j])))
             bpy = applied_back(a, applied(s, (g[j], g[3 + j], g[6 + j])))
             for i in range(3):
-                weight, per_pose = own.motion.inverse_mass[i] * load, (h[3 * i + j] + bpy[i]) / shift
+                weight, per_pose = system.motion.inverse_mass[i] * load, (h[3 * i + j] + bpy[i]) / shift
                 to_pose[3 * i + j] += weight * per_pose
                 m[3 * i + j] += weight * (by_u[i] + per_pose)
-    add_spring_slopes(own.motion, own.springs, piece, since, at(y, own.bristles), 1.0 / shift, to_pose, m)
-    put_all(own.work.inverse, inverse(shift, m))
+    add_spring_slopes(system.motion, system.springs, piece, since, at(y, system.bristles), 1.0 / shift, to_pose, m)
+    put_all(system.work.inverse, inverse(shift, m))
 
 
 @entry
-def solve(system, piece, since, y, shift, r, out):
+def solve(address: Place, piece: int, since: float, y: Doubles, shift: float, r: Doubles, out: Doubles) -> None:
     """Solve `(shift I - J) out = r` with the matrix that `factor` prepared."""
-    own = read(system)
-    w, v, body, inverse_mass = own.work.stiffness, own.work.twist, at(y, own.bristles), own.motion.inverse_mass
-    r_body, r_pose = at(r, own.bristles), at(r, own.bristles + 3)
-    b = plus(three(r_body), 1.0, applied(own.work.to_pose, r_pose))
-    for c in range(own.size):
-        first = own.contacts.state[c]
-        states = record_of(own, piece, c), at(y, first), shift, at(r, first), linearisation_of(own, c), w
-        call(function_of(own, c, ELIMINATE), states)
-        load, force = total_load(own, piece, since, c), applied_back(maps_of(own, c)[0], w)
+    system = read(address)
+    w, v, body, inverse_mass = (
+        system.work.stiffness,
+        system.work.twist,
+        at(y, system.bristles),
+        system.motion.inverse_mass,
+    )
+    r_body, r_pose = at(r, system.bristles), at(r, system.bristles + 3)
+    b = plus(three(r_body), 1.0, applied(system.work.to_pose, r_pose))
+    for c in range(system.size):
+        first = system.contacts.state[c]
+        states = record_of(system, piece, c), at(y, first), shift, at(r, first), linearisation_of(system, c), w
+        call(function_of(system, c, ELIMINATE), states)
+        load, force = total_load(system, piece, since, c), applied_back(maps_of(system, c)[0], w)
         b = plus(b, load, (inverse_mass[0] * force[0], inverse_mass[1] * force[1], inverse_mass[2] * force[2]))
-    u, pose, per_shift = at(out, own.bristles), at(out, own.bristles + 3), 1.0 / shift
-    put(u, applied(own.work.inverse, b))
-    px, py, s = plus(three(r_pose), 1.0, _turned(own, body, three(u)))
+    u, pose, per_shift = at(out, system.bristles), at(out, system.bristles + 3), 1.0 / shift
+    put(u, applied(system.work.inverse, b))
+    px, py, s = plus(three(r_pose), 1.0, _turned(system, body, three(u)))
     pose[2] = per_shift * s
-    if own.motion.body_axes:
+    if system.motion.body_axes:
         cos, sin = math.cos(body[5]), math.sin(body[5])
         px -= (sin * body[0] + cos * body[1]) * pose[2]
         py += (cos * body[0] - sin * body[1]) * pose[2]
     pose[0], pose[1] = per_shift * px, per_shift * py
-    for c in range(own.size):
-        first, (a, g, _) = own.contacts.state[c], maps_of(own, c)
+    for c in range(system.size):
+        first, (a, g, _) = system.contacts.state[c], maps_of(system, c)
         put(v, plus(applied(a, u), 1.0, applied(g, pose)))
-        states = record_of(own, piece, c), at(y, first), at(r, first), v, linearisation_of(own, c), at(out, first)
-        call(function_of(own, c, BACK_SUBSTITUTE), states)
+        states = record_of(system, piece, c), at(y, first), at(r, first), v, linearisation_of(system, c), at(out, first)
+        call(function_of(system, c, BACK_SUBSTITUTE), states)
 
 
-BODY_FUNCTIONS = (rates, "ppfdd"), (linearise, "ppd"), (factor, "ppfdf"), (solve, "ppfdfdd")
-"""Functions of `SystemRecord`, with their arguments (see `calls.address_of`)."""
+BODY_FUNCTIONS = rates, linearise, factor, solve
+"""Functions of `SystemRecord`."""
 
 
 @jit
-def right_hand_side(system, piece, since, y, dy):
+def right_hand_side(address: Place, piece: int, since: float, y: np.ndarray, dy: np.ndarray) -> None:
     """Write `rates` for callers in Python, as an explicit or a general implicit solver needs it; contiguous arrays."""
-    call(read(system).rates, (system, piece, since, y, dy))
+    call(read(address).rates, (address, piece, since, y, dy))

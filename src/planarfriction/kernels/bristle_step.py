@@ -6,12 +6,12 @@ A bristle `z` driven by `u` steps by
     n = back (exp(-x) z + (1 - exp(-x))/x dt u),   k(n)
 
 (docs/physics.md, "A step at a held twist"). `k` sees the deflection `|z| q/h` and `along = z/|z| . u/h`, with the
-grip `q`, the speed `v` and `h = |u|/v`. Derivatives are those that `derive` writes.
+grip `q`, the speed `v` and `h = |u|/v`. `derive` writes the derivatives.
 
 At the kinks: the slope of a norm at zero is zero, and `along` of no bristle is constant. A minimum or maximum of equal
 numbers has the slope of its first argument. A bristle that the cap just touches counts as not capped: steady sliding
-sits on the cap to the last bit, and whether rounding lifts it over must not decide about its slope, nor about that of
-the cap of the next step.
+sits on the cap to the last bit, and rounding that lifts it over must not decide about its slope, nor about the slope
+of the next cap.
 """
 
 from __future__ import annotations
@@ -19,21 +19,22 @@ from __future__ import annotations
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
+from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.rules import ratio, rule
-from planarfriction.kernels.vectors import dot, norm, plus, times
+from planarfriction.kernels.vectors import Vector, dot, norm, plus, times
 
 ROUNDING = 1.0 + 256.0 * 2.220446049250313e-16
 """Ratio of a deflection to its cap [-] above which it counts as capped."""
 
 
 @kernel
-def cap(deflection, largest):
-    """Compute `formulas.cap`, with the slope of what is not capped where rounding alone lifts it over."""
+def cap(deflection: float, largest: float) -> float:
+    """Compute `formulas.cap`, with the slope of a free bristle where rounding alone lifts it over the cap."""
     return formulas.cap(xp, deflection, largest)
 
 
 @kernel
-def _per_capped(deflection, largest):
+def _per_capped(deflection: float, largest: float) -> float:
     """Return one over the deflection of a capped bristle, 0 for others."""
     capped = deflection > ROUNDING * largest
     return xp.where(capped, 1.0, 0.0) / xp.where(capped, deflection, 1.0)
@@ -43,13 +44,13 @@ rule(cap, "s", {0: "-{t} * per_capped({0}, {1})", 1: "per_capped({0}, {1})"}, pe
 
 
 @kernel
-def reachable(deflection, law):
+def reachable(deflection: float, law: LawNumbers) -> float:
     """Compute `formulas.reachable_deflection`, with no slope for a deflection that is full to rounding."""
     return formulas.reachable_deflection(xp, deflection, law)
 
 
 @kernel
-def _beyond_full(deflection):
+def _beyond_full(deflection: float) -> float:
     return xp.where(deflection > ROUNDING, 1.0, 0.0)
 
 
@@ -57,14 +58,14 @@ rule(reachable, "s", {0: "beyond_full({0})"}, beyond_full=_beyond_full)
 
 
 @kernel
-def seen(z, size, u, per_h, q):
+def seen(z: Vector, size: float, u: Vector, per_h: float, q: float) -> Vector:
     """Return the deflection of a bristle, and the speed at which it is being stretched; 0 and 0 for none."""
     return size * (q * per_h), per_h * ratio(dot(z, u), size)
 
 
 @kernel
-def bounded(far, start, dt, deflection):
-    """Return the deflection at the predicted end of a step, from that without friction and from its start.
+def bounded(far: float, start: float, dt: float, deflection: float) -> float:
+    """Return the deflection at the predicted end of a step, from the end without friction `far` and the decay `start`.
 
     The bound is full deflection or more, where k no longer depends on the deflection.
     """
@@ -72,14 +73,14 @@ def bounded(far, start, dt, deflection):
 
 
 @kernel
-def capped(law, free, far, deflection):
-    """Return a bristle within its cap, and its deflection; `deflection`: that at the start of the step."""
+def capped(law: LawNumbers, free: Vector, far: float, deflection: float) -> tuple[Vector, float]:
+    """Return a bristle within its cap, and its deflection; `deflection` is the one at the start of the step."""
     back = cap(far, reachable(deflection, law))
     return times(back, free), far * back
 
 
 @kernel
-def step(law, z, u, v, per_h, q, dt):
+def step(law: LawNumbers, z: Vector, u: Vector, v: float, per_h: float, q: float, dt: float) -> tuple[Vector, float]:
     """Return the bristle after dt, and its k."""
     deflection, along = seen(z, norm(z), u, per_h, q)
     start = formulas.bristle_decay(xp, deflection, along, v, q, law)

@@ -13,8 +13,9 @@ from numba import types
 from numba.extending import intrinsic
 
 from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import at
-from planarfriction.kernels.vectors import plus
+from planarfriction.compiler.memory import Doubles, at
+from planarfriction.kernels.cells import Lever
+from planarfriction.kernels.vectors import Vector, plus
 
 VECTOR = 8
 """Numbers of the longest vectors that processors have."""
@@ -33,7 +34,7 @@ cache."""
 
 
 @kernel
-def divided(count):
+def divided(count: int) -> tuple[int, int]:
     """Return the number of blocks of so many cells and the number of cells in each, a multiple of `VECTOR`."""
     blocks = -(-count // LANES)
     return blocks, -(-count // (blocks * VECTOR)) * VECTOR
@@ -73,13 +74,13 @@ class Kind(NamedTuple):
 
 
 @kernel
-def lever_at(lever, block, i):
+def lever_at(lever: Lever, block: Doubles, i: int) -> Vector:
     """Return the numbers of the lever of cell i."""
     return lever.of(Block(block, LANES), i)
 
 
 @kernel
-def totals(w, blocks, field, lanes):
+def totals(w: Doubles, blocks: int, field: int, lanes: int) -> Vector:
     """Return the sums of three fields over all cells."""
     total = (0.0, 0.0, 0.0)
     for k in range(blocks):
@@ -90,12 +91,12 @@ def totals(w, blocks, field, lanes):
 
 
 @intrinsic(prefer_literal=True)
-def room(typingctx, count):
+def scratch(typingctx: Any, count: types.Type) -> Any:
     """Return memory for a constant count of doubles, which lasts until the function returns it is inlined into."""
     if not isinstance(count, types.IntegerLiteral):
         return None
 
-    def generate(context, builder, signature, args):
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         kind = ir.ArrayType(ir.DoubleType(), count.literal_value)
         with builder.goto_entry_block():
             place = builder.alloca(kind)

@@ -6,12 +6,14 @@ import functools
 from typing import Any, NamedTuple
 
 from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import at
+from planarfriction.compiler.memory import Doubles, at
+from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import cells_rollout, cells_sensitivities
-from planarfriction.kernels.cell_blocks import BLOCK, LANES, Kind, StepBars, room
+from planarfriction.kernels.cell_blocks import BLOCK, LANES, Kind, StepBars, scratch
 from planarfriction.kernels.cell_passes import KINDS, backward_passes, forward_passes
+from planarfriction.kernels.cells import Lever
 from planarfriction.kernels.passes import Passes
-from planarfriction.kernels.vectors import plus, reader_of
+from planarfriction.kernels.vectors import Vector, plus, reader_of
 
 
 def _advance_of(written: Passes) -> Any:
@@ -19,8 +21,8 @@ def _advance_of(written: Passes) -> Any:
     step, numbers = written.run, LANES * written.rows
 
     @kernel
-    def advance(lever, law, w, blocks, lanes, twist, dt):
-        work, total = room(numbers), (0.0, 0.0, 0.0)
+    def advance(lever: Lever, law: LawNumbers, w: Doubles, blocks: int, lanes: int, twist: Vector, dt: float) -> Vector:
+        work, total = scratch(numbers), (0.0, 0.0, 0.0)
         for k in range(blocks):
             total = plus(total, 1.0, step(law, twist, (dt,), at(w, k * BLOCK), work, lanes))
         return total
@@ -33,9 +35,12 @@ def _retreat_of(written: Passes) -> Any:
     adjoint, numbers = written.run, LANES * written.rows
 
     @kernel
-    def retreat(lever, law, block, lanes, interval, pull, load):
+    def retreat(
+        lever: Lever, law: LawNumbers, block: Doubles, lanes: int, interval: tuple[Vector, float], pull: Vector,
+        load: float,
+    ) -> StepBars:  # fmt: skip
         shared = interval[1], load, 0.0 if load == 0.0 else 1.0, pull[0], pull[1], pull[2]
-        s = adjoint(law, interval[0], shared, block, room(numbers), lanes)
+        s = adjoint(law, interval[0], shared, block, scratch(numbers), lanes)
         return StepBars((s[0], s[1], s[2]), s[3], (s[4], s[5], s[6], s[7], s[8], s[9], s[10], s[11]))
 
     return retreat

@@ -50,7 +50,7 @@ POINT = Element("points", 2, points.evaluate, points.step, slopes=Division(2, 0)
 DISC = Element("discs", 3, discs.evaluate, discs.step)
 LEANING_POINT = Element("leaning points", 2, leaning_cells.evaluate, leaning_cells.step)
 LEANING_DISC = Element("leaning discs", 3, leaning_cells.evaluate_disc, leaning_cells.step_disc)
-"""Their law is a `Leaning`, whose asymmetry stands behind the numbers of the lever."""
+"""Elements whose law is a `Leaning`; the asymmetry stands behind the numbers of the lever."""
 
 
 class CellKind(NamedTuple):
@@ -65,13 +65,13 @@ class CellKind(NamedTuple):
 
 
 @kernel
-def _leaning_point(contact: CellsContact, i: int) -> Leaning:
+def _leaning_point(contact: CellsContact, i: int, v: Doubles) -> Leaning:
     c, n = contact.cells, contact.count
     return Leaning(contact.law, (c[5 * n + i], c[6 * n + i]))
 
 
 @kernel
-def _leaning_disc(contact: CellsContact, i: int) -> Leaning:
+def _leaning_disc(contact: CellsContact, i: int, v: Doubles) -> Leaning:
     c, n = contact.cells, contact.count
     return Leaning(contact.law, (c[6 * n + i], c[7 * n + i]))
 

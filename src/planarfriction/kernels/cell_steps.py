@@ -10,15 +10,16 @@ import functools
 from typing import Any, NamedTuple
 
 from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import Doubles, at
+from planarfriction.compiler.memory import Doubles, Place, at
+from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import cells, general_cells
-from planarfriction.kernels.cell_blocks import LANES, divided, room
+from planarfriction.kernels.cell_blocks import LANES, divided, scratch
 from planarfriction.kernels.cell_passes import DISC, KINDS, Rows, rate_passes, slope_passes, step_passes
 from planarfriction.kernels.cells import CellsContact
 from planarfriction.kernels.contacts import ModelFunctions, functions_of
 from planarfriction.kernels.passes import Passes
 from planarfriction.kernels.steps import StepFunctions, step_functions
-from planarfriction.kernels.vectors import plus, put, three
+from planarfriction.kernels.vectors import Vector, plus, put, three
 
 SLOPES = LANES * 2 * DISC.size**2
 """Numbers of a block of derivatives."""
@@ -35,13 +36,13 @@ def _run(written: Passes) -> Any:
     run, numbers = written.run, LANES * written.rows
 
     @kernel
-    def passed(law, v, dt, rows, lanes):
-        return run(law, v, (dt,), rows, room(numbers), lanes)
+    def passed(law: LawNumbers, v: Vector, dt: float, rows: Rows, lanes: int) -> Any:
+        return run(law, v, (dt,), rows, scratch(numbers), lanes)
 
     return passed
 
 
-def evaluate(contact: int, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, *, rate: Any) -> None:
+def evaluate(contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, *, rate: Any) -> None:
     """Write `z'`, and `W`."""
     record, twist, total = cells.read(contact), three(v), (0.0, 0.0, 0.0)
     n, (_, lanes) = record.count, divided(record.count)
@@ -51,9 +52,9 @@ def evaluate(contact: int, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, *,
     put(w, total)
 
 
-def linearise(contact: int, z: Doubles, v: Doubles, lin: Doubles, *, bristle: Any, slope: Any) -> None:
+def linearise(contact: Place, z: Doubles, v: Doubles, lin: Doubles, *, bristle: Any, slope: Any) -> None:
     """Write A and F of each cell (see `general_cells`)."""
-    record, twist, block = cells.read(contact), three(v), room(SLOPES)
+    record, twist, block = cells.read(contact), three(v), scratch(SLOPES)
     n, (_, lanes) = record.count, divided(record.count)
     for first in range(0, n, lanes):
         count = min(lanes, n - first)
@@ -63,7 +64,7 @@ def linearise(contact: int, z: Doubles, v: Doubles, lin: Doubles, *, bristle: An
                 lin[m * n + first + i] = block[m * LANES + i]
 
 
-def step(contact: int, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, advance: Any) -> None:
+def step(contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, advance: Any) -> None:
     """Advance the bristles by `dt` at a held twist, and write the wrench at the end."""
     record, twist, total = cells.read(contact), three(v), (0.0, 0.0, 0.0)
     n, (_, lanes) = record.count, divided(record.count)

@@ -40,7 +40,7 @@ class Lever(NamedTuple):
     around: Any
     """`(cell, P)`: return `B' P B` of a matrix [d, d], nine numbers."""
     law: Any
-    """`(contact, i)`: return the law of the cell."""
+    """`(contact, i, v)`: return the law of the cell; `v` are the twist and numbers behind it."""
 
 
 # ---------------------------------------------------------------------- the levers
@@ -99,7 +99,7 @@ def _around_by_map(cell: Vector, p: Vector) -> Vector:
 
 
 @kernel
-def law_of_all(contact: CellsContact, i: int) -> LawNumbers:
+def law_of_all(contact: CellsContact, i: int, v: Doubles) -> LawNumbers:
     """Return the law that all cells share."""
     return contact.law
 

@@ -1,7 +1,7 @@
 """Rollouts of cells, their discrete adjoint and their derivatives, in vector code (see `rollouts` for the inputs).
 
-The cells of a contact lie in blocks (see `cell_blocks`). `shapes` are the weights of its cells at each load `[L, M]`, M
-that of all their blocks; `data` holds the numbers of their levers, block after block.
+The cells of a contact lie in blocks (see `cell_blocks`). `shapes` are the weights of its M cells at each load `[L, M]`,
+the blocks' filling included; `data` holds the numbers of the levers, block after block.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 
 from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.calls import pointer
-from planarfriction.compiler.memory import at
+from planarfriction.compiler.memory import Doubles, at
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.bind import bind
 from planarfriction.kernels.cell_blocks import (
@@ -31,15 +31,15 @@ from planarfriction.kernels.cell_blocks import (
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.forward import forward
 from planarfriction.kernels.law import law_of
-from planarfriction.kernels.rollouts import row_of
+from planarfriction.kernels.rollouts import Bars, Inputs, row_of
 from planarfriction.kernels.settle import factor_at, softening, stiffened, within
-from planarfriction.kernels.vectors import add, plus, scatter, three, times
+from planarfriction.kernels.vectors import Vector, add, plus, scatter, three, times
 
 PARAMETERS = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
 """Numbers of the law that derivatives are taken by."""
 
 COLUMNS = tuple(LawNumbers._fields.index(name) for name in PARAMETERS)
-"""Their places in a row."""
+"""Places of `PARAMETERS` in a row."""
 
 BY = ("z", "u", *(f"law.{name}" for name in PARAMETERS))
 """Arguments by which steps of cells are differentiated."""
@@ -54,7 +54,7 @@ def pushed_of(step: Any) -> Any:
 
 
 @kernel
-def _lay(w, blocks, levers, numbers=BLOCK):
+def _lay(w: Doubles, blocks: int, levers: np.ndarray, numbers: int = BLOCK) -> None:
     """Write the numbers of the levers, states of zero and no cotangents."""
     per_block = levers.shape[0] // blocks
     for k in range(blocks):
@@ -66,7 +66,7 @@ def _lay(w, blocks, levers, numbers=BLOCK):
 
 
 @kernel
-def _write(w, field, values, n, size, numbers=BLOCK):
+def _write(w: Doubles, field: int, values: np.ndarray, n: int, size: int, numbers: int = BLOCK) -> None:
     """Write vectors [size n] to a field of all blocks, which have so many numbers."""
     blocks, lanes = divided(n)
     for k in range(blocks):
@@ -77,7 +77,7 @@ def _write(w, field, values, n, size, numbers=BLOCK):
 
 
 @kernel
-def _read(w, field, values, n, size, numbers=BLOCK):
+def _read(w: Doubles, field: int, values: np.ndarray, n: int, size: int, numbers: int = BLOCK) -> None:
     """Read vectors [size n] from a field of all blocks."""
     blocks, lanes = divided(n)
     for k in range(blocks):
@@ -88,7 +88,7 @@ def _read(w, field, values, n, size, numbers=BLOCK):
 
 
 @kernel
-def _forget(w, blocks, field, size):
+def _forget(w: Doubles, blocks: int, field: int, size: int) -> None:
     for k in range(blocks):
         block = at(w, k * BLOCK + field)
         for i in range(size * LANES):
@@ -96,7 +96,7 @@ def _forget(w, blocks, field, size):
 
 
 @kernel
-def _weigh(w, blocks, lanes, weights, by_load):
+def _weigh(w: Doubles, blocks: int, lanes: int, weights: np.ndarray, by_load: np.ndarray) -> None:
     for k in range(blocks):
         block, first = at(w, k * BLOCK), k * lanes
         for i in range(lanes):
@@ -111,7 +111,7 @@ _forth_within, _back_within, _pushed_within = _within.forth, _within.back, forwa
 
 
 @kernel
-def _bring_back(kind, law, w, blocks, lanes):
+def _bring_back(kind: Kind, law: LawNumbers, w: Doubles, blocks: int, lanes: int) -> None:
     """Bring bristles back onto their limits (see `settle`)."""
     for k in range(blocks):
         block = at(w, k * BLOCK)
@@ -120,8 +120,8 @@ def _bring_back(kind, law, w, blocks, lanes):
 
 
 @kernel
-def _bring_back_pull(kind, law, w, blocks, lanes):
-    """Carry the cotangents of bristles back over `_bring_back`; return those of sigma_0 and mu_s."""
+def _bring_back_pull(kind: Kind, law: LawNumbers, w: Doubles, blocks: int, lanes: int) -> Vector:
+    """Carry the cotangents of bristles back over `_bring_back`; return the cotangents of sigma_0 and mu_s."""
     total = (0.0, 0.0)
     for k in range(blocks):
         block = at(w, k * BLOCK)
@@ -133,12 +133,25 @@ def _bring_back_pull(kind, law, w, blocks, lanes):
     return total
 
 
+class Interval(NamedTuple):
+    """A step of bristles of a law with the stiffness at its load, and the changes of its inputs."""
+
+    law: LawNumbers
+    d_law: tuple
+    """In the order of `PARAMETERS`."""
+    twist: Vector
+    d_twist: Vector
+    load: float
+    d_load: float
+    dt: float
+
+
 @kernel
-def _bring_back_push(kind, law, by, block, lanes):
-    """Bring bristles back, and their changes for changes `by` of the law, as `BY` has them."""
+def _bring_back_push(kind: Kind, interval: Interval, block: Doubles, lanes: int) -> None:
+    """Bring bristles back onto their limits, with their changes."""
     for i in range(lanes):
         z, change = kind.vector(block, Z + i, LANES), kind.vector(block, BAR + i, LANES)
-        z, change = _pushed_within(law, z, change, by[0], by[4])
+        z, change = _pushed_within(interval.law, z, change, interval.d_law[0], interval.d_law[4])
         scatter(block, Z + i, LANES, z)
         scatter(block, BAR + i, LANES, change)
 
@@ -147,7 +160,9 @@ def _bring_back_push(kind, law, by, block, lanes):
 
 
 @kernel
-def _roll(kind, law, inputs, b, n, w, wrench, states):
+def _roll(
+    kind: Kind, law: LawNumbers, inputs: Inputs, b: int, n: int, w: Doubles, wrench: np.ndarray, states: np.ndarray
+) -> None:
     twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
     which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shapes, -1
     (blocks, lanes), kept = divided(weights.shape[1]), states.shape[0] > 0
@@ -168,7 +183,10 @@ def _roll(kind, law, inputs, b, n, w, wrench, states):
 
 
 @kernel
-def _rollout(kind, inputs, span, z, wrench, states, scratch):
+def _rollout(
+    kind: Kind, inputs: Inputs, span: tuple[int, ...], z: np.ndarray, wrench: np.ndarray, states: np.ndarray,
+    scratch: np.ndarray,
+) -> None:  # fmt: skip
     w, n, rows = pointer(scratch), z.shape[1] // kind.size, inputs.rows
     blocks, _ = divided(inputs.shapes.shape[1])
     for b in range(span[0], span[1]):
@@ -179,7 +197,9 @@ def _rollout(kind, inputs, span, z, wrench, states, scratch):
         _read(w, Z, z[b], n, kind.size)
 
 
-def rollout(inputs, span, z, wrench, states, *, kind):
+def rollout(
+    inputs: Inputs, span: tuple[int, ...], z: np.ndarray, wrench: np.ndarray, states: np.ndarray, *, kind: Kind
+) -> None:
     """Step the contacts `span[0]` to `span[1]`: `z` [B, size n] in place, wrenches added to `wrench` [B, T, 3].
 
     The state before each step goes into `states` [B, T, size n], unless that is empty.
@@ -192,8 +212,11 @@ def rollout(inputs, span, z, wrench, states, *, kind):
 
 
 @kernel
-def _pull(kind, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
-    """Carry the cotangents of a rollout back, and return that of the law."""
+def _pull(
+    kind: Kind, law: LawNumbers, inputs: Any, b: int, w: Doubles, states: np.ndarray, pulls: np.ndarray, bars: Any
+) -> Vector:
+    """Carry the cotangents of the rollout of contact b back, and return the cotangent of the law."""
+    n, twist_bar, load_bar = bars.state.shape[1] // kind.size, bars.twist[b], bars.load[b]
     twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
     which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shapes, -1
     (blocks, lanes), by_law = divided(weights.shape[1]), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -202,12 +225,12 @@ def _pull(kind, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
             last = which[t]
             _weigh(w, blocks, lanes, weights[last], inputs.by_load[last])
         _write(w, Z, states[t], n, kind.size)
-        load, pull, held = loads[t], three(pulls[t]), (three(twists[t]), inputs.dt[t])
+        load, pull, interval = loads[t], three(pulls[t]), (three(twists[t]), inputs.dt[t])
         stiff, by_stiff = stiffened(law, inputs.reference, load), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         if inputs.reference > 0.0:
             _bring_back(kind, stiff, w, blocks, lanes)
         for k in range(blocks):
-            bars = kind.retreat(kind.lever, stiff, at(w, k * BLOCK), lanes, held, pull, load)
+            bars = kind.retreat(kind.lever, stiff, at(w, k * BLOCK), lanes, interval, pull, load)
             add(twist_bar[t], bars.twist)
             load_bar[t] += bars.load
             by_stiff = plus(by_stiff, 1.0, bars.law)
@@ -221,7 +244,10 @@ def _pull(kind, law, inputs, b, n, w, states, pulls, twist_bar, load_bar):
 
 
 @kernel
-def _gradient(kind, inputs, states, wrench_bar, span, bars, scratch):
+def _gradient(
+    kind: Kind, inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: tuple[int, ...], bars: Bars,
+    scratch: np.ndarray,
+) -> None:  # fmt: skip
     w, n, rows = pointer(scratch), bars.state.shape[1] // kind.size, inputs.rows
     blocks, _ = divided(inputs.shapes.shape[1])
     for b in range(span[0], span[1]):
@@ -229,13 +255,15 @@ def _gradient(kind, inputs, states, wrench_bar, span, bars, scratch):
         before, row_bar = before[row_of(before, b)], bars.rows[b]
         _lay(w, blocks, inputs.data)
         _write(w, BAR, bars.state[b], n, kind.size)
-        by_law = _pull(kind, law, inputs, b, n, w, before, pulls, bars.twist[b], bars.load[b])
+        by_law = _pull(kind, law, inputs, b, w, before, pulls, bars)
         _read(w, BAR, bars.state[b], n, kind.size)
         for m in range(len(by_law)):
             row_bar[COLUMNS[m]] += by_law[m]
 
 
-def gradient(inputs, states, wrench_bar, span, bars, *, kind):
+def gradient(
+    inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: tuple[int, ...], bars: Bars, *, kind: Kind
+) -> None:
     """Add the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
     scratch = np.empty(divided(inputs.shapes.shape[1])[0] * BLOCK)
     _gradient(kind, inputs, states, wrench_bar, span, bars, scratch)
@@ -245,28 +273,30 @@ def gradient(inputs, states, wrench_bar, span, bars, *, kind):
 
 
 @kernel
-def _push_one(kind, law, by, block, i, twist, turn, dt, load, push):
-    """Step a cell and its change, for changes `by` of the law, `turn` of the twist and `push` of the load."""
-    lever, weight = kind.lever, block[WEIGHT + i]
+def _push_one(kind: Kind, interval: Interval, block: Doubles, i: int) -> None:
+    """Step a cell and its change."""
+    lever, weight, load = kind.lever, block[WEIGHT + i], interval.load
     one, z, change = lever_at(lever, block, i), kind.vector(block, Z + i, LANES), kind.vector(block, BAR + i, LANES)
-    new, traction, d_new, d_traction = kind.pushed(
-        law, z, lever.seen(one, twist), dt, change, lever.seen(one, turn), *by
-    )
+    u, d_u = lever.seen(one, interval.twist), lever.seen(one, interval.d_twist)
+    new, traction, d_new, d_traction = kind.pushed(interval.law, z, u, interval.dt, change, d_u, *interval.d_law)
     scatter(block, Z + i, LANES, new)
     scatter(block, BAR + i, LANES, d_new)
-    heavier = (weight + load * block[BY_LOAD + i]) * push
+    heavier = (weight + load * block[BY_LOAD + i]) * interval.d_load
     change = plus(times(load * weight, d_traction), heavier, traction)
     scatter(block, OUT + i, LANES, (times(weight, lever.wrench(one, traction)), lever.wrench(one, change)))
 
 
 @kernel
-def _push(kind, law, by, block, twist, turn, dt, load, push, lanes):
+def _push(kind: Kind, interval: Interval, block: Doubles, lanes: int) -> None:
     for i in range(lanes):
-        _push_one(kind, law, by, block, i, twist, turn, dt, load, push)
+        _push_one(kind, interval, block, i)
 
 
 @kernel
-def _tangent(kind, inputs, span, z, changes, wrenches, slopes, scratch):
+def _tangent(
+    kind: Kind, inputs: Inputs, span: tuple[int, ...], z: np.ndarray, changes: Bars, wrenches: np.ndarray,
+    slopes: np.ndarray, scratch: np.ndarray,
+) -> None:  # fmt: skip
     w, n, rows = pointer(scratch), z.shape[1] // kind.size, inputs.rows
     weights, all_by_load = inputs.shapes, inputs.by_load
     blocks, lanes = divided(weights.shape[1])
@@ -282,14 +312,15 @@ def _tangent(kind, inputs, span, z, changes, wrenches, slopes, scratch):
             if which[t] != last:
                 last = which[t]
                 _weigh(w, blocks, lanes, weights[last], all_by_load[last])
-            load, twist, turn, dt = loads[t], three(twists[t]), three(turns[t]), inputs.dt[t]
+            load = loads[t]
             stiff, stiffer = stiffened(law, inputs.reference, load), d_law.sigma_0 * factor_at(inputs.reference, load)
             stiffer += pushes[t] * softening(stiff, inputs.reference, load)
-            by = (stiffer, *d_law[1:7], d_law.breakaway_ratio)
+            by_law, turn = (stiffer, *d_law[1:7], d_law.breakaway_ratio), three(turns[t])
+            interval = Interval(stiff, by_law, three(twists[t]), turn, load, pushes[t], inputs.dt[t])
             for k in range(blocks):
                 if inputs.reference > 0.0:
-                    _bring_back_push(kind, stiff, by, at(w, k * BLOCK), lanes)
-                _push(kind, stiff, by, at(w, k * BLOCK), twist, turn, dt, load, pushes[t], lanes)
+                    _bring_back_push(kind, interval, at(w, k * BLOCK), lanes)
+                _push(kind, interval, at(w, k * BLOCK), lanes)
             add(wrenches[b, t], times(load, totals(w, blocks, OUT, lanes)))
             add(slopes[b, t], totals(w, blocks, OUT + 3 * LANES, lanes))
             if load == 0.0:
@@ -299,10 +330,13 @@ def _tangent(kind, inputs, span, z, changes, wrenches, slopes, scratch):
         _read(w, BAR, changes.state[b], n, kind.size)
 
 
-def tangent(inputs, span, z, changes, wrenches, slopes, *, kind):
-    """Run rollouts with their change along given ones of the inputs, added to `wrenches` and `slopes` [B, T, 3].
+def tangent(
+    inputs: Inputs, span: tuple[int, ...], z: np.ndarray, changes: Bars, wrenches: np.ndarray, slopes: np.ndarray, *,
+    kind: Kind,
+) -> None:  # fmt: skip
+    """Run rollouts with their change along changes of the inputs, added to `wrenches` and `slopes` [B, T, 3].
 
-    `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state in place.
+    `changes` of the inputs: as `Bars`, one row where all contacts share one; the change of the state is in place.
     """
     scratch = np.empty(divided(inputs.shapes.shape[1])[0] * BLOCK)
     _tangent(kind, inputs, span, z, changes, wrenches, slopes, scratch)

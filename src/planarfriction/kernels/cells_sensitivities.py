@@ -1,30 +1,34 @@
 """Derivatives of rollouts of cells by all numbers of their law, forward in time, in one pass.
 
-A step and what its derivatives share is computed once: for each number of the law a bristle carries its change. Those
-of `sigma_1` and `sigma_2` move no bristle.
+A step is computed once with all its derivatives: for each number of the law a bristle carries its change, but
+`sigma_1` and `sigma_2` move no bristle.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.calls import pointer
-from planarfriction.compiler.memory import at
+from planarfriction.compiler.memory import Doubles, at
+from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.bind import bind
 from planarfriction.kernels.cell_blocks import BLOCK, LANES, WEIGHT, Kind, Z, divided, lever_at
 from planarfriction.kernels.cells_rollout import _lay, _read, _write
 from planarfriction.kernels.forward import forwards
 from planarfriction.kernels.law import law_of
-from planarfriction.kernels.rollouts import row_of
+from planarfriction.kernels.rollouts import Derivatives, row_of
 from planarfriction.kernels.settle import factor_at, stiffened, within
-from planarfriction.kernels.vectors import add, plus, scatter, three
+from planarfriction.kernels.vectors import Vector, add, plus, scatter, three
 
 _MOVING = "sigma_0", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
 PARAMETERS = (*_MOVING, "sigma_1", "sigma_2")
-"""Numbers of the law, those first that move bristles."""
+"""Numbers of the law; the numbers that move bristles come first."""
+
+_PLACES = tuple(PARAMETERS.index(name) if name in PARAMETERS else -1 for name in LawNumbers._fields)
+"""Place in `PARAMETERS` of each column of a row."""
 
 _BY = tuple((f"law.{name}", "z")[: 1 + (name in _MOVING)] for name in PARAMETERS)
 
@@ -33,55 +37,68 @@ _pushed_within = forwards(
 ).pushed
 
 _CHANGE, _PULL = BLOCK, BLOCK + 3 * LANES * len(_MOVING)
-"""Fields behind those of a block: changes of the state, and traction with its changes."""
+"""Fields behind a block: changes of the state, and traction with its changes."""
 
 _ALL = _PULL + 3 * LANES * (1 + len(PARAMETERS))
 _SIZE = _ALL + LANES * (1 - _ALL // LANES % 2)
 """Numbers of a block, an odd number of fields (see `cell_blocks`)."""
 
 
+class Interval(NamedTuple):
+    """A step of bristles of a law with the stiffness at its load."""
+
+    law: LawNumbers
+    twist: Vector
+    dt: float
+    stiffer: float
+    """Change of the stiffness at the load per change of `sigma_0`."""
+
+
 @kernel
-def _change(kind, block, n, i):
+def _change(kind: Kind, block: Doubles, n: int, i: int) -> Vector:
     return kind.vector(block, _CHANGE + kind.size * n * LANES + i, LANES)
 
 
 @kernel
-def _bring_back(kind, law, block, stiffer, lanes):
+def _changes(kind: Kind, block: Doubles, i: int) -> tuple[Vector, ...]:
+    """Return the changes of bristle i, in the order of `_MOVING`."""
+    first = _change(kind, block, 0, i), _change(kind, block, 1, i), _change(kind, block, 2, i)
+    return (*first, _change(kind, block, 3, i), _change(kind, block, 4, i), _change(kind, block, 5, i))
+
+
+@kernel
+def _bring_back(kind: Kind, interval: Interval, block: Doubles, lanes: int) -> None:
     """Bring bristles back onto their limits (see `settle`), with their changes."""
     for i in range(lanes):
-        moved = _pushed_within(
-            law, kind.vector(block, Z + i, LANES), stiffer, _change(kind, block, 0, i), _change(kind, block, 1, i), 1.0,
-            _change(kind, block, 2, i), _change(kind, block, 3, i), _change(kind, block, 4, i),
-            _change(kind, block, 5, i),
-        )  # fmt: skip
-        scatter(block, Z + i, LANES, moved[0])
-        scatter(block, _CHANGE + i, LANES, moved[1:])
+        z, (a, b, c, d, e, f) = kind.vector(block, Z + i, LANES), _changes(kind, block, i)
+        bristles = _pushed_within(interval.law, z, interval.stiffer, a, b, 1.0, c, d, e, f)
+        scatter(block, Z + i, LANES, bristles[0])
+        scatter(block, _CHANGE + i, LANES, bristles[1:])
 
 
 @kernel
-def _push_one(kind, pushed, law, block, i, twist, dt, stiffer):
-    z, u = kind.vector(block, Z + i, LANES), kind.lever.seen(lever_at(kind.lever, block, i), twist)
-    found = pushed(
-        law, z, u, dt, stiffer, _change(kind, block, 0, i), 1.0, _change(kind, block, 1, i), 1.0,
-        _change(kind, block, 2, i), 1.0, _change(kind, block, 3, i), 1.0, _change(kind, block, 4, i), 1.0,
-        _change(kind, block, 5, i), 1.0, 1.0
-    )  # fmt: skip
-    scatter(block, Z + i, LANES, found[0])
-    scatter(block, _CHANGE + i, LANES, found[2:14:2])
-    scatter(block, _PULL + i, LANES, found[1::2])
+def _push_one(kind: Kind, interval: Interval, block: Doubles, i: int) -> None:
+    z, u = kind.vector(block, Z + i, LANES), kind.lever.seen(lever_at(kind.lever, block, i), interval.twist)
+    a, b, c, d, e, f = _changes(kind, block, i)
+    changes = interval.stiffer, a, 1.0, b, 1.0, c, 1.0, d, 1.0, e, 1.0, f, 1.0, 1.0
+    results = kind.pushed(interval.law, z, u, interval.dt, *changes)
+    bristles, tractions = results[::2], results[1::2]
+    scatter(block, Z + i, LANES, bristles[0])
+    scatter(block, _CHANGE + i, LANES, bristles[1:7])
+    scatter(block, _PULL + i, LANES, tractions)
 
 
 @kernel
-def _push(kind, pushed, law, block, twist, dt, stiffer, lanes):
+def _push(kind: Kind, interval: Interval, block: Doubles, lanes: int) -> None:
     for i in range(lanes):
-        _push_one(kind, pushed, law, block, i, twist, dt, stiffer)
+        _push_one(kind, interval, block, i)
 
 
 @kernel
-def _total(kind, block, lanes, load, n):
+def _total(kind: Kind, block: Doubles, lanes: int, load: float, n: int) -> Vector:
     """Return the wrench of a block, n = 0, or its change with the number n - 1 of the law.
 
-    The load is a factor inside the sum, so that what adds up blocks rounds alike in compiled code and outside.
+    The load is a factor inside the sum, so that sums over blocks round alike in compiled code and outside.
     """
     total = (0.0, 0.0, 0.0)
     for i in range(lanes):
@@ -91,7 +108,7 @@ def _total(kind, block, lanes, load, n):
 
 
 @kernel
-def _forget(block):
+def _forget(block: Doubles) -> None:
     for i in range(3 * LANES):
         block[Z + i] = 0.0
     for i in range(_CHANGE, _PULL):
@@ -99,10 +116,12 @@ def _forget(block):
 
 
 @kernel
-def _follow(kind, pushed, law, block, inputs, b, k, lanes, wanted, wrench, slopes):
+def _follow(
+    kind: Kind, inputs: Any, b: int, law: LawNumbers, k: int, lanes: int, block: Doubles, out: Derivatives
+) -> None:
     """Step block k of contact b through all steps: one block fits into the cache."""
     twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-    which, last = inputs.which[row_of(inputs.which, b)], -1
+    which, last, wrench, slopes = inputs.which[row_of(inputs.which, b)], -1, out.wrenches[b], out.slopes[b]
     for t in range(inputs.dt.shape[0]):
         if which[t] != last:
             last = which[t]
@@ -113,18 +132,19 @@ def _follow(kind, pushed, law, block, inputs, b, k, lanes, wanted, wrench, slope
             _forget(block)
             continue
         stiff, stiffer = stiffened(law, inputs.reference, load), factor_at(inputs.reference, load)
+        interval = Interval(stiff, three(twists[t]), inputs.dt[t], stiffer)
         if inputs.reference > 0.0:
-            _bring_back(kind, stiff, block, stiffer, lanes)
-        _push(kind, pushed, stiff, block, three(twists[t]), inputs.dt[t], stiffer, lanes)
+            _bring_back(kind, interval, block, lanes)
+        _push(kind, interval, block, lanes)
         add(wrench[t], _total(kind, block, lanes, load, 0))
-        for d in range(wanted.shape[0]):
-            change = _total(kind, block, lanes, load, 1 + wanted[d])
+        for d in range(out.columns.shape[0]):
+            change = _total(kind, block, lanes, load, 1 + _PLACES[out.columns[d]])
             for m in range(3):
                 slopes[t, m, d] += change[m]
 
 
 @kernel
-def _sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes, scratch):
+def _sensitivities(kind: Kind, inputs: Any, span: tuple, z: np.ndarray, out: Derivatives, scratch: np.ndarray) -> None:
     w, n, rows = pointer(scratch), z.shape[1] // kind.size, inputs.rows
     blocks, lanes = divided(inputs.shapes.shape[1])
     for b in range(span[0], span[1]):
@@ -132,20 +152,17 @@ def _sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes, scra
         _write(w, Z, z[b], n, kind.size, _SIZE)
         law = law_of(rows[row_of(rows, b)])
         for k in range(blocks):
-            _follow(kind, pushed, law, at(w, k * _SIZE), inputs, b, k, lanes, wanted, wrenches[b], slopes[b])
+            _follow(kind, inputs, b, law, k, lanes, at(w, k * _SIZE), out)
         _read(w, Z, z[b], n, kind.size, _SIZE)
 
 
-def sensitivities(inputs, span, z, wanted, wrenches, slopes, *, kind, pushed):
-    """Run rollouts with their derivatives by the numbers `wanted` of `PARAMETERS`.
-
-    They are added to `wrenches` [B, T, 3] and `slopes` [B, T, 3, len(wanted)]; `z` [B, size n] in place.
-    """
+def sensitivities(inputs: Any, span: tuple, z: np.ndarray, out: Derivatives, *, kind: Kind) -> None:
+    """Run rollouts with their derivatives by numbers of the law; `z` [B, size n] in place."""
     scratch = np.empty(divided(inputs.shapes.shape[1])[0] * _SIZE)
-    _sensitivities(kind, pushed, inputs, span, z, wanted, wrenches, slopes, scratch)
+    _sensitivities(kind, inputs, span, z, out, scratch)
 
 
 def bound(kind: Kind, step: Any, name: str) -> Any:
     """Return the entry point of a kind of cells, with the step of one and its changes by each number of the law."""
-    pushed = forwards(step, _BY, ("z", "u")).pushed
-    return bind(sensitivities, f"{name}_sensitivities", jit, kind=kind, pushed=pushed)
+    kind = kind._replace(pushed=forwards(step, _BY, ("z", "u")).pushed)
+    return bind(sensitivities, f"{name}_sensitivities", jit, kind=kind)

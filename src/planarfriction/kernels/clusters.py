@@ -10,7 +10,7 @@ import numpy as np
 from planarfriction.compiler import jit
 
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
-"""Multiples of it, less their whole parts, are spread evenly over (0, 1)."""
+"""Golden ratio: its multiples, less their whole parts, are spread evenly over (0, 1)."""
 
 _TIE = 1e-12
 """Relative difference of squared distances below which the first centre wins: far above rounding."""
@@ -20,8 +20,8 @@ _STOPS = 1e-9
 
 
 @jit
-def seeds(points, weights, first, centres):
-    """Write `centres [k, 2]` far from each other: points drawn by weight times squared distance from those before.
+def seeds(points: np.ndarray, weights: np.ndarray, first: int, centres: np.ndarray) -> None:
+    """Write `centres [k, 2]` far from each other: points drawn by weight times squared distance from earlier centres.
 
     Draws are multiples of the golden ratio from number `first` on.
     """
@@ -46,7 +46,10 @@ def seeds(points, weights, first, centres):
 
 
 @jit
-def lloyd(points, weights, both, on_axes, steps, centres, labels, turned):
+def lloyd(
+    points: np.ndarray, weights: np.ndarray, both: bool, on_axes: np.ndarray, steps: int, centres: np.ndarray,
+    labels: np.ndarray, turned: np.ndarray,
+) -> float:  # fmt: skip
     """Move `centres [k, 2]` to the means of the points nearest to them, up to so many `steps`; return the cost.
 
     The cost is the sum of weights times squared distances; infinite if a cluster has no weight. `labels [n]` are the

@@ -1,8 +1,8 @@
-"""Contacts of a planar body, as compiled loops see them: where each sits, which model it has, what load and shape.
+"""Contacts of a planar body, as compiled loops see them: mounts, models, loads and shapes.
 
 The twist of contact c is `V = A(pose) u` for the body's velocity `u = (vx, vy, omega)`, and its wrench `W` acts on the
 body as `A' W`, since power is the same at both ends. With `G = d(A u)/d pose` and `H = d(A' W)/d pose` that is all the
-body needs to know of a contact; what is behind its wrench is called by address (see `ModelFunctions`).
+body needs to know of a contact; its model is called by address (see `ModelFunctions`).
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from planarfriction.compiler import entry, kernel
 from planarfriction.compiler.calls import address_of
 from planarfriction.compiler.memory import Doubles, Integers, Layout
 from planarfriction.kernels.bind import bind
-from planarfriction.kernels.vectors import plus, times
+from planarfriction.kernels.vectors import Vector, plus, times
 
 WORLD, BODY, BODY_AXES = 0, 1, 2
 """Fixed to the world; fixed to the body; fixed to a body whose prescribed velocity is given in its own axes."""
 
 EVALUATE, LINEARISE, FACTOR, ELIMINATE, BACK_SUBSTITUTE, CHANGE, SOLVE_TRANSPOSED, PULL_BACK = range(8)
-"""Columns of `Contacts.calls`; derivatives of scenes need those from `CHANGE` on."""
+"""Columns of `Contacts.calls`; derivatives of scenes need `CHANGE` and the following."""
 
 CALLS = 8
 """Number of columns of `Contacts.calls`."""
@@ -59,7 +59,7 @@ class ModelFunctions(NamedTuple):
     back_substitute: Any
     """`(contact, z, r, dV, lin, out)`: solve `D out = r + df/dV dV`."""
     change: Any = None
-    """`(contact, z, z', lin, dz, dz', rows, friction, size)`: write the change `dz'` of z' and that of the wrench.
+    """`(contact, z, z', lin, dz, dz', rows, friction, size)`: write the changes of z' and of the wrench.
 
     `rows` are `Rows` that hold V, W, dV and take dW. The changes come from `dz`, `dV` and from relative changes of all
     coefficients of friction and of the size of the patch. None: the model takes no part in derivatives of scenes."""
@@ -70,10 +70,6 @@ class ModelFunctions(NamedTuple):
 
     From `l` of z' and the wrench's `rows.d_wrench` write `(df/dz)' l + (dW/dz)' d_wrench` to `out` and the same by V to
     `rows.d_twist`."""
-
-
-WORDS = ("pdddd", "pddd", "pdfdd", "pdfddd", "pddddd", "pddddddff", "pdddd", "pddddd")
-"""Arguments of `ModelFunctions` (see `calls.address_of`)."""
 
 
 def functions_of(name: str, templates: tuple, **model: Any) -> ModelFunctions:
@@ -87,12 +83,12 @@ def calls_of(functions: ModelFunctions, *, change: bool = False) -> np.ndarray:
     Those from `change` on are 0 unless asked for.
     """
     wanted = functions if change else functions[:CHANGE]
-    found = [address_of(each, words) if each else 0 for each, words in zip(wanted, WORDS, strict=False)]
-    return np.array(found + [0] * (CALLS - len(found)), np.int64)
+    addresses = [address_of(each) if each else 0 for each in wanted]
+    return np.array(addresses + [0] * (CALLS - len(addresses)), np.int64)
 
 
 @kernel
-def traction(law, z, rate, u):
+def traction(law: Any, z: Vector, rate: Vector, u: Vector) -> Vector:
     """Return `-(sigma_0 z + sigma_1 z' + sigma_2 u)` of a bristle of any dimension."""
     return plus(plus(times(-law.sigma_0, z), -law.sigma_1, rate), -law.sigma_2, u)
 
@@ -121,7 +117,7 @@ class Contacts(NamedTuple):
 
 
 @kernel
-def contact_map(mount, place, pose, a):
+def contact_map(mount: int, place: Doubles, pose: Doubles, a: Doubles) -> None:
     """Write `A`, with `V = A u`, into `a` [3, 3]."""
     dx, dy, c, s = place[0], place[1], place[2], place[3]
     if mount == WORLD:
@@ -136,7 +132,7 @@ def contact_map(mount, place, pose, a):
 
 
 @kernel
-def contact_map_slopes(mount, a, u, w, g, h):
+def contact_map_slopes(mount: int, a: Doubles, u: Doubles, w: Doubles, g: Doubles, h: Doubles) -> None:
     """Write `G = d(A u)/d pose` and `H = d(A' W)/d pose` into `g` and `h` [3, 3]."""
     for i in range(9):
         g[i], h[i] = 0.0, 0.0

@@ -388,7 +388,7 @@ def solve(patches, problem):
 @functools.cache
 def solve_address() -> int:
     """Return the address of `solve` in this process."""
-    return address_of(solve, "pp")
+    return address_of(solve)
 
 
 @jit

@@ -12,9 +12,9 @@ from collections.abc import Callable
 
 @functools.lru_cache(maxsize=256)
 def _definitions(source: str) -> dict[int, ast.FunctionDef]:
-    """Return the functions of a file by their first line, that of a decorator if there is one."""
-    found = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef))
-    return {min([node.lineno, *(each.lineno for each in node.decorator_list)]): node for node in found}
+    """Return the functions of a file by their first line, decorators included."""
+    nodes = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef))
+    return {min([node.lineno, *(each.lineno for each in node.decorator_list)]): node for node in nodes}
 
 
 def definition_of(function: Callable) -> ast.FunctionDef:

@@ -2,8 +2,8 @@
 
 A straight-line function is assignments and one return, of numbers (`+ - * /`), of vectors (`plus`, `times`, `dot`,
 `norm`, `v[i]`, `(x, y)`), of records that are read by name, and of calls of other such functions. `derive` writes two
-functions for it: `forth(...)` returns `(results, tape)`, and `back(tape, bars)` the cotangents of chosen arguments from
-those of the results. Both are written as text and compiled like any other kernel.
+functions for it: `forth(...)` returns `(results, tape)`, and `back(tape, bars)` the cotangents of chosen arguments
+from the cotangents of the results. Both are written as text and compiled like any other kernel.
 
 A function that is no straight line, one with a kink, or one whose derivative loses digits if it is written term by
 term, has a rule of its own: see `rules`.
@@ -44,7 +44,7 @@ class Step(NamedTuple):
 class Walk:
     """A function taken apart into steps that do one thing each, every variable assigned once."""
 
-    def __init__(self, function: Callable, by: Iterable[str], vectors: Iterable[str]):
+    def __init__(self, function: Callable, by: Iterable[str], vectors: Iterable[str]) -> None:
         self.function = getattr(function, "py_func", function)
         if not inspect.isfunction(self.function):
             raise NotStraightError(f"{self.function!r} has no source to write derivatives from: give it a `rule`")
@@ -110,10 +110,10 @@ class Walk:
             return
         names = target.elts if isinstance(target, ast.Tuple) else []
         if isinstance(value, ast.Tuple) and len(value.elts) == len(names):
-            found = [self._atom(each) for each in value.elts]
+            atoms = [self._atom(each) for each in value.elts]
         else:
-            found = self._several(value, len(names))
-        for name, each in zip(names, found, strict=True):
+            atoms = self._several(value, len(names))
+        for name, each in zip(names, atoms, strict=True):
             if not isinstance(name, ast.Name):
                 raise self._refusal(target, "is no name to assign to")
             self.known[name.id] = each
@@ -122,12 +122,12 @@ class Walk:
 
     def _several(self, node: ast.expr, count: int) -> list[str]:
         """Return the names of `count` values: results of a call, or components of a vector."""
-        found = self._call(node) if isinstance(node, ast.Call) else [self._atom(node)]
-        if len(found) == 1 and count > 1:
-            return [self._item(found[0], i) for i in range(count)]
-        if len(found) != count:
-            raise self._refusal(node, f"has {len(found)} results, not {count}")
-        return found
+        atoms = self._call(node) if isinstance(node, ast.Call) else [self._atom(node)]
+        if len(atoms) == 1 and count > 1:
+            return [self._item(atoms[0], i) for i in range(count)]
+        if len(atoms) != count:
+            raise self._refusal(node, f"has {len(atoms)} results, not {count}")
+        return atoms
 
     def _atom(self, node: ast.expr) -> str:
         """Return the name, or the constant, that holds an expression, after the steps that find it."""
@@ -163,7 +163,7 @@ class Walk:
             raise NotStraightError(f"{self.where} and a rule mean different things by {name}")
 
     def _condition(self, node: ast.expr) -> str:
-        """Return a comparison, or several joined: what chooses has no derivative."""
+        """Return a comparison, or several joined: choices have no derivative."""
         if isinstance(node, ast.Compare):
             text = self._atom(node.left)
             for operator, right in zip(node.ops, node.comparators, strict=True):
@@ -236,7 +236,7 @@ class Walk:
         return self._taken(targets, atoms, how)
 
     def keep_tape(self, step: Step, inner: Derivative) -> tuple[str, str]:
-        """Let the step of a derived function keep its tape; return the name of that and of its way back."""
+        """Let the step of a derived function keep its tape; return the names of the tape and of the way back."""
         tape = self._new("tape")
         name = f"{inner.function.__name__.strip('_')}_{self.count}"
         self.names[f"forth_{name}"], self.names[f"back_{name}"] = inner.forth, inner.back
@@ -255,12 +255,12 @@ class Walk:
     def _derived(self, function: Any, atoms: list[str]) -> Derivative:
         names = list(inspect.signature(getattr(function, "py_func", function)).parameters)
         pairs = list(zip(names, atoms, strict=True))
-        by = tuple(name + found[len(atom) :] for name, atom in pairs for found in sorted(self._inside(atom)))
+        by = tuple(name + path[len(atom) :] for name, atom in pairs for path in sorted(self._inside(atom)))
         vectors = tuple(
-            name + found[len(atom) :]
+            name + path[len(atom) :]
             for name, atom in pairs
-            for found in sorted(self.vectors)
-            if found == atom or found.startswith(atom + ".")
+            for path in sorted(self.vectors)
+            if path == atom or path.startswith(atom + ".")
         )
         return derive(function, by, vectors)
 
@@ -272,19 +272,19 @@ _COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: 
 class _WayBack:
     """Cotangents through the steps of a function, last step first, which add partial derivatives to its lines."""
 
-    def __init__(self, walk: Walk, live: tuple[int, ...]):
+    def __init__(self, walk: Walk, live: tuple[int, ...]) -> None:
         self.walk, self.lines, self.count = walk, [], 0
         self.bars: dict[str, str] = {}
         for i, result in enumerate(live):
             self._add(walk.results[result], f"bars[{i}]")
         for step in reversed(walk.steps):
-            found = [self.bars.pop(target, "") for target in step.targets]
-            if not any(found):
+            bars = [self.bars.pop(target, "") for target in step.targets]
+            if not any(bars):
                 continue
             if isinstance(step.rule, Rule):
-                self._by_rule(step, step.rule, found)
+                self._by_rule(step, step.rule, bars)
             else:
-                self._by_derivative(step, step.rule, found)
+                self._by_derivative(step, step.rule, bars)
 
     def emit(self, text: str, name: str = "bar") -> str:
         self.count += 1
@@ -305,18 +305,18 @@ class _WayBack:
         """Return the cotangent of a name, zero where the results do not depend on it."""
         return self.bars.get(name) or (f"zeros({name})" if name in self.walk.vectors else "0.0")
 
-    def _by_rule(self, step: Step, rule: Rule, found: list[str]) -> None:
+    def _by_rule(self, step: Step, rule: Rule, bars: list[str]) -> None:
         results = {"t": step.targets[0], **{f"t{r}": target for r, target in enumerate(step.targets)}}
         kept = {}
         for key, text in rule.slopes.items():
             r, i = key if isinstance(key, tuple) else (0, key)
             if isinstance(i, str):
                 kept[i] = self._kept(text.format(*step.atoms, **results))
-            elif step.atoms[i] in self.walk.active and found[r]:
-                self._add(step.atoms[i], self._product(found[r], text.format(*step.atoms, **results), step.atoms[i]))
+            elif step.atoms[i] in self.walk.active and bars[r]:
+                self._add(step.atoms[i], self._product(bars[r], text.format(*step.atoms, **results), step.atoms[i]))
         for i, text in rule.pulls.items():
             if step.atoms[i] in self.walk.active:
-                self._add(step.atoms[i], text.format(*step.atoms, **results, **kept, b=found[0]))
+                self._add(step.atoms[i], text.format(*step.atoms, **results, **kept, b=bars[0]))
 
     def _product(self, bar: str, slope: str, atom: str) -> str:
         if slope in ("1.0", "-1.0"):
@@ -328,10 +328,10 @@ class _WayBack:
         """Return the name that holds a partial derivative, found on the way forth."""
         return text if text.replace(".", "_").isidentifier() else self.walk.emit(text, "slope")
 
-    def _by_derivative(self, step: Step, inner: Derivative, found: list[str]) -> None:
-        inner = derive(inner.function, inner.by, inner.vectors, tuple(i for i, bar in enumerate(found) if bar))
+    def _by_derivative(self, step: Step, inner: Derivative, bars: list[str]) -> None:
+        inner = derive(inner.function, inner.by, inner.vectors, tuple(i for i, bar in enumerate(bars) if bar))
         tape, name = self.walk.keep_tape(step, inner)
-        pulled = self.emit(f"{name}({tape}, ({''.join(bar + ', ' for bar in found if bar)}))", "bars")
+        pulled = self.emit(f"{name}({tape}, ({''.join(bar + ', ' for bar in bars if bar)}))", "bars")
         for i, path in enumerate(inner.by):
             head, dot, rest = path.partition(".")
             self._add(step.atoms[inner.arguments.index(head)] + dot + rest, f"{pulled}[{i}]")
@@ -343,7 +343,7 @@ class Derivative(NamedTuple):
     function: Callable
     arguments: tuple[str, ...]
     by: tuple[str, ...]
-    """Arguments, or fields of them, whose cotangents `back` returns, in this order."""
+    """Arguments, or fields of arguments, whose cotangents `back` returns, in this order."""
     vectors: tuple[str, ...]
     results: str
     """Kind of each result."""
@@ -352,7 +352,7 @@ class Derivative(NamedTuple):
     forth: Any
     """Return the results and a tape, from the arguments of the function."""
     back: Any
-    """Return the cotangents of `by`, from the tape and a tuple of those of the results (that are `live`)."""
+    """Return the cotangents of `by`, from the tape and a tuple of the cotangents of the `live` results."""
 
 
 @functools.cache
@@ -361,7 +361,7 @@ def derive(
 ) -> Derivative:
     """Write the derivative of a straight-line function.
 
-    `by` are the arguments to differentiate by, a field of a record as `law.mu_c`; `vectors` those that are vectors,
+    `by` are the arguments to differentiate by, a field of a record as `law.mu_c`; `vectors` the names of vectors,
     `live` the results that have a cotangent, unless all do.
     Raises `NotStraightError` with the line that cannot be taken apart. The text depends on nothing but the sources.
     """

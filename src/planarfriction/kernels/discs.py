@@ -6,7 +6,7 @@ along `W(u)`, and with the mean speed S (see `formulas.disc_friction`)
 
     z_ss = g(S)/sigma_0 W/S,     z_t' = u_t - (k/c_t) z_t,     z_s' = u_s - (k/c_s) z_s,
 
-where k is that of a single bristle with the deflection `|z|/|z_ss|` and the cosine of z and W (docs/physics.md,
+where k is the decay of a single bristle with the deflection `|z|/|z_ss|` and the cosine of z and W (docs/physics.md,
 "Discs"). A disc without a radius is the bristle of a point. Functions are straight lines: derivatives and loops are
 written from them.
 """
@@ -18,21 +18,22 @@ import math
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
+from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.bristle_step import capped, seen
 from planarfriction.kernels.contacts import traction
 from planarfriction.kernels.law import grip
 from planarfriction.kernels.rules import ratio
-from planarfriction.kernels.vectors import norm
+from planarfriction.kernels.vectors import Vector, norm
 
 KAPPA = math.sqrt(0.5)
 """Radius of gyration of a disc, over its radius."""
 
 STILL = 1e-100
-"""Speed [m/s] up to which the ratio of two speeds counts as that at rest: its slopes leave the range of numbers."""
+"""Speed [m/s] up to which the ratio of two speeds has its value at rest: the slopes leave the range of numbers."""
 
 
 @kernel
-def sliding(u):
+def sliding(u: Vector) -> tuple[float, float, float, Vector]:
     """Return `c_t`, `c_s`, the mean speed S, and W."""
     slide, spin = u[0] * u[0] + u[1] * u[1], 2.0 * u[2] * u[2]
     c_t, c_s, m = formulas.disc_friction(xp, slide, spin)
@@ -40,14 +41,14 @@ def sliding(u):
 
 
 @kernel
-def mean_speed(u):
+def mean_speed(u: Vector) -> float:
     """Return S."""
     _, _, speed, _ = sliding(u)
     return speed
 
 
 @kernel
-def _per_h(speed, pull):
+def _per_h(speed: float, pull: Vector) -> float:
     """Return `S/|W|`; 1 at rest, which is about its value near it."""
     size = norm(pull)
     moves = size > STILL
@@ -55,7 +56,7 @@ def _per_h(speed, pull):
 
 
 @kernel
-def _seen(z, pull, per_h, q):
+def _seen(z: Vector, pull: Vector, per_h: float, q: float) -> Vector:
     """Return the deflection of a bristle, the speed at which it is being stretched, and the share of spin in it."""
     size = norm(z)
     deflection, along = seen(z, size, pull, per_h, q)
@@ -64,21 +65,21 @@ def _seen(z, pull, per_h, q):
 
 
 @kernel
-def _decay(law, deflection, along, spin_share, speed, q):
+def _decay(law: LawNumbers, deflection: float, along: float, spin_share: float, speed: float, q: float) -> float:
     """Return k."""
     slipping = formulas.disc_deflection(xp, deflection, spin_share, law.breakaway_ratio)
     return formulas.bristle_decay(xp, slipping, along, speed, q, law)
 
 
 @kernel
-def _rate(u, z, k, c_t, c_s, per):
+def _rate(u: Vector, z: Vector, k: float, c_t: float, c_s: float, per: float) -> Vector:
     """Return z'; `per` is `1/(c_t c_s)`."""
     k = k * per
     return u[0] - k * c_s * z[0], u[1] - k * c_s * z[1], u[2] - k * c_t * z[2]
 
 
 @kernel
-def evaluate(law, z, u):
+def evaluate(law: LawNumbers, z: Vector, u: Vector) -> tuple[Vector, Vector]:
     """Return z' and the traction of a disc that moves at u."""
     c_t, c_s, speed, pull = sliding(u)
     q = grip(law, speed)
@@ -88,7 +89,7 @@ def evaluate(law, z, u):
 
 
 @kernel
-def _ahead(z, u, k_dt, c_t, c_s, dt):
+def _ahead(z: Vector, u: Vector, k_dt: float, c_t: float, c_s: float, dt: float) -> Vector:
     """Return the bristle at the predicted end of a step, each component at its own rate."""
     t, s = c_t + k_dt, c_s + k_dt
     per = 1.0 / (t * s)
@@ -97,7 +98,7 @@ def _ahead(z, u, k_dt, c_t, c_s, dt):
 
 
 @kernel
-def _relaxed(z, u, k_dt, c_t, c_s, dt):
+def _relaxed(z: Vector, u: Vector, k_dt: float, c_t: float, c_s: float, dt: float) -> Vector:
     """Return the bristle at the end of a step, `k_dt` being the mean of k dt over `c_t c_s`."""
     left_t, mean_t = formulas.relaxation(xp, k_dt * c_s)
     left_s, mean_s = formulas.relaxation(xp, k_dt * c_t)
@@ -106,7 +107,7 @@ def _relaxed(z, u, k_dt, c_t, c_s, dt):
 
 
 @kernel
-def step(law, z, u, dt):
+def step(law: LawNumbers, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
     """Return the bristle after dt and its traction, by the equations of `bristle_step`."""
     c_t, c_s, speed, pull = sliding(u)
     q, per_h, per = grip(law, speed), _per_h(speed, pull), 1.0 / (c_t * c_s)

@@ -1,12 +1,12 @@
 """Patches of a step in contact space whose pressure follows the moments of their loads (the rule: `kernels.tilt`).
 
-The pressure is that of the load and the moments at the guess of the wrenches, and held while the step is solved: a host
-that steps on gives the next step the moments that came out.
+The pressure follows from the load and the moments at the guess of the wrenches, and stays while the step is solved: a
+host that steps on gives the next step the moments that came out.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
@@ -28,7 +28,7 @@ class Followers(NamedTuple):
 
 
 @kernel
-def _borne(x, y, w, n, support, out):
+def _borne(x: Doubles, y: Doubles, w: Doubles, n: int, support: Doubles, out: Doubles) -> None:
     """Write the weights that lie on the rectangle of the support, with their total unchanged; all if none does."""
     for i in range(n):
         out[i] = w[i]
@@ -48,11 +48,11 @@ def _borne(x, y, w, n, support, out):
 
 
 @kernel
-def _press(own, p, problem, k, n, first):
+def _press(patches: Any, p: Any, problem: int, k: int, n: int, first: int) -> None:
     """Write the weights of the n points of patch k, which begin at `first`, or how far it moves as a whole."""
-    x, y = at(own.followers.x, first), at(own.followers.y, first)
+    x, y = at(patches.followers.x, first), at(patches.followers.y, first)
     cx, cy = centre(p.moments[2 * k], p.moments[2 * k + 1], p.free_load[k])
-    words, out = own.followers.words[k], at(p.weights, first)
+    words, out = patches.followers.words[k], at(p.weights, first)
     if words == 0:
         p.moved[2 * k], p.moved[2 * k + 1] = cx - x[0], cy - y[0]
     elif p.records[k] != 0:
@@ -60,30 +60,30 @@ def _press(own, p, problem, k, n, first):
         _borne(x, y, doubles(record[words - 1]), n, at(p.support, 7 * k), out)
         tilt(x, y, out, n, cx, cy, out)
         for j in range(k):
-            copied += own.followers.words[j]
+            copied += patches.followers.words[j]
         target = at(p.copies, copied)
         for i in range(words - 1):
             target[i] = record[i]
-        target[words - 1] = at(problem, own.row.weights + first)
-        p.acting[k] = at(problem, own.row.copies + copied)
+        target[words - 1] = at(problem, patches.row.weights + first)
+        p.acting[k] = at(problem, patches.row.copies + copied)
 
 
 @kernel
-def hold(own, p):
+def hold(patches: Any, p: Any) -> None:
     """Keep the pressures of the last solution in further ones of the same step."""
-    for k in range(own.count):
+    for k in range(patches.count):
         p.follows[k] = -abs(p.follows[k])
 
 
 @kernel
-def follow(own, p, problem):
+def follow(patches: Any, p: Any, problem: int) -> None:
     """Write the records that act in the problem, whose address is `problem`, and how far patches move."""
-    for k in range(own.count):
+    for k in range(patches.count):
         if p.follows[k] < 0.0:
             continue
         p.acting[k] = p.records[k]
         p.moved[2 * k], p.moved[2 * k + 1] = 0.0, 0.0
-        first = own.followers.firsts[k]
-        n = own.followers.firsts[k + 1] - first
+        first = patches.followers.firsts[k]
+        n = patches.followers.firsts[k + 1] - first
         if p.follows[k] > 0.0 and p.free_load[k] > 0.0 and n > 0:
-            _press(own, p, problem, k, n, first)
+            _press(patches, p, problem, k, n, first)

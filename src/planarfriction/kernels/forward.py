@@ -1,6 +1,6 @@
 """Changes of straight-line functions along a direction, forward mode from source to source (see `derive`).
 
-`forward` writes a straight-line function again, so that `derive` can differentiate what calls it.
+`forward` writes a straight-line function again, so that `derive` can differentiate its callers.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class Directions(NamedTuple):
 
     pushed: Any
     """Takes the arguments, then the changes of each direction; returns the results, then their changes likewise."""
-    moved: tuple[tuple[bool, ...], ...]
+    changing: tuple[tuple[bool, ...], ...]
     """For each direction, True for the results that change along it."""
 
 
@@ -34,28 +34,30 @@ def forward(function: Callable, by: tuple[str, ...], vectors: tuple[str, ...] = 
 
 @functools.cache
 def forwards(function: Callable, directions: tuple[tuple[str, ...], ...], vectors: tuple[str, ...] = ()) -> Directions:
-    """Write the same along several `directions`, each the arguments that change; what they share is computed once."""
+    """Write a function with its changes along several `directions`, each the names of arguments that change.
+
+    Common operations are computed once."""
     walk = Walk(function, dict.fromkeys(name for by in directions for name in by), vectors)
     changes = _Changes(walk, directions)
-    given = [own[walk.outer(name)] for own, by in zip(changes.of, directions, strict=True) for name in by]
-    heads = [*(walk.first[name] for name in walk.arguments), *given]
-    results = [changes.of_one(own, name) for own in changes.of for name in walk.results]
+    inputs = [direction[walk.outer(name)] for direction, by in zip(changes.of, directions, strict=True) for name in by]
+    heads = [*(walk.first[name] for name in walk.arguments), *inputs]
+    results = [changes.of_one(direction, name) for direction in changes.of for name in walk.results]
     lines = [*changes.lines, f"return ({''.join(f'{name}, ' for name in [*walk.results, *results])})"]
     source = text_of(f"pushed({', '.join(heads)})", lines)
-    moved = tuple(tuple(name in own for name in walk.results) for own in changes.of)
-    return Directions(kernel(run_source(walk.where, source, walk.names)["pushed"]), moved)
+    changing = tuple(tuple(name in direction for name in walk.results) for direction in changes.of)
+    return Directions(kernel(run_source(walk.where, source, walk.names)["pushed"]), changing)
 
 
 class _Changes:
-    """Lines of a function, each followed by the changes of what it finds."""
+    """Lines of a function, each followed by the changes of its results."""
 
-    def __init__(self, walk: Walk, directions: tuple[tuple[str, ...], ...]):
+    def __init__(self, walk: Walk, directions: tuple[tuple[str, ...], ...]) -> None:
         self.walk, self.lines, self.count = walk, [], 0
         self.of = [
             {walk.outer(name): f"change_{name.replace('.', '_')}_of_{i}" for name in by}
             for i, by in enumerate(directions)
         ]
-        """Names of the changes by those of what changes, for each direction."""
+        """Name of the change of each name, for each direction."""
         at = {step.line: step for step in walk.steps}
         for i, line in enumerate(walk.lines):
             step = at.get(i)
@@ -64,12 +66,12 @@ class _Changes:
                 continue
             self.lines.append(line)
             if step is not None:
-                for own in self.of:
-                    self._by_rule(step, step.rule, own)
+                for direction in self.of:
+                    self._by_rule(step, step.rule, direction)
 
-    def of_one(self, own: dict[str, str], name: str) -> str:
+    def of_one(self, direction: dict[str, str], name: str) -> str:
         """Return the change of a name along one direction."""
-        return own.get(name) or (f"times(0.0, {name})" if name in self.walk.vectors else "0.0")
+        return direction.get(name) or (f"times(0.0, {name})" if name in self.walk.vectors else "0.0")
 
     def _emit(self, text: str) -> str:
         self.count += 1
@@ -77,11 +79,11 @@ class _Changes:
         self.lines.append(f"{name} = {text}")
         return name
 
-    def _by_rule(self, step: Step, rule: Rule, own: dict[str, str]) -> None:
+    def _by_rule(self, step: Step, rule: Rule, direction: dict[str, str]) -> None:
         results = {"t": step.targets[0], **{f"t{r}": target for r, target in enumerate(step.targets)}}
         terms: dict[str, list[str]] = {target: [] for target in step.targets}
         for i, atom in enumerate(step.atoms):
-            if (d := own.get(atom)) is None:
+            if (d := direction.get(atom)) is None:
                 continue
             if i in rule.pushes:
                 terms[step.targets[0]].append(rule.pushes[i].format(*step.atoms, **results, d=d))
@@ -93,26 +95,28 @@ class _Changes:
             if texts:
                 vector = target in self.walk.vectors
                 added = functools.reduce(lambda a, b: f"plus({a}, 1.0, {b})", texts) if vector else " + ".join(texts)
-                own[target] = self._emit(added)
+                direction[target] = self._emit(added)
 
     def _by_function(self, step: Step, inner: Derivative) -> None:
         places = {path: _place(step, inner, path) for path in inner.by}
-        given = [{path: own[place] for path, place in places.items() if place in own} for own in self.of]
-        found = forwards(inner.function, tuple(tuple(each) for each in given), inner.vectors)
+        inputs = [
+            {path: direction[place] for path, place in places.items() if place in direction} for direction in self.of
+        ]
+        written = forwards(inner.function, tuple(tuple(each) for each in inputs), inner.vectors)
         name = f"pushed_{inner.function.__name__.strip('_')}_{step.line}"
-        self.walk.names[name] = found.pushed
+        self.walk.names[name] = written.pushed
         targets = list(step.targets)
-        for own, moved in zip(self.of, found.moved, strict=True):
-            for target, moves in zip(step.targets, moved, strict=True):
+        for direction, changing in zip(self.of, written.changing, strict=True):
+            for target, moves in zip(step.targets, changing, strict=True):
                 self.count += 1
                 targets.append(f"change_{self.count}")
                 if moves:
-                    own[target] = targets[-1]
-        changes = [change for each in given for change in each.values()]
+                    direction[target] = targets[-1]
+        changes = [change for each in inputs for change in each.values()]
         self.lines.append(f"{', '.join(targets)} = {name}({', '.join([*step.atoms, *changes])})")
 
 
 def _place(step: Step, inner: Derivative, path: str) -> str:
-    """Return the name of what a step gives to an inner function as an argument, or a field of one."""
+    """Return the name of an argument, or of a field of one, that a step gives to an inner function."""
     head, dot, rest = path.partition(".")
     return step.atoms[inner.arguments.index(head)] + dot + rest

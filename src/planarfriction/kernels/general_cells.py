@@ -2,8 +2,8 @@
 
 A bristle has d components, two of a point or three of a disc; the state of the contact is `z [d, n]`. With `u = B V`
 of a cell (see `cells.Lever`) and the derivatives `A = df/dz`, `F = df/du`, `C = dt/dz`, `E = dt/du`, each [d, d],
-`D = shift I - A` is inverted cell by cell; `W = sum w B' t`. The functions are those of `contacts.ModelFunctions` and
-`steps.StepFunctions`.
+`D = shift I - A` is inverted cell by cell; `W = sum w B' t`. The functions are described at
+`contacts.ModelFunctions` and `steps.StepFunctions`.
 """
 
 from __future__ import annotations
@@ -11,11 +11,13 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import arrays_at, at
+from planarfriction.compiler.memory import Doubles, Place, arrays_at, at
+from planarfriction.kernels.cells import Lever
 from planarfriction.kernels.contacts import ROWS, traction
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.steps import SLOPES
 from planarfriction.kernels.vectors import (
+    Vector,
     matrix_applied,
     matrix_applied_back,
     matrix_product,
@@ -32,7 +34,7 @@ MATRICES = 5
 """Matrices [d, d] of a cell in a linearisation: A, F, the inverse of D, C and E; number by number, [5 d d, n]."""
 
 LINEAR = 3
-"""Matrices of a cell whose bristle is `Bristle.linear`: the first of these."""
+"""Matrices of a cell whose bristle is `Bristle.linear`: A, F and the inverse."""
 
 A, F, INVERSE, C, E = range(MATRICES)
 
@@ -50,7 +52,7 @@ class CellSlopes(NamedTuple):
 
 
 class Bristle(NamedTuple):
-    """Compiled functions of a bristle of d components; `law` is what `Lever.law` returns."""
+    """Compiled functions of a bristle of d components; `law` comes from `Lever.law`."""
 
     evaluate: Any
     """`(law, z, u)`: return z' and the traction."""
@@ -88,7 +90,7 @@ def slopes_of(function: Any, size: int) -> Any:
     forth, rows_of = written.forth, (_two_rows if size == 2 else _three_rows)(written.back)
 
     @kernel
-    def slopes(*arguments):
+    def slopes(*arguments: Any) -> CellSlopes:
         results, tape = forth(*arguments)
         return CellSlopes(results[0], results[1], *rows_of(tape))
 
@@ -97,7 +99,7 @@ def slopes_of(function: Any, size: int) -> Any:
 
 def _two_rows(back: Any) -> Any:
     @kernel
-    def rows(tape):
+    def rows(tape: tuple) -> tuple[Vector, Vector, Vector, Vector]:
         none, x, y = (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)
         (new_zx, new_ux), (new_zy, new_uy) = back(tape, (x, none)), back(tape, (y, none))
         (zx, ux), (zy, uy) = back(tape, (none, x)), back(tape, (none, y))
@@ -108,7 +110,7 @@ def _two_rows(back: Any) -> Any:
 
 def _three_rows(back: Any) -> Any:
     @kernel
-    def rows(tape):
+    def rows(tape: tuple) -> tuple[Vector, Vector, Vector, Vector]:
         none, x, y, s = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
         (new_zx, new_ux), (new_zy, new_uy), (new_zs, new_us) = (
             back(tape, (x, none)),
@@ -122,14 +124,14 @@ def _three_rows(back: Any) -> Any:
 
 
 @kernel
-def _inverse_2(shift, m):
+def _inverse_2(shift: float, m: Vector) -> Vector:
     a, b, c, d = shift - m[0], -m[1], -m[2], shift - m[3]
     per = 1.0 / (a * d - b * c)
     return per * d, -per * b, -per * c, per * a
 
 
 @kernel
-def _inverse_3(shift, m):
+def _inverse_3(shift: float, m: Vector) -> Vector:
     a, b, c, d, e, f, g, h, i = shift - m[0], -m[1], -m[2], -m[3], shift - m[4], -m[5], -m[6], -m[7], shift - m[8]
     r, p, w = e * i - f * h, f * g - d * i, d * h - e * g
     cofactors = r, c * h - b * i, b * f - c * e, p, a * i - c * g, c * d - a * f, w, b * g - a * h, a * e - b * d
@@ -137,12 +139,12 @@ def _inverse_3(shift, m):
 
 
 @kernel
-def _add_diagonal_2(a, x):
+def _add_diagonal_2(a: Vector, x: float) -> Vector:
     return a[0] + x, a[1], a[2], a[3] + x
 
 
 @kernel
-def _add_diagonal_3(a, x):
+def _add_diagonal_3(a: Vector, x: float) -> Vector:
     return a[0] + x, a[1], a[2], a[3], a[4] + x, a[5], a[6], a[7], a[8] + x
 
 
@@ -150,37 +152,44 @@ _ALGEBRA = {2: (_add_diagonal_2, _inverse_2), 3: (_add_diagonal_3, _inverse_3)}
 
 
 @kernel
-def _matrix(bristle, lin, which, i, n):
+def _matrix(bristle: Bristle, lin: Doubles, which: int, i: int, n: int) -> Vector:
     """Return a matrix of cell i."""
     return bristle.matrix(lin, which * bristle.size * bristle.size * n + i, n)
 
 
-def evaluate(contact, z, v, zdot, w, *, lever, bristle, read):
+def evaluate(
+    contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, *, lever: Lever, bristle: Bristle, read: Any
+) -> None:
     """Write `z'`, and `W`."""
     record, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
     n = record.count
     for i in range(n):
         cell = lever.of(record, i)
-        rate, t = bristle.evaluate(lever.law(record, i), bristle.vector(z, i, n), lever.seen(cell, twist))
+        rate, t = bristle.evaluate(lever.law(record, i, v), bristle.vector(z, i, n), lever.seen(cell, twist))
         scatter(zdot, i, n, rate)
         total = plus(total, record.weights[i], lever.wrench(cell, t))
     put(w, total)
 
 
-def linearise(contact, z, v, lin, *, lever, bristle, read):
+def linearise(
+    contact: Place, z: Doubles, v: Doubles, lin: Doubles, *, lever: Lever, bristle: Bristle, read: Any
+) -> None:
     """Write A, F, C and E of each cell."""
     record, twist = read(contact), three(v)
     n = record.count
     for i in range(n):
         u = lever.seen(lever.of(record, i), twist)
-        linear = bristle.linearise(lever.law(record, i), bristle.vector(z, i, n), u)
+        linear = bristle.linearise(lever.law(record, i, v), bristle.vector(z, i, n), u)
         scatter(lin, i, n, (linear.new_z, linear.new_u))
         if not bristle.linear:
             place = C * bristle.size * bristle.size * n + i
             scatter(lin, place, n, (linear.traction_z, linear.traction_u))
 
 
-def factor(contact, z, shift, lin, stiffness, *, lever, bristle, read):
+def factor(
+    contact: Place, z: Doubles, shift: float, lin: Doubles, stiffness: Doubles, *, lever: Lever, bristle: Bristle,
+    read: Any,
+) -> None:  # fmt: skip
     """Invert D, write `sum w B' (C D^-1 F + E) B`."""
     record, total = read(contact), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     n = record.count
@@ -197,7 +206,10 @@ def factor(contact, z, shift, lin, stiffness, *, lever, bristle, read):
     put_all(stiffness, total)
 
 
-def eliminate(contact, z, shift, r, lin, w, *, lever, bristle, read):
+def eliminate(
+    contact: Place, z: Doubles, shift: float, r: Doubles, lin: Doubles, w: Doubles, *, lever: Lever, bristle: Bristle,
+    read: Any,
+) -> None:  # fmt: skip
     """Write `sum w B' C D^-1 r`."""
     record, total = read(contact), (0.0, 0.0, 0.0)
     n = record.count
@@ -212,7 +224,10 @@ def eliminate(contact, z, shift, r, lin, w, *, lever, bristle, read):
     put(w, total)
 
 
-def back_substitute(contact, z, r, dv, lin, out, *, lever, bristle, read):
+def back_substitute(
+    contact: Place, z: Doubles, r: Doubles, dv: Doubles, lin: Doubles, out: Doubles, *, lever: Lever,
+    bristle: Bristle, read: Any,
+) -> None:  # fmt: skip
     """Solve `D out = r + F B dV`."""
     record, twist = read(contact), three(dv)
     n = record.count
@@ -222,33 +237,42 @@ def back_substitute(contact, z, r, dv, lin, out, *, lever, bristle, read):
         scatter(out, i, n, matrix_applied(_matrix(bristle, lin, INVERSE, i, n), driven))
 
 
-def change(contact, z, zdot, lin, dz, dzdot, rows, friction, size, *, lever, bristle, read):
-    """Write the changes of `z'` and of the wrench; bristles grow with friction, and with them what they tend to."""
+def change(
+    contact: Place, z: Doubles, zdot: Doubles, lin: Doubles, dz: Doubles, dzdot: Doubles, rows: Doubles,
+    friction: float, size: float, *, lever: Lever, bristle: Bristle, read: Any,
+) -> None:  # fmt: skip
+    """Write the changes of `z'` and of the wrench; bristles and their limits grow with friction."""
     record, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
     n, twist = record.count, (rows.d_twist[0], rows.d_twist[1], rows.d_twist[2] + size * rows.twist[2])
     for i in range(n):
-        cell, b = lever.of(record, i), bristle.vector(z, i, n)
-        u, a = lever.seen(cell, twist), plus(bristle.vector(dz, i, n), -friction, b)
-        rate = matrix_applied(_matrix(bristle, lin, A, i, n), a)
-        rate = plus(rate, 1.0, matrix_applied(_matrix(bristle, lin, F, i, n), u))
+        cell, grown, dz_i = lever.of(record, i), times(friction, bristle.vector(z, i, n)), bristle.vector(dz, i, n)
+        u, a, by_z = lever.seen(cell, twist), plus(dz_i, -1.0, grown), _matrix(bristle, lin, A, i, n)
+        rate = plus(matrix_applied(by_z, a), 1.0, matrix_applied(_matrix(bristle, lin, F, i, n), u))
         scatter(dzdot, i, n, rate)
         if bristle.linear:
-            t = traction(record.law, a, rate, u)
-        else:
-            t = matrix_applied(_matrix(bristle, lin, C, i, n), a)
+            t = plus(traction(record.law, a, rate, u), -record.law.sigma_0, grown)
+        else:  # the traction sees the bristle as it is, and only its rate as that of a smaller one
+            t = plus(
+                matrix_applied(_matrix(bristle, lin, C, i, n), dz_i), record.law.sigma_1, matrix_applied(by_z, grown)
+            )
             t = plus(t, 1.0, matrix_applied(_matrix(bristle, lin, E, i, n), u))
-        total = plus(total, record.weights[i], lever.wrench(cell, plus(t, -friction * record.law.sigma_0, b)))
+        total = plus(total, record.weights[i], lever.wrench(cell, t))
     put(rows.d_wrench, plus(total, size * rows.wrench[2], (0.0, 0.0, 1.0)))
 
 
-def solve_transposed(contact, z, r, lin, out, *, bristle, read):
+def solve_transposed(
+    contact: Place, z: Doubles, r: Doubles, lin: Doubles, out: Doubles, *, bristle: Bristle, read: Any
+) -> None:
     """Solve `D' out = r`."""
     n = read(contact).count
     for i in range(n):
         scatter(out, i, n, matrix_applied_back(_matrix(bristle, lin, INVERSE, i, n), bristle.vector(r, i, n)))
 
 
-def pull_back(contact, z, lin, dzdot, rows, out, *, lever, bristle, read):
+def pull_back(
+    contact: Place, z: Doubles, lin: Doubles, dzdot: Doubles, rows: Doubles, out: Doubles, *, lever: Lever,
+    bristle: Bristle, read: Any,
+) -> None:  # fmt: skip
     """Write the transpose of `change`."""
     record, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
     n, wrench = record.count, three(rows.d_wrench)
@@ -267,20 +291,25 @@ def pull_back(contact, z, lin, dzdot, rows, out, *, lever, bristle, read):
     put(rows.d_twist, total)
 
 
-def step(contact, z, v, dt, new, out, *, lever, bristle, read):
+def step(
+    contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, lever: Lever, bristle: Bristle,
+    read: Any,
+) -> None:  # fmt: skip
     """Advance the bristles by `dt` at a held twist, and write the wrench at the end."""
     record, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
     n = record.count
     for i in range(n):
         cell = lever.of(record, i)
-        end, t = bristle.step(lever.law(record, i), bristle.vector(z, i, n), lever.seen(cell, twist), dt)
+        end, t = bristle.step(lever.law(record, i, v), bristle.vector(z, i, n), lever.seen(cell, twist), dt)
         scatter(new, i, n, end)
         total = plus(total, record.weights[i], lever.wrench(cell, t))
     put(out, total)
 
 
 @kernel
-def _put_cell(lever, bristle, cell, weight, linear, i, n, out):
+def _put_cell(
+    lever: Lever, bristle: Bristle, cell: Vector, weight: float, linear: CellSlopes, i: int, n: int, out: Doubles
+) -> None:
     """Write the derivatives of cell i to its places in d new/dV [d, n, 3], dW/dz [3, d, n] and d new/dz [d, d, n]."""
     d = bristle.size
     for j in range(3):
@@ -291,13 +320,16 @@ def _put_cell(lever, bristle, cell, weight, linear, i, n, out):
     scatter(out, 6 * d * n + i, n, linear.new_z)
 
 
-def slopes(contact, z, v, dt, new, out, *, lever, bristle, read, whole):
+def slopes(
+    contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, lever: Lever, bristle: Bristle,
+    read: Any, whole: bool,
+) -> None:  # fmt: skip
     """Step with the slopes of the wrench, or with all derivatives."""
     record, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
     n, by_twist = record.count, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for i in range(n):
         cell = lever.of(record, i)
-        linear = bristle.linearise_step(lever.law(record, i), bristle.vector(z, i, n), lever.seen(cell, twist), dt)
+        linear = bristle.linearise_step(lever.law(record, i, v), bristle.vector(z, i, n), lever.seen(cell, twist), dt)
         scatter(new, i, n, linear.new)
         total = plus(total, record.weights[i], lever.wrench(cell, linear.traction))
         by_twist = plus(by_twist, record.weights[i], lever.around(cell, linear.traction_u))

@@ -46,7 +46,7 @@ class Output(NamedTuple):
     bristles: Doubles
     """[M, number of bristle states], or [0, 0] when they are not wanted."""
     pressure: Doubles = np.empty((0, 2))
-    """Last two of these, [M, 2], where they are the place of a pressure that follows its load; else [0, 2]."""
+    """Last two bristle states, [M, 2], if they are the place of a pressure that follows its load; else [0, 2]."""
 
 
 class Progress(NamedTuple):
@@ -92,7 +92,7 @@ class Stages(NamedTuple):
 
 
 @entry
-def combine(coefficients, stages, count, n, base, out):
+def combine(coefficients: Doubles, stages: Doubles, count: int, n: int, base: Doubles, out: Doubles) -> None:
     """Write `out = base + sum coefficients_j stages_j` over the first `count` stages [count, n], two at a time."""
     if count % 2 == 1:
         a = coefficients[0]

@@ -16,7 +16,7 @@ law_of = reader(LawNumbers)
 
 
 @kernel
-def squared(law):
+def squared(law: LawNumbers) -> LawNumbers:
     """Return a law with the exponent 2 as a constant: the compiler then drops the general power from a loop."""
     return LawNumbers(
         law.sigma_0, law.sigma_1, law.sigma_2, law.mu_c, law.mu_s, law.v_s, 2.0,
@@ -25,6 +25,6 @@ def squared(law):
 
 
 @kernel
-def grip(law, speed):
+def grip(law: LawNumbers, speed: float) -> float:
     """Return `sigma_0/g(v)` [1/m]: one over the steady deflection of a bristle."""
     return law.sigma_0 / formulas.stribeck(xp, speed, law)

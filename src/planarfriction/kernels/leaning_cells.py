@@ -1,7 +1,8 @@
 """Cells whose friction forwards and backwards is not the same: bristles that decay towards `c = a g(|u|)/sigma_0`.
 
-A twist that is held holds c, so `z - c` moves as the bristle of a cell without c does, and the traction is that of one
-less `sigma_0 c` (docs/anisotropy.md, "Asymmetric friction"). The speed of a disc is its mean; spin does not lean.
+At a constant twist c is constant, so `z - c` moves as the bristle of a cell without asymmetry, whose traction less
+`sigma_0 c` is the traction (docs/anisotropy.md, "Asymmetric friction"). The speed of a disc is its mean; spin does not
+lean.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.compiler.memory import at
+from planarfriction.compiler.memory import Doubles, Place, at
 from planarfriction.kernels.vectors import plus, put, three, times
 
 
@@ -18,7 +18,7 @@ class Contact(NamedTuple):
     surface: tuple
     """Kind, offset and size of the limit surface: three integers."""
     data: np.ndarray
-    """Their numbers, flat."""
+    """Numbers of the limit surfaces, flat."""
 
 
 class Cotangents(NamedTuple):
@@ -34,15 +34,15 @@ class StepModel(NamedTuple):
     """Functions of a model of three states, for a contact c, a twist V, a state z and a step dt."""
 
     shape_of: Any
-    """`(row)`: return the shape, from the numbers behind those of the law."""
+    """`(row)`: return the shape, from the numbers behind the law."""
     hold: Any
-    """`(c, V)`: return what a step holds that does not depend on z."""
+    """`(c, V)`: return the numbers of a step that do not depend on z."""
     hold_slopes: Any
-    """`(c, V, work)`: return that, and its slopes; `work` [9] is scratch."""
+    """`(c, V, work)`: return these numbers, and slopes of the sliding; `work` [9] is scratch."""
     taped_step: Any
-    """`(c, held, z, dt)`: return the step, with `new` state and `wrench` per unit load."""
+    """`(c, drive, z, dt)`: return the step, with `new` state and `wrench` per unit load."""
     pull_back: Any
-    """`(c, step, slopes, new, wrench)`: return `Cotangents` from those of the new state and of the wrench."""
+    """`(c, step, slopes, new, wrench)`: return `Cotangents` from the cotangents of the new state and of the wrench."""
 
 
 class Framed(NamedTuple):
@@ -51,35 +51,41 @@ class Framed(NamedTuple):
     read: Any
     """`(contact)`: return the record, and the `Contact` that steps."""
     seen: Any
-    """`(own, V)`: return `T V`."""
+    """`(record, V)`: return `T V`."""
     wrench: Any
-    """`(own, W)`: return `T' W`."""
+    """`(record, W)`: return `T' W`."""
     spins: Any
-    """`(own)`: return 1; 0 of a point, whose third state has no effect and keeps its value."""
+    """`(record)`: return 1; 0 of a point, whose third state has no effect and keeps its value."""
 
 
-def step(contact, z, v, dt, new, out, *, frame, hold, taped_step):
+def step(
+    contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, frame: Framed, hold: Any,
+    taped_step: Any,
+) -> None:  # fmt: skip
     """Step a contact (see `steps.StepFunctions`)."""
-    (own, framed), z = frame.read(contact), three(z)
-    spins = frame.spins(own)
-    done = taped_step(framed, hold(framed, frame.seen(own, three(v))), (z[0], z[1], spins * z[2]), dt)
+    (record, framed), z = frame.read(contact), three(z)
+    spins = frame.spins(record)
+    done = taped_step(framed, hold(framed, frame.seen(record, three(v))), (z[0], z[1], spins * z[2]), dt)
     put(new, (done.new[0], done.new[1], spins * done.new[2] + (1.0 - spins) * z[2]))
-    put(out, frame.wrench(own, done.wrench))
+    put(out, frame.wrench(record, done.wrench))
 
 
-def slopes(contact, z, v, dt, new, out, *, frame, hold_slopes, taped_step, pull_back, whole):
+def slopes(
+    contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, frame: Framed, hold_slopes: Any,
+    taped_step: Any, pull_back: Any, whole: bool,
+) -> None:  # fmt: skip
     """Step a contact with the slopes of the wrench, or with all derivatives, the rows of the wrench first."""
-    (own, framed), z = frame.read(contact), three(z)
-    spins = frame.spins(own)
-    held, known = hold_slopes(framed, frame.seen(own, three(v)), out)
-    done = taped_step(framed, held, (z[0], z[1], spins * z[2]), dt)
+    (record, framed), z = frame.read(contact), three(z)
+    spins = frame.spins(record)
+    drive, known = hold_slopes(framed, frame.seen(record, three(v)), out)
+    done = taped_step(framed, drive, (z[0], z[1], spins * z[2]), dt)
     put(new, (done.new[0], done.new[1], spins * done.new[2] + (1.0 - spins) * z[2]))
-    put(out, frame.wrench(own, done.wrench))
+    put(out, frame.wrench(record, done.wrench))
     for i in range(6 if whole else 3):
         unit = (1.0 if i % 3 == 0 else 0.0), (1.0 if i % 3 == 1 else 0.0), (1.0 if i % 3 == 2 else 0.0)
         of_wrench, (x, y, s) = times(0.0 if i > 2 else 1.0, unit), times(1.0 if i > 2 else 0.0, unit)
-        bar = pull_back(framed, done, known, (x, y, spins * s), frame.seen(own, of_wrench))
-        put(at(out, 3 + 3 * i), frame.wrench(own, bar.twist))
+        bar = pull_back(framed, done, known, (x, y, spins * s), frame.seen(record, of_wrench))
+        put(at(out, 3 + 3 * i), frame.wrench(record, bar.twist))
         if whole:
             x, y, s = plus((bar.state[0], bar.state[1], spins * bar.state[2]), (1.0 - spins) * s, (0.0, 0.0, 1.0))
             put(at(out, 21 + 3 * i), (x, y, s))

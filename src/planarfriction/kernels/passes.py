@@ -52,10 +52,10 @@ class Part(NamedTuple):
 def passes(
     name: str, block: Block, inputs: Mapping[str, str], stores: Sequence[str], *, count: int, short: int
 ) -> Passes:
-    """Write a traced function of a cell as about `count` passes, which do again what takes up to `short` operations.
+    """Write a traced function of a cell as about `count` passes, which repeat numbers of up to `short` operations.
 
-    `inputs` are the sources of its arguments by their names in the trace: those of a cell are read at `[... + i]`, all
-    cells share the others. The first results go to the places `stores`, the others are summed up over the cells.
+    `inputs` are the sources of its arguments by their names in the trace: numbers of a cell are read at
+    `[... + i]`, all cells share the others. The first results go to the places `stores`, the others are summed up.
     """
     parts = _parts(block, inputs, stores, count, short)
     places, rows = _places(parts)
@@ -108,21 +108,21 @@ def _compiled(name: str, source: str, count: int) -> Any:
 
 
 def _parts(block: Block, inputs: Mapping[str, str], stores: Sequence[str], count: int, short: int) -> list[Part]:
-    """Divide the operations of a function among passes; what takes the place of an input is stored by the last one."""
+    """Divide the operations of a function among passes; results in the place of an input are stored by the last one."""
     operations = _used(block)
     again = _done_again(operations, inputs, short)
-    own = [each for each in operations if each.name not in again]
-    cuts = _cuts(own, again, block, count)
+    kept = [each for each in operations if each.name not in again]
+    cuts = _cuts(kept, again, block, count)
     spans = list(itertools.pairwise(cuts))
-    part_of = {each.name: k for k, span in enumerate(spans) for each in own[slice(*span)]}
+    part_of = {each.name: k for k, span in enumerate(spans) for each in kept[slice(*span)]}
     made = [max((part_of.get(name, 0) for name in _needed([each], again)), default=0) for each in block.results]
     for k, place in enumerate(stores):
         made[k] = len(spans) - 1 if place in inputs.values() else made[k]
     parts = []
     for k, span in enumerate(spans):
-        here, ends = own[slice(*span)], [each for each, part in enumerate(made) if part == k]
-        names = _names_needed([*here, *_as_operations([block.results[each] for each in ends])], again)
-        inside = {each.name for each in here} | (names & again.keys())
+        span_operations, ends = kept[slice(*span)], [each for each, part in enumerate(made) if part == k]
+        names = _names_needed([*span_operations, *_as_operations([block.results[each] for each in ends])], again)
+        inside = {each.name for each in span_operations} | (names & again.keys())
         parts.append(Part([each for each in operations if each.name in inside], names - inside, ends))
     return parts
 
@@ -133,12 +133,12 @@ def _as_operations(results: Sequence[Any]) -> list[Operation]:
 
 def _used(block: Block) -> list[Operation]:
     """Return the operations that the results of a block depend on."""
-    used, found = {each for each in block.results if isinstance(each, str)}, []
+    used, needed = {each for each in block.results if isinstance(each, str)}, []
     for each in reversed(block.operations):
         if each.name in used:
             used.update(_arguments(each))
-            found.append(each)
-    return found[::-1]
+            needed.append(each)
+    return needed[::-1]
 
 
 def _arguments(operation: Operation) -> Iterator[str]:
@@ -146,10 +146,10 @@ def _arguments(operation: Operation) -> Iterator[str]:
 
 
 def _done_again(operations: Sequence[Operation], inputs: Mapping[str, str], short: int) -> dict[str, Operation]:
-    """Return operations that passes do again: short ones, comparisons, and those of numbers that all cells share."""
+    """Return operations that passes repeat: short ones, comparisons, and all of numbers that cells share."""
     steps = dict.fromkeys(inputs, 0)
     alike = {name for name, source in inputs.items() if not source.endswith("+ i]")}
-    found = {}
+    again = {}
     for each in operations:
         names = list(_arguments(each))
         if alike.issuperset(names):
@@ -160,41 +160,41 @@ def _done_again(operations: Sequence[Operation], inputs: Mapping[str, str], shor
         else:
             steps[each.name] = 1 + sum(steps[name] for name in names)
         if steps[each.name] <= short:
-            found[each.name] = each
+            again[each.name] = each
         else:
             steps[each.name] = 0  # read by those that follow
-    return found
+    return again
 
 
 def _needed(names: Sequence[Any], again: Mapping[str, Operation]) -> set[str]:
     """Return the names that others follow from, through operations that are done again."""
-    found, left = set(), [each for each in names if isinstance(each, str)]
+    needed, left = set(), [each for each in names if isinstance(each, str)]
     while left:
         name = left.pop()
-        if name not in found:
-            found.add(name)
+        if name not in needed:
+            needed.add(name)
             left += _arguments(again[name]) if name in again else ()
-    return found
+    return needed
 
 
 def _names_needed(operations: Sequence[Operation], again: Mapping[str, Operation]) -> set[str]:
     return _needed([name for each in operations for name in _arguments(each)], again)
 
 
-def _cuts(own: Sequence[Operation], again: Mapping[str, Operation], block: Block, count: int) -> list[int]:
+def _cuts(kept: Sequence[Operation], again: Mapping[str, Operation], block: Block, count: int) -> list[int]:
     """Return where passes begin: about evenly by cost, where few numbers are handed on."""
-    costs = [next((cost for text, cost in COSTS.items() if text in each.text), 1) for each in own]
-    reached = [sum(costs[:k]) / sum(costs) * count for k in range(len(own))]
-    made, last = {each.name: k for k, each in enumerate(own)}, [0] * len(own)
-    for k, each in enumerate([*own, *_as_operations(block.results)]):
+    costs = [next((cost for text, cost in COSTS.items() if text in each.text), 1) for each in kept]
+    reached = [sum(costs[:k]) / sum(costs) * count for k in range(len(kept))]
+    made, last = {each.name: k for k, each in enumerate(kept)}, [0] * len(kept)
+    for k, each in enumerate([*kept, *_as_operations(block.results)]):
         for name in _needed(list(_arguments(each)), again) & made.keys():
             last[made[name]] = k
-    handed = [sum(use >= end for use in last[:end]) for end in range(len(own))]
+    handed = [sum(use >= end for use in last[:end]) for end in range(len(kept))]
     ends = set()
     for middle in range(1, count):
-        near = [k for k in range(1, len(own)) if abs(reached[k] - middle) < 0.25]
+        near = [k for k in range(1, len(kept)) if abs(reached[k] - middle) < 0.25]
         ends.add(min(near or [1], key=handed.__getitem__))
-    return [0, *sorted(ends), len(own)]
+    return [0, *sorted(ends), len(kept)]
 
 
 def _places(parts: Sequence[Part]) -> tuple[dict[str, str], int]:

@@ -8,15 +8,16 @@ import numpy as np
 
 from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.calls import call
-from planarfriction.compiler.memory import at, exists
+from planarfriction.compiler.memory import Doubles, Place, at, exists
 from planarfriction.kernels.body import read, settle_all
 from planarfriction.kernels.integration import read_run
 from planarfriction.kernels.rosenbrock import PAUSED, PIECE, SINCE, STEPS, advance
+from planarfriction.kernels.sdirk import Workspace
 from planarfriction.kernels.vectors import put, three
 
 
 class Path(NamedTuple):
-    """The ends of accepted steps of a motion, K of them; between two of the same piece lies a step."""
+    """Ends of K accepted steps of a motion; between two of the same piece lies a step."""
 
     piece: np.ndarray
     """Piece between breaks, int [K]."""
@@ -28,25 +29,44 @@ class Path(NamedTuple):
     """Rate of the state, [K, n]."""
 
 
+class Stretch(NamedTuple):
+    """Part of a piece that derivatives are carried along, in either direction."""
+
+    first: int
+    """Nodes of the piece: this one up to `last`."""
+    last: int
+    begin: float
+    """Seconds into the piece."""
+    until: float
+
+
+class Tolerances(NamedTuple):
+    """Largest error of derivatives in a step, `rtol |s| + atol`."""
+
+    rtol: float
+    atol: np.ndarray
+    """[n]"""
+
+
 def path_for(most: int, n: int) -> Path:
-    """Return room for the ends of steps (made outside compiled code)."""
+    """Return memory for the ends of steps (made outside compiled code)."""
     return Path(np.zeros(most, np.int64), np.zeros(most), np.zeros((most, n)), np.zeros((most, n)))
 
 
 @jit
-def follow(run, path):
+def follow(run: Place, path: Path) -> tuple[int, int]:
     """Go on with the run at an address until it ends or `path` is full; return its number of nodes and the outcome."""
     integration, count, outcome = read_run(run), 0, PAUSED
-    own, n, progress = read(integration.system), integration.states, integration.progress
-    cursor, clock, counts, breaks = progress.cursor, progress.clock, progress.statistics, own.motion.breaks
+    system, n, progress = read(integration.system), integration.states, integration.progress
+    cursor, clock, counts, breaks = progress.cursor, progress.clock, progress.statistics, system.motion.breaks
     while outcome == PAUSED and count + 2 <= path.piece.shape[0]:
         piece, since, accepted = cursor[PIECE], clock[SINCE], counts[STEPS]
         starting = count == 0 or path.piece[count - 1] != piece
         if starting:
-            if since == 0.0 and exists(own.motion.velocity):
-                put(at(progress.y, n - 6), three(at(own.motion.velocity, 3 * piece)))
+            if since == 0.0 and exists(system.motion.velocity):
+                put(at(progress.y, n - 6), three(at(system.motion.velocity, 3 * piece)))
             if since == 0.0:
-                settle_all(own, piece, progress.y)
+                settle_all(system, piece, progress.y)
             path.piece[count], path.since[count] = piece, since
             for i in range(n):
                 path.state[count, i] = progress.y[i]
@@ -59,13 +79,13 @@ def follow(run, path):
         for i in range(n):
             path.rate[count - 1, i], path.state[count, i] = integration.stages.start_rate[i], integration.stages.new[i]
         if ended or outcome != PAUSED or count + 3 > path.piece.shape[0]:  # else the next trial evaluates it
-            call(own.rates, (integration.system, piece, path.since[count], path.state[count], path.rate[count]))
+            call(system.rates, (integration.system, piece, path.since[count], path.state[count], path.rate[count]))
         count += 1
     return count, outcome
 
 
 @kernel
-def interpolate(path, k, since, state):
+def interpolate(path: Path, k: int, since: float, state: Doubles) -> None:
     """Write the state at `since` seconds into the piece, in the step after node k: the cubic Hermite interpolant."""
     h = path.since[k + 1] - path.since[k]
     right = (since - path.since[k]) / h
@@ -77,7 +97,7 @@ def interpolate(path, k, since, state):
 
 
 @kernel
-def node_after(path, k, last, since):
+def node_after(path: Path, k: int, last: int, since: float) -> int:
     """Return the last node from k on, but for `last`, that is not behind `since`."""
     while k + 1 < last and path.since[k + 1] <= since:
         k += 1
@@ -85,7 +105,7 @@ def node_after(path, k, last, since):
 
 
 @kernel
-def node_before(path, k, first, since):
+def node_before(path: Path, k: int, first: int, since: float) -> int:
     """Return the last node up to k, but from `first` on, that is before `since`."""
     while k > first and path.since[k] >= since:
         k -= 1
@@ -93,16 +113,16 @@ def node_before(path, k, first, since):
 
 
 @kernel
-def hold(system, own, path, k, since, shift, w):
+def hold(address: Place, path: Path, k: int, since: float, shift: float, w: Workspace) -> None:
     """Hold the state in the step after node k: interpolate it into `w.state`, linearise there, factor."""
-    piece = path.piece[k]
+    system, piece = read(address), path.piece[k]
     interpolate(path, k, since, w.state)
-    call(own.rates, (system, piece, since, w.state, w.rate))
-    call(own.linearise, (system, piece, w.state))
-    call(own.factor, (system, piece, since, w.state, shift))
+    call(system.rates, (address, piece, since, w.state, w.rate))
+    call(system.linearise, (address, piece, w.state))
+    call(system.factor, (address, piece, since, w.state, shift))
 
 
 @jit
-def state_at(path, first, last, since, state):
+def state_at(path: Path, first: int, last: int, since: float, state: np.ndarray) -> None:
     """Write the state at `since` seconds into the piece whose nodes are `first` to `last` of a path."""
     interpolate(path, node_after(path, first, last, since), since, state)

@@ -21,14 +21,14 @@ import numpy as np
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, kernel
-from planarfriction.compiler.memory import Doubles, Layout, arrays_at, reader
+from planarfriction.compiler.memory import Doubles, Layout, Place, arrays_at, reader
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.contacts import ROWS, ModelFunctions, traction
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.rules import ratio
 from planarfriction.kernels.small_matrices import applied, inverse
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
-from planarfriction.kernels.vectors import applied_back, dot, norm, plus, put, put_all, three, times
+from planarfriction.kernels.vectors import Vector, applied_back, dot, norm, plus, put, put_all, three, times
 
 
 class PublishedPatch(NamedTuple):
@@ -90,51 +90,51 @@ def slopes_in(lin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 @kernel
-def per_radius(radius):
+def per_radius(radius: float) -> float:
     """Return one over the contact radius; 0 of a point."""
     return 1.0 / xp.where(radius > 0.0, radius, math.inf)
 
 
 @kernel
-def through(root, x, y):
-    """Return a velocity in the axes of the metric, or a force out of them: times the symmetric root."""
+def through(root: Root, x: float, y: float) -> Vector:
+    """Turn a velocity into the axes of the metric, or a force back: multiply by the symmetric root."""
     return root.xx * x + root.xy * y, root.xy * x + root.yy * y
 
 
 @kernel
-def _seen(own, v):
+def _seen(record: PublishedContact, v: Vector) -> Vector:
     """Return `V_S` of a twist."""
-    (x, y), shape = through(own.root, v[0], v[1]), own.shape
+    (x, y), shape = through(record.root, v[0], v[1]), record.shape
     return x - v[2] * shape.centre_y, y + v[2] * shape.centre_x, shape.contact_radius * v[2]
 
 
 @kernel
-def _wrench(own, t):
+def _wrench(record: PublishedContact, t: Vector) -> Vector:
     """Return the wrench about the origin of a scaled one about the centre of pressure."""
-    shape = own.shape
-    x, y = through(own.root, t[0], t[1])
+    shape = record.shape
+    x, y = through(record.root, t[0], t[1])
     return x, y, shape.contact_radius * t[2] + shape.centre_x * t[1] - shape.centre_y * t[0]
 
 
 @kernel
-def _viscous(own, v):
+def _viscous(record: PublishedContact, v: Vector) -> Vector:
     """Return `V_S` with the spin that the second moment has in the place of the squared radius."""
-    x, y, _ = _seen(own, v)
-    return x, y, own.shape.second_moment * per_radius(own.shape.contact_radius) * v[2]
+    x, y, _ = _seen(record, v)
+    return x, y, record.shape.second_moment * per_radius(record.shape.contact_radius) * v[2]
 
 
 @kernel
-def _scaled(own, z):
-    return z[0], z[1], z[2] * per_radius(own.shape.contact_radius)
+def _scaled(record: PublishedContact, z: Vector) -> Vector:
+    return z[0], z[1], z[2] * per_radius(record.shape.contact_radius)
 
 
 @kernel
-def _raw(own, z):
-    return z[0], z[1], z[2] * own.shape.contact_radius
+def _raw(record: PublishedContact, z: Vector) -> Vector:
+    return z[0], z[1], z[2] * record.shape.contact_radius
 
 
 @kernel
-def _decay(law, z, u, twist):
+def _decay(law: LawNumbers, z: Vector, u: Vector, twist: Vector) -> float:
     """Return the decay of the bristle at the scaled twist for which the limit surface gives u."""
     v, size = norm(twist), norm(z)
     h = xp.where(norm(u) > 0.0, ratio(norm(u), v), 1.0)
@@ -147,17 +147,17 @@ _forth, _back = _SLOPES.forth, _SLOPES.back
 
 
 @kernel
-def _rate(own, z, twist):
+def _rate(record: PublishedContact, z: Vector, twist: Vector) -> Vector:
     x, y, s = twist
-    u = sliding(own.kind, own.data, 0, own.size, x, y, s, norm(twist))
-    return plus(u, -_decay(own.law, z, u, twist), z)
+    u = sliding(record.kind, record.data, 0, record.size, x, y, s, norm(twist))
+    return plus(u, -_decay(record.law, z, u, twist), z)
 
 
 @kernel
-def _slopes(own, z, twist, m):
+def _slopes(record: PublishedContact, z: Vector, twist: Vector, m: LinearPublished) -> None:
     (x, y, s), j = twist, m.sliding
-    sliding_jacobian(own.kind, own.data, 0, own.size, x, y, s, norm(twist), j)
-    (k,), tape = _forth(own.law, z, applied(j, twist), twist)
+    sliding_jacobian(record.kind, record.data, 0, record.size, x, y, s, norm(twist), j)
+    (k,), tape = _forth(record.law, z, applied(j, twist), twist)
     by_z, by_u, by_twist = _back(tape, (1.0,))
     by_twist = plus(by_twist, 1.0, applied_back(j, by_u))
     for i in range(3):
@@ -170,81 +170,84 @@ def _slopes(own, z, twist, m):
 
 
 @entry
-def evaluate(contact, z, v, zdot, w):
+def evaluate(contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles) -> None:
     """Write `z'` and the wrench."""
-    own, v = read(contact), three(v)
-    z = _scaled(own, three(z))
-    rate = _rate(own, z, _seen(own, v))
-    put(zdot, _raw(own, rate))
-    put(w, _wrench(own, traction(own.law, z, rate, _viscous(own, v))))
+    record, v = read(contact), three(v)
+    z = _scaled(record, three(z))
+    rate = _rate(record, z, _seen(record, v))
+    put(zdot, _raw(record, rate))
+    put(w, _wrench(record, traction(record.law, z, rate, _viscous(record, v))))
 
 
 @entry
-def linearise(contact, z, v, lin):
+def linearise(contact: Place, z: Doubles, v: Doubles, lin: Doubles) -> None:
     """Write `f_z` and `f_V`."""
-    own = read(contact)
-    _slopes(own, _scaled(own, three(z)), _seen(own, three(v)), arrays_at(_LINEAR, lin))
+    record = read(contact)
+    _slopes(record, _scaled(record, three(z)), _seen(record, three(v)), arrays_at(_LINEAR, lin))
 
 
 @entry
-def factor(contact, z, shift, lin, stiffness):
+def factor(contact: Place, z: Doubles, shift: float, lin: Doubles, stiffness: Doubles) -> None:
     """Prepare `D^-1`, write `-G' ((sigma_0 + sigma_1 shift) D^-1 f_V G + sigma_2 G)`."""
-    own, m = read(contact), arrays_at(_LINEAR, lin)
+    record, m = read(contact), arrays_at(_LINEAR, lin)
     put_all(m.inverse, inverse(shift, m.by_z))
-    pull = own.law.sigma_0 + own.law.sigma_1 * shift
+    pull = record.law.sigma_0 + record.law.sigma_1 * shift
     for k in range(3):
         unit = (1.0 if k == 0 else 0.0), (1.0 if k == 1 else 0.0), (1.0 if k == 2 else 0.0)
-        z = applied(m.inverse, applied(m.by_twist, _seen(own, unit)))
-        t = plus(times(-pull, z), -own.law.sigma_2, _viscous(own, unit))
-        stiffness[k], stiffness[3 + k], stiffness[6 + k] = _wrench(own, t)
+        z = applied(m.inverse, applied(m.by_twist, _seen(record, unit)))
+        t = plus(times(-pull, z), -record.law.sigma_2, _viscous(record, unit))
+        stiffness[k], stiffness[3 + k], stiffness[6 + k] = _wrench(record, t)
 
 
 @entry
-def eliminate(contact, z, shift, r, lin, w):
+def eliminate(contact: Place, z: Doubles, shift: float, r: Doubles, lin: Doubles, w: Doubles) -> None:
     """Write `G' (sigma_1 - (sigma_0 + sigma_1 shift) D^-1) r`."""
-    own, m = read(contact), arrays_at(_LINEAR, lin)
-    r, pull = _scaled(own, three(r)), own.law.sigma_0 + own.law.sigma_1 * shift
-    put(w, _wrench(own, plus(times(own.law.sigma_1, r), -pull, applied(m.inverse, r))))
+    record, m = read(contact), arrays_at(_LINEAR, lin)
+    r, pull = _scaled(record, three(r)), record.law.sigma_0 + record.law.sigma_1 * shift
+    put(w, _wrench(record, plus(times(record.law.sigma_1, r), -pull, applied(m.inverse, r))))
 
 
 @entry
-def back_substitute(contact, z, r, dv, lin, out):
+def back_substitute(contact: Place, z: Doubles, r: Doubles, dv: Doubles, lin: Doubles, out: Doubles) -> None:
     """Solve `D out = r + f_V G dV`."""
-    own, m = read(contact), arrays_at(_LINEAR, lin)
-    driven = applied(m.by_twist, _seen(own, three(dv)))
-    put(out, _raw(own, applied(m.inverse, plus(_scaled(own, three(r)), 1.0, driven))))
+    record, m = read(contact), arrays_at(_LINEAR, lin)
+    driven = applied(m.by_twist, _seen(record, three(dv)))
+    put(out, _raw(record, applied(m.inverse, plus(_scaled(record, three(r)), 1.0, driven))))
 
 
 @entry
-def change(contact, z, zdot, lin, dz, dzdot, rows, friction, size):
+def change(
+    contact: Place, z: Doubles, zdot: Doubles, lin: Doubles, dz: Doubles, dzdot: Doubles, rows: Doubles,
+    friction: float, size: float,
+) -> None:  # fmt: skip
     """Write the changes of `z'` and of the wrench."""
-    own, m, rows = read(contact), arrays_at(_LINEAR, lin), arrays_at(ROWS, rows)
+    record, m, rows = read(contact), arrays_at(_LINEAR, lin), arrays_at(ROWS, rows)
     turns = 0.0, 0.0, 1.0
-    v, z = plus(three(rows.d_twist), size * rows.twist[2], turns), _scaled(own, three(z))
-    dz = plus(_scaled(own, three(dz)), -size * z[2], turns)
-    rate = plus(applied(m.by_z, plus(dz, -friction, z)), 1.0, applied(m.by_twist, _seen(own, v)))
-    put(dzdot, plus(_raw(own, rate), size * zdot[2], turns))
-    w = _wrench(own, traction(own.law, dz, rate, _viscous(own, v)))
+    v, z = plus(three(rows.d_twist), size * rows.twist[2], turns), _scaled(record, three(z))
+    dz = plus(_scaled(record, three(dz)), -size * z[2], turns)
+    rate = plus(applied(m.by_z, plus(dz, -friction, z)), 1.0, applied(m.by_twist, _seen(record, v)))
+    put(dzdot, plus(_raw(record, rate), size * zdot[2], turns))
+    w = _wrench(record, traction(record.law, dz, rate, _viscous(record, v)))
     put(rows.d_wrench, plus(w, size * rows.wrench[2], turns))
 
 
 @entry
-def solve_transposed(contact, z, r, lin, out):
+def solve_transposed(contact: Place, z: Doubles, r: Doubles, lin: Doubles, out: Doubles) -> None:
     """Solve `D' out = r`; a cotangent is scaled as a state is made raw."""
-    own, m = read(contact), arrays_at(_LINEAR, lin)
-    put(out, _scaled(own, applied_back(m.inverse, _raw(own, three(r)))))
+    record, m = read(contact), arrays_at(_LINEAR, lin)
+    put(out, _scaled(record, applied_back(m.inverse, _raw(record, three(r)))))
 
 
 @entry
-def pull_back(contact, z, lin, dzdot, rows, out):
-    """Write the transpose of `change`; that of `G' t` is G."""
-    own, m, rows = read(contact), arrays_at(_LINEAR, lin), arrays_at(ROWS, rows)
-    law, wrench = own.law, three(rows.d_wrench)
-    t = _seen(own, wrench)
-    rate = plus(_raw(own, three(dzdot)), -law.sigma_1, t)
-    put(out, _scaled(own, plus(applied_back(m.by_z, rate), -law.sigma_0, t)))
-    u = plus(applied_back(m.by_twist, rate), -law.sigma_2, _viscous(own, wrench))
-    put(rows.d_twist, _wrench(own, u))
+def pull_back(contact: Place, z: Doubles, lin: Doubles, dzdot: Doubles, rows: Doubles, out: Doubles) -> None:
+    """Write the transpose of `change`; the transpose of `G' t` is G."""
+    record, m, rows = read(contact), arrays_at(_LINEAR, lin), arrays_at(ROWS, rows)
+    law, wrench = record.law, three(rows.d_wrench)
+    t = _seen(record, wrench)
+    rate = plus(_raw(record, three(dzdot)), -law.sigma_1, t)
+    put(out, _scaled(record, plus(applied_back(m.by_z, rate), -law.sigma_0, t)))
+    u = plus(applied_back(m.by_twist, rate), -law.sigma_2, _viscous(record, wrench))
+    put(rows.d_twist, _wrench(record, u))
 
 
 FUNCTIONS = ModelFunctions(evaluate, linearise, factor, eliminate, back_substitute, change, solve_transposed, pull_back)

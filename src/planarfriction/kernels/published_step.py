@@ -1,8 +1,8 @@
-"""The step of the published reduced model with its derivatives, and what is bound to it.
+"""The step of the published reduced model with its derivatives.
 
 In scaled coordinates, `V_S = S V` at the centre of pressure with `S = diag(1, 1, r)`, the bristle `S^-1 z` steps as in
 `bristle_step`, driven by `u = h(V) |V_S|` with `h = |u|/|V_S|` (docs/physics.md, "The published reduced model").
-Derivatives are those that `derive` writes, of the limit surface `du/dV_S`; its numbers are held fixed: r acts through
+`derive` writes the derivatives, and the limit surface gives `du/dV_S`; its numbers are held fixed: r acts through
 `V_S` alone.
 """
 
@@ -13,16 +13,16 @@ from typing import NamedTuple
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import reader
+from planarfriction.compiler.memory import Doubles, Place, reader
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import bristle_step, moment_steps, published_contact
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.moment_steps import Contact, Cotangents, Framed, StepModel
-from planarfriction.kernels.published_contact import PublishedPatch, through
+from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, through
 from planarfriction.kernels.rules import ratio
 from planarfriction.kernels.steps import step_functions
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
-from planarfriction.kernels.vectors import applied_back, norm, plus, times
+from planarfriction.kernels.vectors import Vector, applied_back, norm, plus, times
 
 NAMES = (*LawNumbers._fields, *PublishedPatch._fields)
 """Numbers of a contact, in the order of its row."""
@@ -34,7 +34,7 @@ shape_of = reader(PublishedPatch)
 
 
 class HeldTwist(NamedTuple):
-    """Twist of a step, and what follows from it alone."""
+    """Twist of a step, and numbers that follow from the twist alone."""
 
     twist: tuple
     """V_S"""
@@ -47,7 +47,7 @@ class HeldTwist(NamedTuple):
 class PublishedStep(NamedTuple):
     """A step and the tape of its derivatives."""
 
-    held: HeldTwist
+    drive: HeldTwist
     tape: tuple
     new: tuple
     """State after the step."""
@@ -56,7 +56,7 @@ class PublishedStep(NamedTuple):
 
 
 @kernel
-def scaled_twist(shape, twist):
+def scaled_twist(shape: PublishedPatch, twist: Vector) -> Vector:
     """Return `V_S`; rest up to `STILL`, below which the squares in its norm leave the range of numbers."""
     vx, vy, omega = twist
     scaled = vx - omega * shape.centre_y, vy + omega * shape.centre_x, shape.contact_radius * omega
@@ -64,7 +64,7 @@ def scaled_twist(shape, twist):
 
 
 @kernel
-def hold(contact, twist):
+def hold(contact: Contact, twist: Vector) -> HeldTwist:
     """Return `HeldTwist` at a twist."""
     surface, scaled = contact.surface, scaled_twist(contact.shape, twist)
     v = norm(scaled)
@@ -73,16 +73,18 @@ def hold(contact, twist):
 
 
 @kernel
-def hold_slopes(contact, twist, work):
+def hold_slopes(contact: Contact, twist: Vector, work: Doubles) -> tuple[HeldTwist, Vector]:
     """Return `HeldTwist`, and `du/dV_S` row by row."""
-    held, surface, j = hold(contact, twist), contact.surface, work
-    x, y, s = held.twist
-    sliding_jacobian(surface[0], contact.data, surface[1], surface[2], x, y, s, held.v, j)
-    return held, (j[0], j[1], j[2], j[3], j[4], j[5], j[6], j[7], j[8])
+    drive, surface, j = hold(contact, twist), contact.surface, work
+    x, y, s = drive.twist
+    sliding_jacobian(surface[0], contact.data, surface[1], surface[2], x, y, s, drive.v, j)
+    return drive, (j[0], j[1], j[2], j[3], j[4], j[5], j[6], j[7], j[8])
 
 
 @kernel
-def _step(law, shape, twist, omega, u, z, dt):
+def _step(
+    law: LawNumbers, shape: PublishedPatch, twist: Vector, omega: float, u: Vector, z: Vector, dt: float
+) -> tuple[Vector, Vector]:
     """Return the new state and the wrench at V_S = `twist`, where the limit surface gives u."""
     r, v = shape.contact_radius, norm(twist)
     h = xp.where(v > 0.0, ratio(norm(u), v), 1.0)
@@ -112,16 +114,16 @@ _forth, _back = DERIVATIVE.forth, DERIVATIVE.back
 
 
 @kernel
-def taped_step(contact, held, z, dt):
+def taped_step(contact: Contact, drive: HeldTwist, z: Vector, dt: float) -> PublishedStep:
     """Return `PublishedStep` from the raw state z."""
-    (new, wrench), tape = _forth(contact.law, contact.shape, held.twist, held.omega, held.u, z, dt)
-    return PublishedStep(held, tape, new, wrench)
+    (new, wrench), tape = _forth(contact.law, contact.shape, drive.twist, drive.omega, drive.u, z, dt)
+    return PublishedStep(drive, tape, new, wrench)
 
 
 @kernel
-def pull_back(contact, step, slopes, new, wrench):
-    """Return `Cotangents` from those of the new state and of the wrench."""
-    shape, omega = contact.shape, step.held.omega
+def pull_back(contact: Contact, step: PublishedStep, slopes: Vector, new: Vector, wrench: Vector) -> Cotangents:
+    """Return `Cotangents` from the cotangents of the new state and of the wrench."""
+    shape, omega = contact.shape, step.drive.omega
     bars = _back(step.tape, (new, wrench))
     z, u, twist, turn = bars[:4]
     x, y, s = plus(twist, 1.0, applied_back(slopes, u))
@@ -141,32 +143,32 @@ MODEL = StepModel(shape_of, hold, hold_slopes, taped_step, pull_back)
 
 
 @kernel
-def _spins(own):
-    return xp.where(own.shape.contact_radius > 0.0, 1.0, 0.0)
+def _spins(record: PublishedContact) -> float:
+    return xp.where(record.shape.contact_radius > 0.0, 1.0, 0.0)
 
 
 @kernel
-def _read(contact):
+def _read(contact: Place) -> tuple[PublishedContact, Contact]:
     """Return the record of a contact, and the contact about its centre of pressure, in the axes of its metric.
 
     A point slides as a patch of any size does that does not spin.
     """
-    own = published_contact.read(contact)
-    spins, radius = _spins(own), own.shape.contact_radius
-    shape = PublishedPatch(0.0, 0.0, xp.where(spins > 0.0, radius, 1.0), spins * own.shape.second_moment)
-    return own, Contact(own.law, shape, (own.kind, 0, own.size), own.data)
+    record = published_contact.read(contact)
+    spins, radius = _spins(record), record.shape.contact_radius
+    shape = PublishedPatch(0.0, 0.0, xp.where(spins > 0.0, radius, 1.0), spins * record.shape.second_moment)
+    return record, Contact(record.law, shape, (record.kind, 0, record.size), record.data)
 
 
 @kernel
-def _seen(own, v):
-    x, y = through(own.root, v[0], v[1])
-    return x - own.shape.centre_y * v[2], y + own.shape.centre_x * v[2], _spins(own) * v[2]
+def _seen(record: PublishedContact, v: Vector) -> Vector:
+    x, y = through(record.root, v[0], v[1])
+    return x - record.shape.centre_y * v[2], y + record.shape.centre_x * v[2], _spins(record) * v[2]
 
 
 @kernel
-def _wrench(own, w):
-    x, y = through(own.root, w[0], w[1])
-    return x, y, own.shape.centre_x * w[1] - own.shape.centre_y * w[0] + _spins(own) * w[2]
+def _wrench(record: PublishedContact, w: Vector) -> Vector:
+    x, y = through(record.root, w[0], w[1])
+    return x, y, record.shape.centre_x * w[1] - record.shape.centre_y * w[0] + _spins(record) * w[2]
 
 
 _FRAME = Framed(_read, _seen, _wrench, _spins)

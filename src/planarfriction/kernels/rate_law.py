@@ -1,6 +1,6 @@
 """A bristle of a law that is a function of its own, `z' = rate(xp, law, z, u)`, with the derivatives `derive` writes.
 
-Its step is linearly implicit, of two stages (Rosenbrock; Verwer, Spee, Blom, Hundsdorfer 1999): with `A = dz'/dz` at
+The step is linearly implicit, of two stages (Rosenbrock; Verwer, Spee, Blom, Hundsdorfer 1999): with `A = dz'/dz` at
 the start and `g = 1 - 1/sqrt(2)`,
 
     (I - g dt A) k = z'(z),   (I - g dt A) l = z'(p) - 2 k,   p = z + dt k,   new = z + dt (3 k + l)/2.
@@ -29,7 +29,7 @@ from planarfriction.kernels.contacts import ModelFunctions, functions_of
 from planarfriction.kernels.forward import forward
 from planarfriction.kernels.general_cells import RATES, STEPS, Bristle, bristle
 from planarfriction.kernels.steps import StepFunctions, step_functions
-from planarfriction.kernels.vectors import norm, plus, times
+from planarfriction.kernels.vectors import Vector, norm, plus, times
 
 _SHARE = 1.0 - math.sqrt(0.5)
 """g [-]"""
@@ -38,24 +38,24 @@ _KNOWN = frozenset(("planarfriction", "math", "numpy", "numba", "builtins"))
 """Packages whose versions and sources machine code is kept under anyway."""
 
 _LEAST = 0.1
-"""Least determinant of `I - g dt A`: that of a law whose bristles grow by themselves could vanish."""
+"""Least determinant of `I - g dt A`: it could vanish for a law whose bristles grow by themselves."""
 
 
 @kernel
-def traction(xp, law, z, zdot, u):
+def traction(xp: Any, law: Any, z: Vector, zdot: Vector, u: Vector) -> Vector:
     """Compute `-(sigma_0 z + sigma_1 z' + sigma_2 u)`, the traction per unit load of a law without one."""
     return contacts.traction(law, z, zdot, u)
 
 
 @kernel
-def _within(z, largest):
+def _within(z: Vector, largest: float) -> Vector:
     """Bring a bristle back to its largest deflection."""
     size = norm(z)
     return times(xp.where(size > largest, largest, 1.0) / xp.where(size > largest, size, 1.0), z)
 
 
 @kernel
-def _solved(a, b, c, d, per_determinant, r):
+def _solved(a: float, b: float, c: float, d: float, per_determinant: float, r: Vector) -> Vector:
     """Solve a system [2, 2] with the rows (a, b) and (c, d)."""
     return per_determinant * (d * r[0] - b * r[1]), per_determinant * (a * r[1] - c * r[0])
 
@@ -68,12 +68,12 @@ def bristle_of(rate: Callable, pull: Callable = traction) -> Bristle:
     pushed = forward(rate, (z_name,), (z_name, u_name))
 
     @kernel
-    def evaluate(law, z, u):
+    def evaluate(law: Any, z: Vector, u: Vector) -> tuple[Vector, Vector]:
         zdot = rate(xp, law, z, u)
         return zdot, pull(xp, law, z, zdot, u)
 
     @kernel
-    def step(law, z, u, dt):
+    def step(law: Any, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
         start, x = pushed(xp, law, z, u, (1.0, 0.0))
         start, y = pushed(xp, law, z, u, (0.0, 1.0))
         g = _SHARE * dt
@@ -109,28 +109,28 @@ def cell_functions(name: str, law: Any, bristle_: Bristle, lever: Lever) -> Cell
 
 
 def fingerprint(names: Sequence[str], *functions: Callable) -> str:
-    """Return a short text that changes with the names of a law's numbers, with functions, and with what these use.
+    """Return a short text that changes with the names of a law's numbers, with functions, and with all that these use.
 
-    That is other functions, modules and numbers.
+    Functions use other functions, modules and numbers.
     """
-    found: dict[Any, str] = {None: " ".join(names)}
+    sources: dict[Any, str] = {None: " ".join(names)}
     for function in functions:
-        _note(function, found)
-    return hashlib.sha256(repr(sorted(found.values())).encode()).hexdigest()[:12]
+        _note(function, sources)
+    return hashlib.sha256(repr(sorted(sources.values())).encode()).hexdigest()[:12]
 
 
-def _note(value: Any, found: dict[Any, str]) -> None:
+def _note(value: Any, sources: dict[Any, str]) -> None:
     value = getattr(value, "py_func", value)
     home = value.__name__ if inspect.ismodule(value) else getattr(value, "__module__", None)
-    if value in found or (home or "").split(".")[0] in _KNOWN:
+    if value in sources or (home or "").split(".")[0] in _KNOWN:
         return
     if inspect.ismodule(value):
-        found[value] = inspect.getsource(value)
+        sources[value] = inspect.getsource(value)
     elif inspect.isfunction(value):
-        found[value] = inspect.getsource(value)
+        sources[value] = inspect.getsource(value)
         used = inspect.getclosurevars(value)
         for name, each in {**used.globals, **used.nonlocals}.items():
             if callable(each) or inspect.ismodule(each):
-                _note(each, found)
+                _note(each, sources)
             else:
-                found[value, name] = f"{value.__qualname__} {name} {each!r}"
+                sources[value, name] = f"{value.__qualname__} {name} {each!r}"

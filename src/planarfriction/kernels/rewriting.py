@@ -19,49 +19,49 @@ class Rewriting:
     """
 
     def __init__(
-        self,
-        known: Iterable[tuple[Any, Any]],
-        names: Mapping[str, Any] | None = None,
+        self, known: Iterable[tuple[Any, Any]], names: Mapping[str, Any] | None = None,
         finished: Callable[[FunctionType], Any] = lambda twin: twin,
-    ) -> None:
-        self._twins = {id(own): (twin, own) for own, twin in known}  # an `id` is that of an object that is kept
+    ) -> None:  # fmt: skip
+        self._twins = {
+            id(original): (twin, original) for original, twin in known
+        }  # an `id` is that of an object that is kept
         self._names, self._finished = names or {}, finished
 
-    def __call__(self, own: Any) -> Any:
+    def __call__(self, original: Any) -> Any:
         """Return the twin."""
-        if id(own) in self._twins:
-            return self._twins[id(own)][0]
-        if isinstance(own, ModuleType):
-            return _Module(own, self)
-        if isinstance(own, tuple):
-            return like(own, [self(each) for each in own])
-        function = getattr(own, "py_func", own)
+        if id(original) in self._twins:
+            return self._twins[id(original)][0]
+        if isinstance(original, ModuleType):
+            return _Module(original, self)
+        if isinstance(original, tuple):
+            return like(original, [self(each) for each in original])
+        function = getattr(original, "py_func", original)
         if not isinstance(function, FunctionType):
-            return own
+            return original
         space: dict[str, Any] = {"__builtins__": function.__globals__.get("__builtins__"), **self._names}
         cells = [CellType() for _ in function.__closure__ or ()]
         made = FunctionType(function.__code__, space, function.__name__, function.__defaults__, tuple(cells))
         twin = self._finished(made)
-        self._twins[id(own)] = twin, own
+        self._twins[id(original)] = twin, original
         for name in _global_names(function.__code__):
             if name in function.__globals__:
                 space[name] = self(function.__globals__[name])
-        for cell, given in zip(cells, function.__closure__ or (), strict=True):
-            cell.cell_contents = self(given.cell_contents)
+        for cell, outer in zip(cells, function.__closure__ or (), strict=True):
+            cell.cell_contents = self(outer.cell_contents)
         return twin
 
 
 class _Module:
     """A module whose functions are twins."""
 
-    def __init__(self, own: ModuleType, rewriting: Rewriting) -> None:
-        self._own, self._rewriting = own, rewriting
+    def __init__(self, original: ModuleType, rewriting: Rewriting) -> None:
+        self._module, self._rewriting = original, rewriting
 
     def __getattr__(self, name: str) -> Any:
-        return self._rewriting(getattr(self._own, name))
+        return self._rewriting(getattr(self._module, name))
 
 
 def _global_names(code: CodeType) -> set[str]:
-    """Return the names that code may look up, with those of the code inside it."""
+    """Return the names that code and the code inside it may look up."""
     inner = [each for each in code.co_consts if isinstance(each, CodeType)]
     return set(code.co_names).union(*map(_global_names, inner))

@@ -1,6 +1,6 @@
 """Inputs of rollouts, and their cotangents or changes, as compiled loops read them.
 
-A step without load forgets its state: it passes on no gradient but that of the load, the wrench per unit load that the
+A step without load forgets its state: it passes on the gradient of the load alone, the wrench per unit load that the
 smallest load would have.
 """
 
@@ -33,16 +33,27 @@ class Inputs(NamedTuple):
     shapes: np.ndarray
     """Weights of cells, [L, M]."""
     by_load: np.ndarray
-    """Slopes of these by the load, [L, M] [1/N]."""
+    """Slopes of the weights by the load, [L, M] [1/N]."""
     reference: float = 0.0
     """Reference load [N] of a law whose stiffness does not grow with the load; 0 of others."""
 
 
+class Derivatives(NamedTuple):
+    """Wrenches and their derivatives by some numbers of a contact, to which rollouts add theirs."""
+
+    columns: np.ndarray
+    """Places of the numbers in a row, int [D]."""
+    wrenches: np.ndarray
+    """[B, T, 3]"""
+    slopes: np.ndarray
+    """[B, T, 3, D]"""
+
+
 class Bars(NamedTuple):
-    """Cotangents of the inputs of B rollouts, or changes of them."""
+    """Cotangents or changes of the inputs of B rollouts."""
 
     state: np.ndarray
-    """Comes in as that of the state at the end, [B, S]."""
+    """Comes in as the cotangent of the state at the end, [B, S]."""
     twist: np.ndarray
     """[B, T, 3]"""
     load: np.ndarray
@@ -52,6 +63,6 @@ class Bars(NamedTuple):
 
 
 @kernel
-def row_of(values, b):
-    """Return the row of `values` for contact b: its own, or the one that all share."""
+def row_of(values: np.ndarray, b: int) -> int:
+    """Return the row of `values` for contact b: b, or 0 where all share one."""
     return b if values.shape[0] > 1 else 0

@@ -9,15 +9,24 @@ import numpy as np
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import address_of, call
-from planarfriction.compiler.memory import Packed, at, exists, layout
-from planarfriction.kernels.body import BODY_FUNCTIONS, System, load_of, maps_of, place_at, read, settle_all
+from planarfriction.compiler.memory import Doubles, Packed, Place, at, exists, layout
+from planarfriction.kernels.body import (
+    BODY_FUNCTIONS,
+    System,
+    SystemRecord,
+    load_of,
+    maps_of,
+    place_at,
+    read,
+    settle_all,
+)
 from planarfriction.kernels.contacts import contact_map
 from planarfriction.kernels.integration import Method, Output, Progress, RunRecord, Stages, combine, read_run
 from planarfriction.kernels.rest import at_rest, speed_of
 from planarfriction.kernels.small_matrices import applied
 from planarfriction.kernels.springs import spring_drift
 from planarfriction.kernels.step_control import MOTION, fitted, growth
-from planarfriction.kernels.vectors import applied_back, norm, plus, put, three, times
+from planarfriction.kernels.vectors import Vector, applied_back, norm, plus, put, three, times
 
 DONE, PAUSED, STEP_TOO_SMALL, AT_REST = 0, 1, 2, 3
 """Outcomes of `advance`."""
@@ -51,14 +60,14 @@ _RESOLUTION = 1e-15
 
 
 @kernel
-def _error(run, own):
+def _error(run: RunRecord, system: SystemRecord) -> float:
     """Return the largest error of the body's components and of each contact's bristles (mean), per tolerance.
 
     Infinite where anything is not finite.
     """
     y, new, error, atol, rtol = run.progress.y, run.stages.new, run.stages.error, run.atol, run.rtol
-    largest, state = 0.0, own.contacts.state
-    for c in range(own.size):
+    largest, state = 0.0, system.contacts.state
+    for c in range(system.size):
         total, count = 0.0, state[c + 1] - state[c]
         for i in range(state[c], state[c + 1]):
             e = error[i] / (atol[i] + rtol * xp.maximum(abs(y[i]), abs(new[i])))
@@ -67,7 +76,7 @@ def _error(run, own):
             return math.inf
         if count > 0:
             largest = xp.maximum(largest, math.sqrt(total / count))
-    for i in range(own.bristles, own.bristles + 6):
+    for i in range(system.bristles, system.bristles + 6):
         e = abs(error[i]) / (atol[i] + rtol * xp.maximum(abs(y[i]), abs(new[i])))
         if not xp.is_finite(e):
             return math.inf
@@ -76,72 +85,72 @@ def _error(run, own):
 
 
 @kernel
-def _record(run, own, piece, since, state):
+def _record(run: RunRecord, system: SystemRecord, piece: int, since: float, state: Doubles) -> None:
     """Write the next sample from a state."""
     out, m = run.output, run.progress.cursor[SAMPLE]
-    call(own.rates, (run.system, piece, since, state, run.stages.rate))
+    call(system.rates, (run.system, piece, since, state, run.stages.rate))
     for i in range(6):
-        out.body[6 * m + i] = state[own.bristles + i]
-    for c in range(own.size):
-        load, row = load_of(own, piece, since, c), m * own.size + c
+        out.body[6 * m + i] = state[system.bristles + i]
+    for c in range(system.size):
+        load, row = load_of(system, piece, since, c), m * system.size + c
         out.load[row] = load
-        put(at(out.wrench, 3 * row), times(load, three(at(own.work.wrench, 3 * c))))
+        put(at(out.wrench, 3 * row), times(load, three(at(system.work.wrench, 3 * c))))
     if exists(out.bristles):
-        for i in range(own.bristles):
-            out.bristles[m * own.bristles + i] = state[i]
+        for i in range(system.bristles):
+            out.bristles[m * system.bristles + i] = state[i]
     if exists(out.pressure):
         for i in range(2):
-            out.pressure[2 * m + i] = state[own.bristles - 2 + i]
+            out.pressure[2 * m + i] = state[system.bristles - 2 + i]
     run.progress.cursor[SAMPLE] = m + 1
 
 
 @kernel
-def _time_slope(own, piece, y, slope):
+def _time_slope(system: SystemRecord, piece: int, y: Doubles, slope: Doubles) -> None:
     """Write `df/dt` of the body's accelerations [3]: forces, loads and anchors of springs are linear in time."""
-    motion, total = own.motion, three(at(own.motion.force, 6 * piece + 3))
-    total = plus(total, 1.0, spring_drift(motion, own.springs, piece, y[own.bristles + 5]))
-    for c in range(own.size):
-        load = own.contacts.count[c] * motion.load[(2 * piece + 1) * own.size + c]
-        total = plus(total, load, applied_back(maps_of(own, c)[0], at(own.work.wrench, 3 * c)))
+    motion, total = system.motion, three(at(system.motion.force, 6 * piece + 3))
+    total = plus(total, 1.0, spring_drift(motion, system.springs, piece, y[system.bristles + 5]))
+    for c in range(system.size):
+        load = system.contacts.count[c] * motion.load[(2 * piece + 1) * system.size + c]
+        total = plus(total, load, applied_back(maps_of(system, c)[0], at(system.work.wrench, 3 * c)))
     for i in range(3):
         slope[i] = motion.inverse_mass[i] * total[i]
 
 
 @kernel
-def _drifts(own, piece):
-    """Return True if rates of bristles change with the time alone: what they touch moves, or a limit with the load."""
-    found = exists(own.motion.mover)
-    for c in range(own.size):
-        changes = own.motion.load[(2 * piece + 1) * own.size + c] != 0.0
-        found = found or (changes and own.contacts.reference[c] > 0.0)
-    return found
+def _drifts(system: SystemRecord, piece: int) -> bool:
+    """Return True if rates of bristles change with the time alone: surfaces move, or limits with the load."""
+    drifts = exists(system.motion.mover)
+    for c in range(system.size):
+        changes = system.motion.load[(2 * piece + 1) * system.size + c] != 0.0
+        drifts = drifts or (changes and system.contacts.reference[c] > 0.0)
+    return drifts
 
 
 @kernel
-def _drift(run, own, piece, since, step):
+def _drift(run: RunRecord, system: SystemRecord, piece: int, since: float, step: float) -> None:
     """Write `df/dt` of all states [n] where bristles see the time: a difference over a small share of a step.
 
-    That is right to `_NUDGE` and costs one evaluation, while each model would have to know what its bristles say.
+    The difference is right to `_NUDGE` and costs one evaluation; no model needs a derivative by the time.
     """
     by, now, rate = _NUDGE * step, run.stages.start_rate, run.stages.rate
-    call(own.rates, (run.system, piece, since + by, run.progress.y, rate))
+    call(system.rates, (run.system, piece, since + by, run.progress.y, rate))
     for i in range(run.states):
         run.stages.drift[i] = (rate[i] - now[i]) / by
     run.progress.statistics[EVALUATIONS] += 1
 
 
 @kernel
-def forget_unloaded(own, piece, y):
+def forget_unloaded(system: SystemRecord, piece: int, y: Doubles) -> None:
     """Clear the bristles of contacts without load on the whole piece: they start again from rest."""
-    load, first = own.motion.load, 2 * piece * own.size
-    for c in range(own.size):
-        if load[first + c] == 0.0 and load[first + own.size + c] == 0.0:
-            for i in range(own.contacts.state[c], own.contacts.state[c + 1]):
+    load, first = system.motion.load, 2 * piece * system.size
+    for c in range(system.size):
+        if load[first + c] == 0.0 and load[first + system.size + c] == 0.0:
+            for i in range(system.contacts.state[c], system.contacts.state[c + 1]):
                 y[i] = 0.0
 
 
 @kernel
-def _extend(run, share, value, slope, base, out):
+def _extend(run: RunRecord, share: float, value: float, slope: float, base: Doubles, out: Doubles) -> None:
     """Write `base` plus multiples of the continuous extension, less y, and of its slope in s, at a share s of a step.
 
     It is `(1 - s) y + s (new + (1 - s) (d_1 + s (d_2 + ...)))` with `new = y + sum m_j k_j`: a sum of stages.
@@ -158,17 +167,17 @@ def _extend(run, share, value, slope, base, out):
 
 
 @kernel
-def _step(run, own, piece, since, step):
+def _step(run: RunRecord, system: SystemRecord, piece: int, since: float, step: float) -> None:
     """Go through the stages of one step from `y`: solution into `new`, its error estimate into `error`."""
     n, s, method, work, y = run.states, run.stage_count, run.method, run.stages, run.progress.y
-    k, right, shift, drifts = work.k, work.right, 1.0 / (step * method.gamma), _drifts(own, piece)
-    call(own.factor, (run.system, piece, since, y, shift))
+    k, right, shift, drifts = work.k, work.right, 1.0 / (step * method.gamma), _drifts(system, piece)
+    call(system.factor, (run.system, piece, since, y, shift))
     for i in range(s):
         for j in range(i):
             work.coupling[j] = method.c[i * s + j] / step
         if i > 0:
             call(run.combine, (at(method.a, i * s), k, i, n, y, work.argument))
-            call(own.rates, (run.system, piece, since + method.alpha[i] * step, work.argument, work.rate))
+            call(system.rates, (run.system, piece, since + method.alpha[i] * step, work.argument, work.rate))
         call(run.combine, (work.coupling, k, i, n, work.rate if i > 0 else work.start_rate, right))
         slope = method.time_gamma[i] * step
         if drifts:
@@ -177,98 +186,98 @@ def _step(run, own, piece, since, step):
         else:
             for p in range(3):
                 right[n - 6 + p] += slope * work.time_slope[p]
-        call(own.solve, (run.system, piece, since, y, shift, right, at(k, i * n)))
+        call(system.solve, (run.system, piece, since, y, shift, right, at(k, i * n)))
     call(run.combine, (method.m, k, s, n, y, work.new))
     call(run.combine, (method.e, k, s, n, work.zero, work.error))
 
 
 @kernel
-def _direction(own, piece, since, c, state):
+def _direction(system: SystemRecord, piece: int, since: float, c: int, state: Doubles) -> Vector:
     """Return the direction of the twist of contact c in a state; zeros at rest."""
-    a, v, body = own.work.stiffness, own.work.twist, at(state, own.bristles)
-    place, seen = place_at(own, piece, since, c, body)
-    contact_map(own.contacts.mount[c], place, at(body, 3), a)
+    a, v, body = system.work.stiffness, system.work.twist, at(state, system.bristles)
+    place, seen = place_at(system, piece, since, c, body)
+    contact_map(system.contacts.mount[c], place, at(body, 3), a)
     put(v, applied(a, seen))
-    size = speed_of(own, v)
+    size = speed_of(system, v)
     x, y, s = times(1.0 / xp.where(size > 0.0, size, 1.0), three(v))
-    return x, y, own.motion.stop_radius * s
+    return x, y, system.motion.stop_radius * s
 
 
 @kernel
-def _turn(run, own, piece, since, step):
+def _turn(run: RunRecord, system: SystemRecord, piece: int, since: float, step: float) -> float:
     """Return the largest change of direction [rad] of the twist of a contact of few states from `y` to `new`."""
     largest = 0.0
-    for c in range(own.size):
-        if own.contacts.state[c + 1] - own.contacts.state[c] <= _MANY:
-            before = _direction(own, piece, since, c, run.progress.y)
-            after = _direction(own, piece, since + step, c, run.stages.new)
+    for c in range(system.size):
+        if system.contacts.state[c + 1] - system.contacts.state[c] <= _MANY:
+            before = _direction(system, piece, since, c, run.progress.y)
+            after = _direction(system, piece, since + step, c, run.stages.new)
             largest = xp.maximum(largest, norm(plus(after, -1.0, before)))
     return largest
 
 
 @kernel
-def _missed_inside(run, own, piece, since, step):
+def _missed_inside(run: RunRecord, system: SystemRecord, piece: int, since: float, step: float) -> float:
     """Return the error of a step that turns a contact's twist at places on its way, per tolerance.
 
-    The residual of the continuous extension, through the matrix of the step, is what a stage there would have added.
+    The residual of the continuous extension, through the matrix of the step, is the share of one more stage there.
     """
-    looks = xp.minimum(_LOOKS, int(_turn(run, own, piece, since, step) / _ANGLE))
+    looks = xp.minimum(_LOOKS, int(_turn(run, system, piece, since, step) / _ANGLE))
     work, shift, largest = run.stages, 1.0 / (step * run.method.gamma), 0.0
     for i in range(looks):
         share = (i + 1.0) / (looks + 1.0)
         _extend(run, share, 1.0, 0.0, run.progress.y, work.argument)
-        call(own.rates, (run.system, piece, since + share * step, work.argument, work.rate))
+        call(system.rates, (run.system, piece, since + share * step, work.argument, work.rate))
         _extend(run, share, 0.0, -1.0 / step, work.rate, work.right)
-        call(own.solve, (run.system, piece, since, run.progress.y, shift, work.right, work.error))
-        largest = xp.maximum(largest, _error(run, own) / _DOUBT)
+        call(system.solve, (run.system, piece, since, run.progress.y, shift, work.right, work.error))
+        largest = xp.maximum(largest, _error(run, system) / _DOUBT)
     run.progress.statistics[EVALUATIONS] += looks
     return largest
 
 
 @entry
-def attempt(run, piece, since, step, fresh):
+def attempt(run: Place, piece: int, since: float, step: float, fresh: int) -> None:
     """Try a step, and write its error into `verdict`; `fresh` is 1 if the linearisation is yet to be made at y."""
     run = read_run(run)
-    own, y, statistics, fresh = read(run.system), run.progress.y, run.progress.statistics, fresh == 1
+    system, y, statistics, fresh = read(run.system), run.progress.y, run.progress.statistics, fresh == 1
     if fresh:
-        call(own.rates, (run.system, piece, since, y, run.stages.start_rate))
-        call(own.linearise, (run.system, piece, y))
-        _time_slope(own, piece, y, run.stages.time_slope)
-        if _drifts(own, piece):
-            _drift(run, own, piece, since, step)
+        call(system.rates, (run.system, piece, since, y, run.stages.start_rate))
+        call(system.linearise, (run.system, piece, y))
+        _time_slope(system, piece, y, run.stages.time_slope)
+        if _drifts(system, piece):
+            _drift(run, system, piece, since, step)
         statistics[JACOBIANS] += 1
-    _step(run, own, piece, since, step)
+    _step(run, system, piece, since, step)
     statistics[EVALUATIONS] += run.stage_count if fresh else run.stage_count - 1
-    error = _error(run, own)
+    error = _error(run, system)
     if error <= 1.0:
-        error = xp.maximum(error, _missed_inside(run, own, piece, since, step))
+        error = xp.maximum(error, _missed_inside(run, system, piece, since, step))
     run.stages.verdict[0] = error
 
 
 @kernel
-def _start(run, own, piece):
+def _start(run: RunRecord, system: SystemRecord, piece: int) -> None:
     """Start a piece: the prescribed velocity, a first step, and a sample where the motion begins."""
-    progress, motion = run.progress, own.motion
+    progress, motion = run.progress, system.motion
     if exists(motion.velocity):
         put(at(progress.y, run.states - 6), three(at(motion.velocity, 3 * piece)))
-    settle_all(own, piece, progress.y)
+    settle_all(system, piece, progress.y)
     progress.clock[STEP] = xp.minimum(progress.clock[STEP], progress.clock[FIRST])
     if piece == 0 and progress.cursor[SAMPLE] == 0 and run.output.time[0] == motion.breaks[0]:
-        _record(run, own, piece, 0.0, progress.y)
+        _record(run, system, piece, 0.0, progress.y)
 
 
 @kernel
-def _accept(run, own, piece, step, last):
+def _accept(run: RunRecord, system: SystemRecord, piece: int, step: float, last: bool) -> float:
     """Take the new state after a step, and record the samples on its way."""
-    progress, samples, begin = run.progress, run.output.time, own.motion.breaks[piece]
-    since, end = progress.clock[SINCE], own.motion.breaks[piece + 1]
+    progress, samples, begin = run.progress, run.output.time, system.motion.breaks[piece]
+    since, end = progress.clock[SINCE], system.motion.breaks[piece + 1]
     reached = end - begin if last else since + step
     time = end if last else begin + reached
     while progress.cursor[SAMPLE] < run.samples and samples[progress.cursor[SAMPLE]] <= time:
         sample = samples[progress.cursor[SAMPLE]]
-        here = reached if sample == time else sample - begin
-        _extend(run, (here - since) / step, 1.0, 0.0, progress.y, run.stages.argument)
-        _record(run, own, piece, here, run.stages.argument)
+        instant = reached if sample == time else sample - begin
+        _extend(run, (instant - since) / step, 1.0, 0.0, progress.y, run.stages.argument)
+        _record(run, system, piece, instant, run.stages.argument)
     for i in range(run.states):
         progress.y[i] = run.stages.new[i]
     progress.statistics[STEPS] += 1
@@ -277,19 +286,19 @@ def _accept(run, own, piece, step, last):
 
 
 @jit
-def advance(run, max_steps):
+def advance(run: Place, max_steps: int) -> int:
     """Integrate the run at an address from where it stands to the last break, or for `max_steps` trials.
 
     The step that ends at a break is recorded (left limit) before the next piece begins. Returns an outcome.
     """
-    place, run = run, read_run(run)
-    own, progress, clock, taken = read(run.system), run.progress, run.progress.clock, 0
-    while progress.cursor[PIECE] < own.pieces:
+    address, run = run, read_run(run)
+    system, progress, clock, taken = read(run.system), run.progress, run.progress.clock, 0
+    while progress.cursor[PIECE] < system.pieces:
         piece = progress.cursor[PIECE]
-        begin = own.motion.breaks[piece]
-        span, starting, fresh = own.motion.breaks[piece + 1] - begin, clock[SINCE] == 0.0, True
+        begin = system.motion.breaks[piece]
+        span, starting, fresh = system.motion.breaks[piece + 1] - begin, clock[SINCE] == 0.0, True
         if starting:
-            _start(run, own, piece)
+            _start(run, system, piece)
         while clock[SINCE] < span:
             remaining = span - clock[SINCE]
             step = fitted(clock[STEP], remaining)
@@ -297,7 +306,7 @@ def advance(run, max_steps):
                 return PAUSED
             if step <= _RESOLUTION * xp.maximum(1.0, abs(begin)):
                 return STEP_TOO_SMALL
-            call(run.attempt, (place, piece, clock[SINCE], step, 1 if fresh else 0))
+            call(run.attempt, (address, piece, clock[SINCE], step, 1 if fresh else 0))
             taken, error = taken + 1, run.stages.verdict[0]
             # no growth right after a rejection, whose reason is still near
             longer = step * growth(MOTION, error, run.method.order, MOTION.growth if fresh else 1.0)
@@ -306,34 +315,32 @@ def advance(run, max_steps):
                 progress.statistics[REJECTIONS] += 1
                 clock[STEP] = longer
                 continue
-            time = _accept(run, own, piece, step, step == remaining)
+            time = _accept(run, system, piece, step, step == remaining)
             if starting:
                 clock[FIRST], starting = longer, False
             clock[STEP] = xp.maximum(longer, clock[STEP]) if step == remaining else longer
-            if own.motion.stop_speed > 0.0 and _rests(run, own, place, piece, time):
+            if system.motion.stop_speed > 0.0 and _rests(run, system, address, piece, time):
                 return AT_REST
-        forget_unloaded(own, piece, progress.y)
+        forget_unloaded(system, piece, progress.y)
         progress.cursor[PIECE], clock[SINCE] = piece + 1, 0.0
     return DONE
 
 
 @kernel
-def _rests(run, own, place, piece, time):
+def _rests(run: RunRecord, system: SystemRecord, address: Place, piece: int, time: float) -> bool:
     """Return True if the body is at rest, after a sample of its place."""
     progress, since = run.progress, run.progress.clock[SINCE]
-    call(run.at_rest, (place, piece, since))
+    call(run.at_rest, (address, piece, since))
     if run.stages.verdict[1] == 0.0:
         return False
     if progress.cursor[SAMPLE] < run.samples:
         run.output.time[progress.cursor[SAMPLE]] = time
-        _record(run, own, piece, since, progress.y)
+        _record(run, system, piece, since, progress.y)
     return True
 
 
-COMBINE, ATTEMPT = (combine, "ddppdd"), (attempt, "ppffp")
-
-FUNCTIONS = (*BODY_FUNCTIONS, COMBINE, ATTEMPT, (advance, "pp"))
-"""Functions that every run calls, in the order in which it asks for them, with their arguments."""
+FUNCTIONS = (*BODY_FUNCTIONS, combine, attempt, advance)
+"""Functions that every run calls, in the order in which it asks for them."""
 
 
 class Run(Packed):
@@ -347,8 +354,7 @@ class Run(Packed):
         stages, sizes = layout(Stages, **shapes), (n, s, len(method.dense), len(output.time))
         self._block = np.zeros(stages.size)
         atol = np.ascontiguousarray(atol, dtype=float)
-        addresses = [address_of(*each) for each in (COMBINE, ATTEMPT)]
-        addresses.append(address_of(at_rest, "ppf") if system.motion.stop_speed > 0.0 else 0)
+        rests = address_of(at_rest) if system.motion.stop_speed > 0.0 else 0
         parts = system.address, method, output, progress, stages.placed(self._block), atol, float(rtol)
-        super().__init__(RunRecord(*parts, *sizes, *addresses))
+        super().__init__(RunRecord(*parts, *sizes, address_of(combine), address_of(attempt), rests))
         self.system = system

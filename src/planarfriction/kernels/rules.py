@@ -34,37 +34,37 @@ class Rule(NamedTuple):
     pulls: Mapping[int, str] = _NONE
     """Cotangent of argument i, where a derivative of a vector would be a matrix."""
     names: Mapping[str, Any] = _NONE
-    """Functions that the texts name, beside those of `NAMES`."""
+    """Functions that the texts name, beside `NAMES`."""
     pushes: Mapping[int, str] = _NONE
     """Change of the result with argument i, where `pulls` has its cotangent."""
 
 
 @kernel
-def per(x):
+def per(x: float) -> float:
     """Return `1/x` for x > 0; 0 at 0, and so is its slope."""
     return 1.0 / xp.where(x > 0.0, x, math.inf)
 
 
 @kernel
-def ratio(x, y):
+def ratio(x: float, y: float) -> float:
     """Return `x/y` for y > 0; 0 at 0, and so are its slopes."""
     return x * per(y)
 
 
 @kernel
-def _power_slope(x, exponent, raised):
+def _power_slope(x: float, exponent: float, raised: float) -> float:
     """Return the derivative of `x^exponent` by x; at 0 the right-hand limit for exponents >= 1."""
     return xp.where(x > 0.0, exponent * raised * per(x), xp.where(exponent == 1.0, 1.0, 0.0))
 
 
 @kernel
-def _log(x):
+def _log(x: float) -> float:
     """Return `log x`; 0 at 0, where `x^e log x` vanishes."""
     return xp.log(xp.where(x > 0.0, x, 1.0))
 
 
 @kernel
-def slip_slope(deflection, breakaway):
+def slip_slope(deflection: float, breakaway: float) -> float:
     """Return the derivative of `slip_fraction` by the deflection, zero before breakaway and at full deflection.
 
     It is multiplied by how far a long step would have gone, 1e9, or by one over hardly any deflection.
@@ -74,7 +74,7 @@ def slip_slope(deflection, breakaway):
 
 
 @kernel
-def _slip_by_breakaway(deflection, breakaway):
+def _slip_by_breakaway(deflection: float, breakaway: float) -> float:
     """Return the derivative of `formulas.slip_fraction` by the breakaway ratio."""
     return formulas.bristle_decay_by_breakaway(xp, slip_slope(deflection, breakaway), deflection, breakaway)
 

@@ -14,6 +14,7 @@ import numpy as np
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, Layout, Packed, at, reader
+from planarfriction.kernels.body import SystemRecord
 
 GAMMA = 0.25
 PLACES = np.array([0.25, 0.75, 0.55, 0.5, 1.0])
@@ -29,14 +30,14 @@ STAGES = np.array(
 )
 """Stage arguments below the diagonal, `a_ij`."""
 ERROR = np.array([-3.0 / 16.0, -27.0 / 32.0, 25.0 / 32.0, 0.0, 0.25])
-"""Solution minus that of the embedded method, in `h G_i`."""
+"""Solution minus the solution of the embedded method, in `h G_i`."""
 START, AGAIN = 0.125, np.array([-11.0 / 32.0, -11.0 / 64.0, 25.0 / 64.0, 0.0, 0.0])
 """Another difference of order 3, `START h s'` at the start of the step and `AGAIN` in `h G_i`: a Jacobian that jumps
 before the first stage would go unseen without it."""
 
 OTHERS = 0.05
-"""Share of the largest derivative so far of its kind, better than to which none need be known: that of a knot whose say
-has just begun is small, and follows a contact's swings that matter to nobody."""
+"""Share of the largest derivative of its kind so far: none need be known better than to that. The derivative of a knot
+whose say has just begun is small, and follows swings of a contact that matter to nobody."""
 
 
 class Workspace(NamedTuple):
@@ -59,9 +60,9 @@ class Workspace(NamedTuple):
     most: Doubles
     """Largest gain on a piece so far, [U]."""
     state: Doubles
-    """Held state, [n]."""
+    """State about which the motion is linearised, [n]."""
     rate: Doubles
-    """Rate of the held state, [n]."""
+    """Rate of this state, [n]."""
     base: Doubles
     """Base of a stage, [n]."""
     right: Doubles
@@ -95,7 +96,7 @@ class Variation(NamedTuple):
 
 
 @kernel
-def variation_of(w, values, p, u, n):
+def variation_of(w: Workspace, values: Doubles, p: int, u: int, n: int) -> Variation:
     """Return derivative p of `values` [P, n], which goes by input u."""
     return Variation(
         at(values, p * n), at(w.new, p * n), at(w.before, p * n), at(w.level, u * n), at(w.stages, 5 * p * n)
@@ -103,7 +104,7 @@ def variation_of(w, values, p, u, n):
 
 
 @kernel
-def stage_base(i, h, n, d, base):
+def stage_base(i: int, h: float, n: int, d: Variation, base: Doubles) -> None:
     """Write `b_i = s + h sum_{j<i} a_ij G_j` of a derivative s, in one pass."""
     y, b, k_0, k_1, k_2, k_3 = d.value, base, d.stages, at(d.stages, n), at(d.stages, 2 * n), at(d.stages, 3 * n)
     a_0, a_1, a_2, a_3 = h * STAGES[i, 0], h * STAGES[i, 1], h * STAGES[i, 2], h * STAGES[i, 3]
@@ -125,14 +126,14 @@ def stage_base(i, h, n, d, base):
 
 
 @kernel
-def keep_stage(i, shift, n, d, base):
+def keep_stage(i: int, shift: float, n: int, d: Variation, base: Doubles) -> None:
     """Keep `G_i = (S_i - b_i)/(h gamma)` of the solution S_i in `d.new`."""
     for m in range(n):
         d.stages[i * n + m] = shift * (d.new[m] - base[m])
 
 
 @kernel
-def accept(n, d):
+def accept(n: int, d: Variation) -> None:
     """Take the derivative after a step."""
     for m in range(n):
         d.value[m], d.before[m] = d.new[m], d.stages[4 * n + m]
@@ -140,15 +141,15 @@ def accept(n, d):
 
 
 @kernel
-def error_of(own, n, d, h, known, rtol, atol):
-    """Return the larger error estimate of a step of a derivative per tolerance, as that of the motion.
+def error_of(system: SystemRecord, n: int, d: Variation, h: float, known: float, rtol: float, atol: Doubles) -> float:
+    """Return the larger of two error estimates of a step of a derivative, per tolerance.
 
-    One of the two counts only if it is `known` (1 or 0) how fast the derivative changes at the start, `d.before`.
+    The second counts only if it is `known` (1 or 0) how fast the derivative changes at the start, `d.before`.
     """
-    k, state, largest = d.stages, own.contacts.state, 0.0
-    for c in range(own.size + 6):
-        first, last, mean = own.bristles + c - own.size, own.bristles + c - own.size + 1, 1.0
-        if c < own.size:
+    k, state, largest = d.stages, system.contacts.state, 0.0
+    for c in range(system.size + 6):
+        first, last, mean = system.bristles + c - system.size, system.bristles + c - system.size + 1, 1.0
+        if c < system.size:
             first, last = state[c], state[c + 1]
             mean = 1.0 / xp.where(last > first, last - first, 1)
         one, other = 0.0, 0.0

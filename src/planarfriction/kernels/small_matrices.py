@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.kernels.vectors import times
+from planarfriction.compiler.memory import Doubles
+from planarfriction.kernels.vectors import Vector, times
 
 SWEEPS = 5
 """Sweeps of Jacobi rotations over a matrix [3, 3], which converge with their square from the second or third on."""
 
 
 @kernel
-def applied(m, a):
+def applied(m: Doubles, a: Any) -> Vector:
     """Return `M a` of a matrix [3, 3] in memory."""
     return (
         m[0] * a[0] + m[1] * a[1] + m[2] * a[2],
@@ -23,7 +25,7 @@ def applied(m, a):
 
 
 @kernel
-def inverse(shift, m):
+def inverse(shift: float, m: Doubles) -> Vector:
     """Return `(shift I - M)^-1` of a matrix [3, 3] in memory, nine numbers."""
     a, b, c, d, e, f, g, h, i = shift - m[0], -m[1], -m[2], -m[3], shift - m[4], -m[5], -m[6], -m[7], shift - m[8]
     r, p, w = e * i - f * h, f * g - d * i, d * h - e * g
@@ -32,7 +34,7 @@ def inverse(shift, m):
 
 
 @kernel
-def _rotate(s, q, i, j):
+def _rotate(s: Doubles, q: Doubles, i: int, j: int) -> None:
     """Rotate the symmetric matrix s [3, 3], so that `s_ij = 0`; its axes are the columns of q."""
     off = s[3 * i + j]
     half = 0.5 * (s[4 * j] - s[4 * i]) / (off if off != 0.0 else 1.0)
@@ -51,7 +53,7 @@ def _rotate(s, q, i, j):
 
 
 @kernel
-def leave_out_rising(p, scale, s, q):
+def leave_out_rising(p: Doubles, scale: Doubles, s: Doubles, q: Doubles) -> None:
     """Take out of the slopes p [3, 3] the directions in which they rise; `scale` are twists of unit energy."""
     for i in range(3):
         for j in range(3):
@@ -67,7 +69,7 @@ def leave_out_rising(p, scale, s, q):
 
 
 @kernel
-def solved(m, x, n):
+def solved(m: Doubles, x: Doubles, n: int) -> float:
     """Solve `m x' = x` in place, by elimination with pivots; return the sign of the determinant.
 
     m [n, n] is lost. Where it is singular, the numbers that it does not determine are 0.

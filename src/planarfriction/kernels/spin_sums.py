@@ -11,11 +11,14 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from planarfriction.compiler import jit
+from planarfriction.kernels.vectors import Vector
 
 
 @jit
-def spin_sum(x, y, w, cx, cy):
+def spin_sum(x: np.ndarray, y: np.ndarray, w: np.ndarray, cx: float, cy: float) -> Vector:
     """Return `sum w v/|v|` and `sum w rho x v/|v|` of a unit spin about `(cx, cy)`; a cell there adds nothing."""
     hx, hy, ht = 0.0, 0.0, 0.0
     for i in range(x.shape[0]):
@@ -29,7 +32,9 @@ def spin_sum(x, y, w, cx, cy):
 
 
 @jit
-def smoothed_spin_sum(corners, grid, x, y, w, cx, cy):
+def smoothed_spin_sum(
+    corners: np.ndarray, grid: Vector, x: np.ndarray, y: np.ndarray, w: np.ndarray, cx: float, cy: float
+) -> Vector:
     """Return `spin_sum` blended bilinearly over the corners of the grid cell that holds the centre of rotation.
 
     As published: the cell index is truncated toward zero, so up to one cell outside the low edges the first cell is
@@ -58,7 +63,10 @@ def smoothed_spin_sum(corners, grid, x, y, w, cx, cy):
 
 
 @jit
-def smoothed_nodes(corners, grid, x, y, w, radius, size, nodes):
+def smoothed_nodes(
+    corners: np.ndarray, grid: Vector, x: np.ndarray, y: np.ndarray, w: np.ndarray, radius: float, size: int,
+    nodes: np.ndarray,
+) -> None:  # fmt: skip
     """Write `h` at `[size + 1, 4 size + 1]` directions of the scaled twist from smoothed sums; torque over `radius`."""
     segment = 0.5 * math.pi / size
     for i in range(size + 1):

@@ -10,24 +10,25 @@ on the body at its centre of mass, where `a` and `angle` are the pose of the anc
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import at
-from planarfriction.kernels.vectors import plus
+from planarfriction.compiler.memory import Doubles, at
+from planarfriction.kernels.vectors import Vector, plus
 
 STIFFNESS, DAMPING, TORSION, TORSION_DAMPING, AT_X, AT_Y = range(6)
 """Columns of `Motion.spring`."""
 
 
 @kernel
-def _arm(spring, theta):
+def _arm(spring: Doubles, theta: float) -> Vector:
     """Return the lever arm of the point of a spring, world axes."""
     cos, sin = math.cos(theta), math.sin(theta)
     return cos * spring[AT_X] - sin * spring[AT_Y], sin * spring[AT_X] + cos * spring[AT_Y]
 
 
 @kernel
-def _force(spring, anchor, since, body, rx, ry):
+def _force(spring: Doubles, anchor: Doubles, since: float, body: Doubles, rx: float, ry: float) -> Vector:
     """Return the force of a spring on the body at `body` (velocity and pose)."""
     x, y = anchor[0] + since * anchor[3], anchor[1] + since * anchor[4]
     fx = spring[STIFFNESS] * (x - body[3] - rx) + spring[DAMPING] * (anchor[3] - body[0] + body[2] * ry)
@@ -36,7 +37,7 @@ def _force(spring, anchor, since, body, rx, ry):
 
 
 @kernel
-def spring_wrench(motion, count, piece, since, body):
+def spring_wrench(motion: Any, count: int, piece: int, since: float, body: Doubles) -> Vector:
     """Return the wrench of all springs on the body at its centre of mass."""
     total = (0.0, 0.0, 0.0)
     for i in range(count):
@@ -50,7 +51,7 @@ def spring_wrench(motion, count, piece, since, body):
 
 
 @kernel
-def spring_drift(motion, count, piece, theta):
+def spring_drift(motion: Any, count: int, piece: int, theta: float) -> Vector:
     """Return the change of `spring_wrench` with the time alone."""
     total = (0.0, 0.0, 0.0)
     for i in range(count):
@@ -62,7 +63,16 @@ def spring_drift(motion, count, piece, theta):
 
 
 @kernel
-def add_spring_slopes(motion, count, piece, since, body, per_shift, to_pose, matrix):
+def add_spring_slopes(
+    motion: Any,
+    count: int,
+    piece: int,
+    since: float,
+    body: Doubles,
+    per_shift: float,
+    to_pose: Doubles,
+    matrix: Doubles,
+) -> None:
     """Add the accelerations by pose [3, 3], times `per_shift`, to `to_pose`, and with those by velocity to `matrix`."""
     for i in range(count):
         spring, anchor = at(motion.spring, 6 * i), at(motion.anchor, 6 * (piece * count + i))

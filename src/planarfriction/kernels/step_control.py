@@ -1,4 +1,4 @@
-"""Lengths of the steps of adaptive methods: the motion's, and those of its derivatives."""
+"""Lengths of the steps of adaptive methods, for the motion and for its derivatives."""
 
 from __future__ import annotations
 
@@ -31,29 +31,29 @@ _EXACT = 1e-10
 
 
 @kernel
-def fitted(step, remaining):
-    """Return a length that is stretched to the end, or halves what is left, so that no sliver of a step remains."""
+def fitted(step: float, remaining: float) -> float:
+    """Return a length that is stretched to the end, or halves the rest, so that no sliver of a step remains."""
     return step if 2.0 * step <= remaining else (remaining if step >= remaining else 0.5 * remaining)
 
 
 @kernel
-def growth(pace, error, order, most):
+def growth(pace: Pace, error: float, order: float, most: float) -> float:
     """Return the factor, at most `most`, between the next step and one with an error in units of the tolerance."""
     ideal = pace.safety * xp.maximum(error, _EXACT) ** (-1.0 / order)
     return xp.minimum(most, xp.maximum(pace.shrinkage, ideal))
 
 
 @kernel
-def length(pace, local, reach, remaining):
+def length(pace: float, local: float, reach: float, remaining: float) -> float:
     """Return the length of a step of derivatives, `pace` steps of the motion, whose step there is `local` long.
 
-    It ends within `reach`, and `fitted` to what remains.
+    It ends within `reach`, and is `fitted` to the rest.
     """
     return fitted(xp.minimum(pace * local, reach), remaining)
 
 
 @kernel
-def judged(pace, error, h, local):
+def judged(pace: float, error: float, h: float, local: float) -> tuple[bool, float]:
     """Return True if a step of derivatives is accepted, and the pace of the next.
 
     A step shorter than `SHORTEST` is accepted with any error: the Jacobian may jump within it.

@@ -17,8 +17,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
+from planarfriction.compiler.memory import Doubles
+from planarfriction.kernels.vectors import Vector
 
 BILINEAR, POTENTIAL, ELLIPSOID, CELLS = 0, 1, 2, 3
 
@@ -32,7 +36,7 @@ _AT_REST = 1e-14
 
 
 @kernel
-def place(size, x, y, s):
+def place(size: int, x: float, y: float, s: float) -> tuple:
     """Table coordinates of a direction with `s >= 0`: polar and azimuth cell, position within it, and the angles."""
     per_segment = size / (0.5 * math.pi)
     polar = xp.atan2(math.sqrt(x * x + y * y), s)
@@ -45,7 +49,7 @@ def place(size, x, y, s):
 
 
 @kernel
-def _sines(x, y, s, polar):
+def _sines(x: float, y: float, s: float, polar: float) -> Vector:
     """Sine and cosine of the polar angle, which stays `_AXIS` away from the axis, and of the azimuth."""
     across = math.sqrt(x * x + y * y)
     per_across = 1.0 / xp.where(across > 0.0, across, 1.0)
@@ -57,7 +61,9 @@ def _sines(x, y, s, polar):
 
 
 @kernel
-def bilinear_blend(low_left, low_right, high_left, high_right, a, b):
+def bilinear_blend(
+    low_left: float, low_right: float, high_left: float, high_right: float, a: float, b: float
+) -> Vector:
     """Bilinear value from four corners and its differences along the polar angle and the azimuth."""
     low = low_left + b * (low_right - low_left)
     high = high_left + b * (high_right - high_left)
@@ -67,13 +73,13 @@ def bilinear_blend(low_left, low_right, high_left, high_right, a, b):
 
 
 @kernel
-def _corners(data, p, row, a, b):
+def _corners(data: Doubles, p: int, row: int, a: float, b: float) -> Vector:
     """`bilinear_blend` of one component at a place in a table."""
     return bilinear_blend(data[p], data[p + 4], data[p + row], data[p + row + 4], a, b)
 
 
 @kernel
-def _bilinear(data, start, size, x, y, s, speed):
+def _bilinear(data: Doubles, start: int, size: int, x: float, y: float, s: float, speed: float) -> Vector:
     i, j, a, b, _, _ = place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
@@ -86,7 +92,7 @@ def _bilinear(data, start, size, x, y, s, speed):
 
 
 @kernel
-def bilinear_frame(size, x, y, s, polar):
+def bilinear_frame(size: int, x: float, y: float, s: float, polar: float) -> tuple[Vector, Vector, Vector]:
     """Radial direction, and the slopes of the table coordinates in space, for the Jacobian of `_bilinear`."""
     per_segment = size / (0.5 * math.pi)
     sin_p, cos_p, sin_a, cos_a = _sines(x, y, s, polar)
@@ -97,13 +103,13 @@ def bilinear_frame(size, x, y, s, polar):
 
 
 @kernel
-def bilinear_inset(size, a, polar):
+def bilinear_inset(size: int, a: float, polar: float) -> float:
     """Position within the polar cell at which the Jacobian is taken: the axis has none."""
     return xp.where(polar < _AXIS, _AXIS * size / (0.5 * math.pi), a)
 
 
 @kernel
-def _bilinear_jacobian(data, start, size, x, y, s, out):
+def _bilinear_jacobian(data: Doubles, start: int, size: int, x: float, y: float, s: float, out: Doubles) -> None:
     i, j, a, b, polar, _ = place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
@@ -116,7 +122,7 @@ def _bilinear_jacobian(data, start, size, x, y, s, out):
 
 
 @kernel
-def _hermite(t):
+def _hermite(t: float) -> tuple[Vector, Vector, Vector]:
     """Cubic Hermite basis on [0, 1]: values, first and second derivatives; order value 0, value 1, slope 0, slope 1."""
     u = 1.0 - t
     value = ((1.0 + 2.0 * t) * u * u, t * t * (3.0 - 2.0 * t), t * u * u, -t * t * u)
@@ -126,7 +132,7 @@ def _hermite(t):
 
 
 @kernel
-def _blend(data, p, row, segment, a, b, whole):
+def _blend(data: Doubles, p: int, row: int, segment: float, a: Vector, b: Vector, whole: float) -> float:
     """Bicubic value from the basis `a` along the polar angle and `b` along the azimuth.
 
     Azimuth's neighbours enter by their differences: near the spin axis, where they are equal but for little, its second
@@ -145,7 +151,7 @@ def _blend(data, p, row, segment, a, b, whole):
 
 
 @kernel
-def _tilt(ax, ay, x, y, s):
+def _tilt(ax: float, ay: float, x: float, y: float, s: float) -> tuple[float, Vector]:
     """`c = (a . V) s^2/|V|^2` at a unit vector with `s >= 0`, and `n`: the gradient of c is `n - 2 c V`.
 
     The force in a pure spin tilts the dissipation about the spin axis, where polar coordinates cannot hold a slope: an
@@ -157,7 +163,7 @@ def _tilt(ax, ay, x, y, s):
 
 
 @kernel
-def _potential(data, start, size, x, y, s, speed):
+def _potential(data: Doubles, start: int, size: int, x: float, y: float, s: float, speed: float) -> Vector:
     i, j, a, b, polar, azimuth = place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
@@ -182,7 +188,7 @@ def _potential(data, start, size, x, y, s, speed):
 
 
 @kernel
-def _potential_jacobian(data, start, size, x, y, s, out):
+def _potential_jacobian(data: Doubles, start: int, size: int, x: float, y: float, s: float, out: Doubles) -> None:
     i, j, a, b, polar, _ = place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
@@ -220,7 +226,7 @@ def _potential_jacobian(data, start, size, x, y, s, out):
 
 
 @kernel
-def _cells(data, start, size, x, y, s, speed):
+def _cells(data: Doubles, start: int, size: int, x: float, y: float, s: float, speed: float) -> Vector:
     hx, hy, hs = 0.0, 0.0, 0.0
     for i in range(size):
         px, py, w = data[start + i], data[start + size + i], data[start + 2 * size + i]
@@ -234,7 +240,9 @@ def _cells(data, start, size, x, y, s, speed):
 
 
 @kernel
-def _cells_jacobian(data, start, size, x, y, s, speed, out):
+def _cells_jacobian(
+    data: Doubles, start: int, size: int, x: float, y: float, s: float, speed: float, out: Doubles
+) -> None:
     radial = (x / speed, y / speed, s / speed)
     for i in range(9):
         out[i] = 0.0
@@ -253,7 +261,7 @@ def _cells_jacobian(data, start, size, x, y, s, speed, out):
 
 
 @kernel
-def sliding(kind, data, start, size, x, y, s, speed):
+def sliding(kind: int, data: Doubles, start: int, size: int, x: float, y: float, s: float, speed: float) -> Vector:
     """`u = h(V) |V_S|` of the scaled twist `(x, y, s)` of norm `speed`; the lower half sphere mirrors the upper."""
     if kind == ELLIPSOID:
         return x, y, s
@@ -270,7 +278,9 @@ def sliding(kind, data, start, size, x, y, s, speed):
 
 
 @kernel
-def sliding_jacobian(kind, data, start, size, x, y, s, speed, out):
+def sliding_jacobian(
+    kind: int, data: Doubles, start: int, size: int, x: float, y: float, s: float, speed: float, out: Doubles
+) -> None:
     """Write `du/dV_S`, nine numbers row by row; at rest, where it has no value, the ellipsoid's.
 
     `u` is homogeneous, so that `u = du/dV_S V_S`.
@@ -288,12 +298,12 @@ def sliding_jacobian(kind, data, start, size, x, y, s, speed, out):
 
 
 @kernel
-def _norm(twist):
+def _norm(twist: np.ndarray) -> float:
     return math.sqrt(twist[0] * twist[0] + twist[1] * twist[1] + twist[2] * twist[2])
 
 
 @jit
-def sliding_batch(kind, data, start, size, twist, u):
+def sliding_batch(kind: int, data: np.ndarray, start: int, size: int, twist: np.ndarray, u: np.ndarray) -> None:
     """`sliding` for scaled twists `[M, 3]` into `u [M, 3]`."""
     for m in range(twist.shape[0]):
         v = twist[m]
@@ -301,7 +311,9 @@ def sliding_batch(kind, data, start, size, twist, u):
 
 
 @jit
-def sliding_jacobian_batch(kind, data, start, size, twist, jacobian):
+def sliding_jacobian_batch(
+    kind: int, data: np.ndarray, start: int, size: int, twist: np.ndarray, jacobian: np.ndarray
+) -> None:
     """`sliding_jacobian` for scaled twists `[M, 3]` into `jacobian [M, 9]`."""
     for m in range(twist.shape[0]):
         v = twist[m]

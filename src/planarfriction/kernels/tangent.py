@@ -7,7 +7,7 @@ stage is one `factor` and, for each parameter, one `solve` of `body`,
     b_i = s + h sum_{j<i} a_ij G_j,   (I/(h gamma) - J_i) S_i = b_i/(h gamma) + df/dp,   G_i = (S_i - b_i)/(h gamma)
 
 with `J_i` at the cubic Hermite interpolant between the accepted steps of the motion. Derivatives need fewer digits than
-the motion, so that one step of theirs goes over several of it; the embedded method of order 3 tells how many.
+the motion, so that one of their steps spans several steps of the motion; the embedded method of order 3 tells how many.
 
 Friction and size enter by scaling: with all coefficients `g` times m, a bristle behaves as `z/m` did, `zdot(z; m) =
 zdot(z/m; 1)`; a patch `l` times as large sees `l omega` and gives `l tau`. So does the load of a fixed stiffness, whose
@@ -23,9 +23,10 @@ import numpy as np
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.calls import call, pointer
-from planarfriction.compiler.memory import arrays_at, at
+from planarfriction.compiler.memory import Doubles, Place, arrays_at, at
 from planarfriction.kernels.body import (
     NO_LOAD,
+    SystemRecord,
     function_of,
     hardly_loaded,
     linearisation_of,
@@ -36,11 +37,12 @@ from planarfriction.kernels.body import (
     seen_by,
 )
 from planarfriction.kernels.contacts import CHANGE, ROWS
-from planarfriction.kernels.path import hold, node_after
+from planarfriction.kernels.path import Path, Stretch, Tolerances, hold, node_after
 from planarfriction.kernels.rosenbrock import forget_unloaded
 from planarfriction.kernels.sdirk import (
     GAMMA,
     PLACES,
+    Workspace,
     accept,
     error_of,
     keep_stage,
@@ -50,7 +52,7 @@ from planarfriction.kernels.sdirk import (
 )
 from planarfriction.kernels.small_matrices import applied
 from planarfriction.kernels.step_control import judged, length
-from planarfriction.kernels.vectors import applied_back, plus, put, three, times
+from planarfriction.kernels.vectors import Vector, applied_back, plus, put, three, times
 
 FRICTION, SIZE, MASS, INERTIA, LOAD = 0, 1, 2, 3, 4
 """Parameters; each is a factor, 1 as the scene is."""
@@ -78,23 +80,25 @@ class Drives(NamedTuple):
 
 
 MOST = 8
-"""Steps of the motion that one of the derivatives goes over at most, so that it passes over nothing sudden."""
+"""Most steps of the motion in a step of derivatives, which so passes over nothing sudden."""
 
 
 @kernel
-def change_of(own, piece, c, y, dy, dz, parameter, dzdot):
+def change_of(
+    system: SystemRecord, piece: int, c: int, y: Doubles, dy: Doubles, dz: Doubles, parameter: int, dzdot: Doubles
+) -> None:
     """Write the change of the bristle rates and of the wrench per unit load of contact c, for one of a parameter.
 
-    Pointers to all states, `y` linearised; `own.work.rows` holds V, W and dV and takes dW.
+    Pointers to all states, `y` linearised; `system.work.rows` holds V, W and dV and takes dW.
     """
-    first = own.contacts.state[c]
-    states = at(y, first), at(dy, first), linearisation_of(own, c), at(dz, first), at(dzdot, first)
+    first = system.contacts.state[c]
+    states = at(y, first), at(dy, first), linearisation_of(system, c), at(dz, first), at(dzdot, first)
     by = (1.0 if parameter == FRICTION else 0.0), (1.0 if parameter == SIZE else 0.0)
-    call(function_of(own, c, CHANGE), (record_of(own, piece, c), *states, own.work.rows, *by))
+    call(function_of(system, c, CHANGE), (record_of(system, piece, c), *states, system.work.rows, *by))
 
 
 @kernel
-def gained_load(parameter, place, c, load):
+def gained_load(parameter: int, place: int, c: int, load: float) -> float:
     """Return the change of the load of contact c per change of an input."""
     if parameter == NORMAL_FORCE:
         return 1.0 if c == place else 0.0
@@ -102,18 +106,20 @@ def gained_load(parameter, place, c, load):
 
 
 @kernel
-def follow_load(own, c, y, load, more, dy):
-    """Add to the change `dy` of the bristles of contact c, if their stiffness is fixed, that by `more` load."""
-    reference = own.contacts.reference[c]
+def follow_load(system: SystemRecord, c: int, y: Doubles, load: float, more: float, dy: Doubles) -> None:
+    """Add to the change `dy` of the bristles of contact c, if their stiffness is fixed, the change by `more` load."""
+    reference = system.contacts.reference[c]
     if reference > 0.0 and load > NO_LOAD * reference:
-        for m in range(own.contacts.state[c], own.contacts.state[c + 1]):
+        for m in range(system.contacts.state[c], system.contacts.state[c + 1]):
             dy[m] -= more / load * y[m]
 
 
 @kernel
-def partial_of(own, piece, since, w, parameter, place, out):
-    """Write `df/dp` of an input at the held state, linearised last; of a prescribed velocity that by its slope."""
-    o, inverse_mass = own.bristles, own.motion.inverse_mass
+def partial_of(
+    system: SystemRecord, piece: int, since: float, w: Workspace, parameter: int, place: int, out: Doubles
+) -> None:
+    """Write `df/dp` of an input at the state linearised last; of a prescribed velocity, `df/d slope`."""
+    o, inverse_mass = system.bristles, system.motion.inverse_mass
     for i in range(o + 6):
         out[i] = 0.0
     if parameter == VELOCITY:
@@ -123,45 +129,54 @@ def partial_of(own, piece, since, w, parameter, place, out):
     elif parameter in (MASS, INERTIA):
         for i in range(3):
             if (i == 2) == (parameter == INERTIA) and inverse_mass[i] > 0.0:
-                out[o + i] = own.motion.acceleration[3 * piece + i] - w.rate[o + i]
+                out[o + i] = system.motion.acceleration[3 * piece + i] - w.rate[o + i]
     elif parameter != INITIAL:
-        _partial_of_contacts(own, piece, since, w, parameter, place, out)
+        _partial_of_contacts(system, piece, since, w, parameter, place, out)
 
 
 @kernel
-def _partial_of_contacts(own, piece, since, w, parameter, place, out):
+def _partial_of_contacts(
+    system: SystemRecord, piece: int, since: float, w: Workspace, parameter: int, place: int, out: Doubles
+) -> None:
     total = (0.0, 0.0, 0.0)
-    for c in range(own.size):
+    for c in range(system.size):
         if parameter != NORMAL_FORCE or c == place:
-            change = wrench_by_input(own, piece, since, c, w.state, w, parameter, place, out)
-            total = plus(total, own.contacts.count[c], applied_back(maps_of(own, c)[0], change))
+            change = wrench_by_input(system, piece, since, c, w.state, w, parameter, place, out)
+            total = plus(total, system.contacts.count[c], applied_back(maps_of(system, c)[0], change))
     for i in range(3):
-        out[own.bristles + i] = own.motion.inverse_mass[i] * total[i]
+        out[system.bristles + i] = system.motion.inverse_mass[i] * total[i]
 
 
 @kernel
-def wrench_by_input(own, piece, since, c, y, w, parameter, place, out):
-    """Return the change of the wrench of contact c by an input that scales it, and write those of bristle rates.
+def wrench_by_input(
+    system: SystemRecord, piece: int, since: float, c: int, y: Doubles, w: Workspace, parameter: int, place: int,
+    out: Doubles,
+) -> Vector:  # fmt: skip
+    """Return the change of the wrench of contact c by an input that scales it, and write the changes of bristle rates.
 
-    The state is held, and linearised last; `w.right` is scratch.
+    The workspace holds the state, linearised last; `w.right` is scratch.
     """
-    rows, load, unit = arrays_at(ROWS, own.work.rows), load_of(own, piece, since, c), three(at(own.work.wrench, 3 * c))
+    rows, load, unit = (
+        arrays_at(ROWS, system.work.rows),
+        load_of(system, piece, since, c),
+        three(at(system.work.wrench, 3 * c)),
+    )
     more = gained_load(parameter, place, c, load)
     put(rows.d_wrench, (0.0, 0.0, 0.0))
-    if parameter in (FRICTION, SIZE) or (more > 0.0 and own.contacts.reference[c] > 0.0):
-        put(rows.twist, applied(maps_of(own, c)[0], seen_by(own, c, y)))
+    if parameter in (FRICTION, SIZE) or (more > 0.0 and system.contacts.reference[c] > 0.0):
+        put(rows.twist, applied(maps_of(system, c)[0], seen_by(system, c, y)))
         put(rows.wrench, unit)
         put(rows.d_twist, (0.0, 0.0, 0.0))
-        for m in range(own.contacts.state[c], own.contacts.state[c + 1]):
+        for m in range(system.contacts.state[c], system.contacts.state[c + 1]):
             w.right[m] = 0.0
-        follow_load(own, c, y, load, more, w.right)
-        change_of(own, piece, c, y, w.rate, w.right, parameter, out)
+        follow_load(system, c, y, load, more, w.right)
+        change_of(system, piece, c, y, w.rate, w.right, parameter, out)
     return plus(times(load, three(rows.d_wrench)), more, unit)
 
 
 @kernel
-def _share(drives, p, since):
-    """Return the share of a number's change in that of its input."""
+def _share(drives: Drives, p: int, since: float) -> float:
+    """Return the share of a number's change in the change of its input."""
     kind = drives.kind[p]
     if kind in (NORMAL_FORCE, FORCE):
         return drives.weight[p, 0] + drives.weight[p, 1] * since
@@ -169,14 +184,16 @@ def _share(drives, p, since):
 
 
 @kernel
-def _step(system, own, path, k, last, since, h, slope, drives, w):
+def _step(
+    address: Place, path: Path, k: int, last: int, since: float, h: float, slope: Doubles, drives: Drives, w: Workspace
+) -> None:
     """Carry `slope` over `h` seconds into `w.new`."""
-    piece, n, shift = path.piece[k], path.state.shape[1], 1.0 / (h * GAMMA)
+    system, piece, n, shift = read(address), path.piece[k], path.state.shape[1], 1.0 / (h * GAMMA)
     for i in range(PLACES.shape[0]):
         time = since + h * PLACES[i]
-        hold(system, own, path, node_after(path, k, last, time), time, shift, w)
+        hold(address, path, node_after(path, k, last, time), time, shift, w)
         for u in range(drives.input_kind.shape[0]):
-            partial_of(own, piece, time, w, drives.input_kind[u], drives.input_place[u], at(w.forcing, u * n))
+            partial_of(system, piece, time, w, drives.input_kind[u], drives.input_place[u], at(w.forcing, u * n))
         for p in range(drives.kind.shape[0]):
             d, forcing = variation_of(w, slope, p, drives.input[p], n), at(w.forcing, drives.input[p] * n)
             stage_base(i, h, n, d, w.base)
@@ -186,28 +203,32 @@ def _step(system, own, path, k, last, since, h, slope, drives, w):
             if share != 0.0:
                 for m in range(n):
                     w.right[m] += share * forcing[m]
-            call(own.solve, (system, piece, time, w.state, shift, w.right, d.new))
+            call(system.solve, (address, piece, time, w.state, shift, w.right, d.new))
             keep_stage(i, shift, n, d, w.base)
 
 
 @jit
-def propagate(system, path, first, last, begin, until, slope, drives, rtol, atol, workspace):
-    """Carry `slope` [P, n] from `begin` to `until` seconds into a piece, whose nodes are `first` to `last` of a path.
+def propagate(
+    address: Place, path: Path, stretch: Stretch, slope: np.ndarray, drives: Drives, tolerances: Tolerances,
+    workspace: Place,
+) -> int:  # fmt: skip
+    """Carry `slope` [P, n] along a stretch of a path; return the number of steps.
 
-    Returns the number of steps. Each keeps its error below `rtol`, `atol` [n], unless it is one of the shortest.
+    Each step keeps its error below the tolerances, unless it is one of the shortest.
     """
-    own, w, n, slope, atol = read(system), read_workspace(workspace), slope.shape[1], pointer(slope), pointer(atol)
-    taken, k, since = 0, first, begin
+    system, w, n, slope = read(address), read_workspace(workspace), slope.shape[1], pointer(slope)
+    last, until, rtol, atol = stretch.last, stretch.until, tolerances.rtol, pointer(tolerances.atol)
+    taken, k, since = 0, stretch.first, stretch.begin
     while since < until:
         k = node_after(path, k, last, since)
         local, remaining = path.since[k + 1] - path.since[k], until - since
         h = length(w.pace[0], local, path.since[xp.minimum(k + MOST, last)] - since, remaining)
-        _step(system, own, path, k, last, since, h, slope, drives, w)
+        _step(address, path, k, last, since, h, slope, drives, w)
         taken += 1
         error, known = 0.0, 1.0 if since > 0.0 else 0.0
         for p in range(drives.kind.shape[0]):
             d = variation_of(w, slope, p, drives.input[p], n)
-            error = xp.maximum(error, error_of(own, n, d, h, known, rtol, atol))
+            error = xp.maximum(error, error_of(system, n, d, h, known, rtol, atol))
         accepted, w.pace[0] = judged(w.pace[0], error, h, local)
         if accepted:
             since = until if h == remaining else since + h
@@ -217,47 +238,54 @@ def propagate(system, path, first, last, begin, until, slope, drives, rtol, atol
 
 
 @jit
-def forget(system, piece, slope):
-    """Clear the slopes [P, n] of contacts without load on a piece, at the end of it."""
-    own = read(system)
+def forget(address: Place, piece: int, slope: np.ndarray) -> None:
+    """Clear the slopes [P, n] of contacts without load on a piece, at its end."""
+    system = read(address)
     for p in range(slope.shape[0]):
-        forget_unloaded(own, piece, slope[p])
+        forget_unloaded(system, piece, slope[p])
 
 
 @jit
-def settle(system, piece, slope):
+def settle(address: Place, piece: int, slope: np.ndarray) -> None:
     """Clear the slopes [P, n] of contacts that start a piece with hardly any load (see `body.settle_all`)."""
-    own = read(system)
-    for c in range(own.size):
-        if hardly_loaded(own, piece, c):
+    system = read(address)
+    for c in range(system.size):
+        if hardly_loaded(system, piece, c):
             for p in range(slope.shape[0]):
-                for m in range(own.contacts.state[c], own.contacts.state[c + 1]):
+                for m in range(system.contacts.state[c], system.contacts.state[c + 1]):
                     slope[p, m] = 0.0
 
 
 @jit
-def wrench_slopes(system, piece, since, y, drives, slope, wrench, out, scratch):
+def wrench_slopes(
+    address: Place, piece: int, since: float, y: np.ndarray, drives: Drives, slope: np.ndarray, wrench: np.ndarray,
+    out: np.ndarray, scratch: np.ndarray,
+) -> None:  # fmt: skip
     """Write wrenches [C, 3] of one of the identical contacts, and from the slopes [P, n] of y theirs, `out` [C, 3, P].
 
     `scratch` [3, n] needs no values.
     """
-    own, n, y, slope = read(system), y.shape[0], pointer(y), pointer(slope)
-    rate, rows = pointer(scratch), arrays_at(ROWS, own.work.rows)
-    call(own.rates, (system, piece, since, y, rate))
-    call(own.linearise, (system, piece, y))
-    for c in range(own.size):
-        load, (a, g, _), unit = load_of(own, piece, since, c), maps_of(own, c), three(at(own.work.wrench, 3 * c))
-        put(rows.twist, applied(a, seen_by(own, c, y)))
+    system, n, y, slope = read(address), y.shape[0], pointer(y), pointer(slope)
+    rate, rows = pointer(scratch), arrays_at(ROWS, system.work.rows)
+    call(system.rates, (address, piece, since, y, rate))
+    call(system.linearise, (address, piece, y))
+    for c in range(system.size):
+        load, (a, g, _), unit = (
+            load_of(system, piece, since, c),
+            maps_of(system, c),
+            three(at(system.work.wrench, 3 * c)),
+        )
+        put(rows.twist, applied(a, seen_by(system, c, y)))
         put(rows.wrench, unit)
         wrench[c, 0], wrench[c, 1], wrench[c, 2] = times(load, unit)
         for p in range(drives.kind.shape[0]):
-            body, dz = at(slope, p * n + own.bristles), at(rate, 2 * n)
+            body, dz = at(slope, p * n + system.bristles), at(rate, 2 * n)
             put(rows.d_twist, plus(applied(a, body), 1.0, applied(g, at(body, 3))))
             more = gained_load(drives.kind[p], drives.place[p], c, load)
             if drives.kind[p] == NORMAL_FORCE:
                 more *= drives.weight[p, 0] + drives.weight[p, 1] * since
-            for m in range(own.contacts.state[c], own.contacts.state[c + 1]):
+            for m in range(system.contacts.state[c], system.contacts.state[c + 1]):
                 dz[m] = slope[p * n + m]
-            follow_load(own, c, y, load, more, dz)
-            change_of(own, piece, c, y, rate, dz, drives.kind[p], at(rate, n))
+            follow_load(system, c, y, load, more, dz)
+            change_of(system, piece, c, y, rate, dz, drives.kind[p], at(rate, n))
             out[c, 0, p], out[c, 1, p], out[c, 2, p] = plus(times(load, three(rows.d_wrench)), more, unit)

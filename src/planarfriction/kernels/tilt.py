@@ -11,8 +11,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
+from planarfriction.compiler.memory import Doubles
+from planarfriction.kernels.vectors import Vector
 
 SOFTNESS = 1e-9
 """Compliance of the centre of pressure [-]: it may miss the one asked for by so many radii of gyration, times the slope
@@ -22,16 +26,16 @@ FARTHEST = 100.0
 """Distance of the centre asked for, in radii of gyration, beyond which it is brought back: it lies outside."""
 
 STEPS, SHORTENINGS = 60, 30
-"""Newton steps at most, and times at most that one of them is shortened: both end after a few."""
+"""Newton steps at most, and times at most that a step is shortened: both end after a few."""
 
 NARROW = 1e-8
 """Square of the ratio of width to length below which cells count as a line, across which a plane does not tilt them."""
 
 OVERSHOT = 0.5
-"""Slope along a Newton step at which it may end, as a share of that at its start."""
+"""Slope along a Newton step at which it may end, as a share of the slope at its start."""
 
 REACH = 1e15
-"""Distance [m] at which a centre of pressure may be asked for; that of a load of nearly nothing lies beyond. Its square
+"""Distance [m] at which a centre of pressure may be asked for; a load of nearly nothing has one beyond. Its square
 is a number in single precision too, and its fifth power times a large twist one in double precision."""
 
 
@@ -57,13 +61,13 @@ class Scaled(NamedTuple):
 
 
 @kernel
-def centre(mx, my, load):
+def centre(mx: float, my: float, load: float) -> Vector:
     """Return the centre of pressure `(-m_y, m_x)/f_N` of a load > 0."""
     return xp.minimum(xp.maximum(-my / load, -REACH), REACH), xp.minimum(xp.maximum(mx / load, -REACH), REACH)
 
 
 @kernel
-def _scaled(x, y, w, n, total, cx, cy):
+def _scaled(x: Doubles, y: Doubles, w: Doubles, n: int, total: float, cx: float, cy: float) -> Scaled:
     x0, y0, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(n):
         x0, y0 = x0 + w[i] * x[i], y0 + w[i] * y[i]
@@ -80,21 +84,21 @@ def _scaled(x, y, w, n, total, cx, cy):
 
 
 @kernel
-def _at(plane, s, x, y):
+def _at(plane: Plane, s: Scaled, x: float, y: float) -> float:
     return plane.height + (plane.x * (x - s.x0) + plane.y * (y - s.y0)) * s.per_length
 
 
 @kernel
-def _fitted(x, y, w, n, total, s, plane, soft):
+def _fitted(x: Doubles, y: Doubles, w: Doubles, n: int, total: float, s: Scaled, plane: Plane, soft: float) -> Plane:
     """Return the plane that has total and centre with the cells that press under another one."""
-    own, mx, my, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    pressing, mx, my, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(n):
         if _at(plane, s, x[i], y[i]) > 0.0:
             u, v = (x[i] - s.x0) * s.per_length, (y[i] - s.y0) * s.per_length
-            own, mx, my = own + w[i], mx + w[i] * u, my + w[i] * v
-    if not own > 0.0:
+            pressing, mx, my = pressing + w[i], mx + w[i] * u, my + w[i] * v
+    if not pressing > 0.0:
         return plane
-    mx, my = mx / own, my / own
+    mx, my = mx / pressing, my / pressing
     for i in range(n):
         if _at(plane, s, x[i], y[i]) > 0.0:
             u, v = (x[i] - s.x0) * s.per_length - mx, (y[i] - s.y0) * s.per_length - my
@@ -102,23 +106,23 @@ def _fitted(x, y, w, n, total, s, plane, soft):
     xx, xy, yy = xx / total + soft, xy / total, yy / total + soft
     right, up, one = s.x - mx, s.y - my, xx * yy - xy * xy
     a, b = (yy * right - xy * up) / one, (xx * up - xy * right) / one
-    return Plane(total / own - a * mx - b * my, a, b)
+    return Plane(total / pressing - a * mx - b * my, a, b)
 
 
 @kernel
-def _slopes(x, y, w, n, total, s, plane, step):
+def _slopes(x: Doubles, y: Doubles, w: Doubles, n: int, total: float, s: Scaled, plane: Plane, step: Plane) -> Vector:
     """Return the slope of the dual along a step at a plane, and how the slope rises."""
-    found = SOFTNESS * (plane.x * step.x + plane.y * step.y) - step.height - step.x * s.x - step.y * s.y
+    slope = SOFTNESS * (plane.x * step.x + plane.y * step.y) - step.height - step.x * s.x - step.y * s.y
     rise = SOFTNESS * (step.x * step.x + step.y * step.y)
     for i in range(n):
-        here, along = _at(plane, s, x[i], y[i]), _at(step, s, x[i], y[i])
-        carried = w[i] / total * along if here > 0.0 else 0.0
-        found, rise = found + carried * here, rise + carried * along
-    return found, rise
+        level, along = _at(plane, s, x[i], y[i]), _at(step, s, x[i], y[i])
+        carried = w[i] / total * along if level > 0.0 else 0.0
+        slope, rise = slope + carried * level, rise + carried * along
+    return slope, rise
 
 
 @kernel
-def _same(x, y, n, s, one, other):
+def _same(x: Doubles, y: Doubles, n: int, s: Scaled, one: Plane, other: Plane) -> bool:
     same = True
     for i in range(n):
         same = same and (_at(one, s, x[i], y[i]) > 0.0) == (_at(other, s, x[i], y[i]) > 0.0)
@@ -126,26 +130,26 @@ def _same(x, y, n, s, one, other):
 
 
 @kernel
-def _moved(plane, far, step):
+def _stepped(plane: Plane, far: float, step: Plane) -> Plane:
     return Plane(plane.height + far * step.height, plane.x + far * step.x, plane.y + far * step.y)
 
 
 @kernel
-def _share_of(x, y, w, n, total, s, plane, step):
-    """Return the share of a step to go: all of it, or to about where the dual is least along it."""
+def _share_of(x: Doubles, y: Doubles, w: Doubles, n: int, total: float, s: Scaled, plane: Plane, step: Plane) -> float:
+    """Return the share of a step to go: all, or to about where the dual is least along the step."""
     first, low, high, far = _slopes(x, y, w, n, total, s, plane, step)[0], 0.0, 1.0, 1.0
     for _ in range(SHORTENINGS):
-        here, rise = _slopes(x, y, w, n, total, s, _moved(plane, far, step), step)
-        if not (abs(here) > OVERSHOT * abs(first)) or (far == 1.0 and here < 0.0):
+        slope, rise = _slopes(x, y, w, n, total, s, _stepped(plane, far, step), step)
+        if not (abs(slope) > OVERSHOT * abs(first)) or (far == 1.0 and slope < 0.0):
             break
-        low, high = (low, far) if here > 0.0 else (far, high)
-        next_one = far - here / rise
+        low, high = (low, far) if slope > 0.0 else (far, high)
+        next_one = far - slope / rise
         far = next_one if low < next_one and next_one < high else 0.5 * (low + high)
     return far
 
 
 @kernel
-def _plane(x, y, w, n, total, s):
+def _plane(x: Doubles, y: Doubles, w: Doubles, n: int, total: float, s: Scaled) -> Plane:
     """Return the plane."""
     plane = Plane(1.0, 0.0, 0.0)
     for i in range(STEPS):
@@ -153,18 +157,18 @@ def _plane(x, y, w, n, total, s):
         if _same(x, y, n, s, plane, whole):
             return whole
         step = Plane(whole.height - plane.height, whole.x - plane.x, whole.y - plane.y)
-        plane = _moved(plane, _share_of(x, y, w, n, total, s, plane, step), step)
+        plane = _stepped(plane, _share_of(x, y, w, n, total, s, plane, step), step)
     return plane
 
 
 @kernel
-def tilt(x, y, w, n, cx, cy, out):
+def tilt(x: Doubles, y: Doubles, w: Doubles, n: int, cx: float, cy: float, out: Doubles) -> None:
     """Write the weights of n cells at x, y, of weights w, with their centre of pressure at (cx, cy) if cells reach it.
 
     A centre beyond all cells comes to the nearest point that they reach: the load goes to an edge, or to one cell. The
     total stays. Cells without weight get none. `out` may be w.
     """
-    total, found = 0.0, 0.0
+    total, pressed = 0.0, 0.0
     for i in range(n):
         total += w[i]
     if not total > 0.0:
@@ -175,13 +179,13 @@ def tilt(x, y, w, n, cx, cy, out):
     plane = _plane(x, y, w, n, total, s)
     for i in range(n):
         out[i] = w[i] * xp.maximum(_at(plane, s, x[i], y[i]), 0.0)
-        found += out[i]
+        pressed += out[i]
     for i in range(n):
-        out[i] *= total / found
+        out[i] *= total / pressed
 
 
 @jit
-def tilt_many(x, y, weights, centres, out):
+def tilt_many(x: np.ndarray, y: np.ndarray, weights: np.ndarray, centres: np.ndarray, out: np.ndarray) -> None:
     """Tilt the rows of weights `[B, N]` to the centres `[B, 2]`; x, y are `[N]` or rows of their own, as `[B, N]`."""
     for b in range(weights.shape[0]):
         row = b if x.shape[0] > 1 else 0

@@ -1,7 +1,7 @@
-"""Straight-line functions traced with symbols: what they compute, operation by operation.
+"""Straight-line functions traced with symbols, operation by operation.
 
 A kernel is called in Python with `Number`s instead of floats, which note each operation on a `Trace`. A function
-that asks which way a comparison goes is traced once for either answer, and a `Branch` joins what comes out. Loops run
+that asks which way a comparison goes is traced once for either answer, and a `Branch` joins the results. Loops run
 as long as their count is known. Compiled functions are called through their Python twins (see `twins`).
 """
 
@@ -28,8 +28,8 @@ class Operation(NamedTuple):
     kind: str
     """"real", "index", "wide" (64 bits) or "bool"."""
     text: str
-    """Its source with `{0}`, `{1}` for the arguments, and `$` before the name of a mathematical function, `@` before
-    that of a function of `compiled_math`, whose domain may be smaller."""
+    """Source with `{0}`, `{1}` for the arguments, `$` before the name of a mathematical function, and `@` before the
+    name of a function of `compiled_math`, whose domain may be smaller."""
     arguments: tuple[Any, ...]
     """Names, or constants of Python."""
 
@@ -132,7 +132,7 @@ class Number:
 
 
 def _key(argument: Any) -> Any:
-    """Return what tells arguments of a call apart."""
+    """Return a key that tells arguments of a call apart."""
     if isinstance(argument, list):
         return tuple(map(_key, argument))
     if isinstance(argument, Number):
@@ -154,7 +154,7 @@ def kind_of(arguments: tuple) -> str:
 
 
 class Trace:
-    """Record of what a function does, operation by operation; the same operation is noted once."""
+    """Record of a function, operation by operation; the same operation is noted once."""
 
     def __init__(self) -> None:
         self.operations: list[Any] = []
@@ -258,7 +258,7 @@ class Table:
 
 
 def traced(function: Callable[[Trace], Any]) -> Block:
-    """Return what a function of a `Trace` computes; its results are a number, or tuples of them, one after another."""
+    """Return the operations of a function of a `Trace`; its results are numbers or tuples, one after another."""
     trace = Trace()
     results = flat(trace.call(function, (trace,)))
     return Block(trace.operations, tuple(each.name if isinstance(each, Number) else float(each) for each in results))
@@ -302,7 +302,7 @@ _pow = _function("$pow({0}, {1})", math.pow)
 
 
 class Mathematics:
-    """Functions for symbols instead of those of `math` and what kernels take from NumPy."""
+    """Functions for symbols in place of `math` and of the functions that kernels take from NumPy."""
 
     pi, inf = math.pi, math.inf
     where, power = staticmethod(_where), staticmethod(_power)
@@ -322,7 +322,7 @@ class Mathematics:
 
 
 class CompiledMathematics(Mathematics):
-    """Functions for symbols instead of those of `compiled_math`."""
+    """Functions for symbols in place of `compiled_math`."""
 
     exp = staticmethod(_function("@exp({0})", math.exp))
     sin = staticmethod(_function("@sin({0})", math.sin))

@@ -48,7 +48,7 @@ def _put(row: Any, numbers: tuple) -> None:
 
 
 def _rounded(x: Any) -> tuple[Any, Any]:
-    """Return what `compiled_math.rounded` does, in a form that compilers may reorder."""
+    """Compute `compiled_math.rounded` in a form that compilers may reorder."""
     k = CompiledMathematics.floor(x + 0.5)
     return k, CompiledMathematics.of_bits((CompiledMathematics.wide(k) + 1023) << 52)
 
@@ -94,7 +94,7 @@ SYMBOLS = (
     (memory.at, _At),
     (published_contact.read, lambda record: record),
 )
-"""What compiled functions see as globals, and what stands for it where they take symbols."""
+"""Globals of compiled functions, each with its counterpart for symbols."""
 
 NAMES = {"int": Mathematics.integer, "float": Mathematics.real}
 """Built-in functions that symbols have functions of their own for."""

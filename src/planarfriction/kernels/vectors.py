@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
+import numpy as np
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
 from planarfriction.compiler import kernel
+from planarfriction.compiler.memory import Doubles
 
 Vector = tuple[float, ...]
 """Vector in compiled code, or a matrix row by row."""
@@ -17,10 +21,10 @@ _FLAGS = ("reassoc", "contract", "nsz", "arcp")
 
 
 @intrinsic
-def dot(typingctx, a, b):
+def dot(typingctx: Any, a: types.Type, b: types.Type) -> Any:
     """Return `a . b`."""
 
-    def generate(context, builder, signature, args):
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         parts = zip(*(cgutils.unpack_tuple(builder, vector) for vector in args), strict=True)
         products = [builder.fmul(x, y, flags=_FLAGS) for x, y in parts]
         total = products[0]
@@ -32,10 +36,10 @@ def dot(typingctx, a, b):
 
 
 @intrinsic
-def times(typingctx, c, a):
+def times(typingctx: Any, c: types.Type, a: types.Type) -> Any:
     """Return `c a`."""
 
-    def generate(context, builder, signature, args):
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         parts = cgutils.unpack_tuple(builder, args[1])
         return context.make_tuple(
             builder, signature.return_type, [builder.fmul(args[0], x, flags=_FLAGS) for x in parts]
@@ -45,10 +49,10 @@ def times(typingctx, c, a):
 
 
 @intrinsic
-def plus(typingctx, a, c, b):
+def plus(typingctx: Any, a: types.Type, c: types.Type, b: types.Type) -> Any:
     """Return `a + c b`, a record if a is one."""
 
-    def generate(context, builder, signature, args):
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         parts = zip(cgutils.unpack_tuple(builder, args[0]), cgutils.unpack_tuple(builder, args[2]), strict=True)
         sums = [builder.fadd(x, builder.fmul(args[1], y, flags=_FLAGS), flags=_FLAGS) for x, y in parts]
         return context.make_tuple(builder, signature.return_type, sums)
@@ -58,10 +62,10 @@ def plus(typingctx, a, c, b):
 
 
 @intrinsic
-def zeros(typingctx, a):
+def zeros(typingctx: Any, a: types.Type) -> Any:
     """Return a vector of zeros as long as a."""
 
-    def generate(context, builder, signature, args):
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         zero = context.get_constant(types.float64, 0.0)
         return context.make_tuple(builder, signature.return_type, [zero] * len(a))
 
@@ -69,12 +73,12 @@ def zeros(typingctx, a):
 
 
 @intrinsic(prefer_literal=True)
-def placed(typingctx, a, i, x):
+def placed(typingctx: Any, a: types.Type, i: types.Type, x: types.Type) -> Any:
     """Return a vector of zeros as long as a, but for x in the constant place i."""
     if not isinstance(i, types.IntegerLiteral):
         return None
 
-    def generate(context, builder, signature, args):
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         items = [context.get_constant(types.float64, 0.0)] * len(a)
         items[i.literal_value] = args[2]
         return context.make_tuple(builder, signature.return_type, items)
@@ -82,16 +86,16 @@ def placed(typingctx, a, i, x):
     return types.UniTuple(types.float64, len(a))(a, i, types.float64), generate
 
 
-def _spread(add: bool):
+def _spread(add: bool) -> Callable[..., Any]:
     """Return the code of `accumulate` or `scatter`."""
 
-    def numbers(builder, kind, value):
+    def numbers(builder: Any, kind: Any, value: Any) -> list[Any]:
         if not isinstance(kind, types.BaseTuple):
             return [value]
         parts = zip(kind, cgutils.unpack_tuple(builder, value), strict=True)
         return [number for each in parts for number in numbers(builder, *each)]
 
-    def generate(context, builder, signature, args):
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         pointed = isinstance(signature.args[0], types.CPointer)
         first = args[0] if pointed else context.make_array(signature.args[0])(context, builder, args[0]).data
         at = args[1]
@@ -105,7 +109,7 @@ def _spread(add: bool):
 
 
 @intrinsic
-def accumulate(typingctx, row, at, stride, record):
+def accumulate(typingctx: Any, row: types.Type, at: types.Type, stride: types.Type, record: types.Type) -> Any:
     """Add the numbers of a record, which may hold records, one by one to `row[at]`, `row[at + stride]`, ...
 
     `row` is an array or a pointer.
@@ -114,19 +118,19 @@ def accumulate(typingctx, row, at, stride, record):
 
 
 @intrinsic
-def scatter(typingctx, row, at, stride, record):
+def scatter(typingctx: Any, row: types.Type, at: types.Type, stride: types.Type, record: types.Type) -> Any:
     """Write the numbers of a record as `accumulate` adds them."""
     return types.void(row, types.intp, types.intp, record), _spread(add=False)
 
 
 @intrinsic(prefer_literal=True)
-def gathered(typingctx, row, at, stride, count):
+def gathered(typingctx: Any, row: types.Type, at: types.Type, stride: types.Type, count: types.Type) -> Any:
     """Return `row[at]`, `row[at + stride]`, ... as a tuple of a constant count."""
     if not isinstance(count, types.IntegerLiteral):
         return None
     result = types.UniTuple(types.float64, count.literal_value)
 
-    def generate(context, builder, signature, args):
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         first = context.make_array(signature.args[0])(context, builder, args[0]).data
         at, numbers = args[1], []
         for _ in range(result.count):
@@ -137,13 +141,13 @@ def gathered(typingctx, row, at, stride, count):
     return result(row, types.intp, types.intp, count), generate
 
 
-def reader_of(count: int):
+def reader_of(count: int) -> Any:
     """Return a kernel `(row, first, stride)` that returns so many numbers of a pointer as a tuple."""
     result = types.UniTuple(types.float64, count)
 
     @intrinsic
-    def take(typingctx, row, first, stride):
-        def generate(context, builder, signature, args):
+    def take(typingctx: Any, row: types.Type, first: types.Type, stride: types.Type) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             place, numbers = args[1], []
             for _ in range(count):
                 numbers.append(builder.load(builder.gep(args[0], [place])))
@@ -153,16 +157,16 @@ def reader_of(count: int):
         return result(row, types.intp, types.intp), generate
 
     @kernel
-    def taken(row, first, stride):
+    def taken(row: Doubles, first: int, stride: int) -> Vector:
         return take(row, first, stride)
 
     return taken
 
 
-def _products(rows: int, inner: int, columns: int, place):
+def _products(rows: int, inner: int, columns: int, place: Callable[[int, int], int]) -> Callable[..., Any]:
     """Return the code of a product; number (i, j) of the first factor is at `place(i, j)`."""
 
-    def generate(context, builder, signature, args):
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         m, a = (cgutils.unpack_tuple(builder, each) for each in args)
         numbers = []
         for i in range(rows):
@@ -178,65 +182,65 @@ def _products(rows: int, inner: int, columns: int, place):
 
 
 @intrinsic
-def matrix_applied(typingctx, m, a):
+def matrix_applied(typingctx: Any, m: types.Type, a: types.Type) -> Any:
     """Return `M a` of a square matrix, row by row."""
     d = len(a)
     return types.UniTuple(types.float64, d)(m, a), _products(d, d, 1, lambda i, j: i * d + j)
 
 
 @intrinsic
-def matrix_applied_back(typingctx, m, a):
+def matrix_applied_back(typingctx: Any, m: types.Type, a: types.Type) -> Any:
     """Return `M' a` of a square matrix, row by row."""
     d = len(a)
     return types.UniTuple(types.float64, d)(m, a), _products(d, d, 1, lambda i, j: j * d + i)
 
 
 @intrinsic
-def matrix_product(typingctx, m, a):
+def matrix_product(typingctx: Any, m: types.Type, a: types.Type) -> Any:
     """Return `M A` of square matrices, row by row."""
     d = math.isqrt(len(m))
     return types.UniTuple(types.float64, d * d)(m, a), _products(d, d, d, lambda i, j: i * d + j)
 
 
 @kernel
-def square(a):
+def square(a: Vector) -> float:
     """Return `a . a`."""
     return dot(a, a)
 
 
 @kernel
-def norm(a):
+def norm(a: Vector) -> float:
     """Return `|a|`."""
     return math.sqrt(dot(a, a))
 
 
 @kernel
-def three(row):
+def three(row: Doubles) -> Vector:
     """Return the first three numbers of a row."""
     return row[0], row[1], row[2]
 
 
 @kernel
-def put(row, a):
+def put(row: Doubles, a: Vector) -> None:
     """Write a vector to the beginning of a row."""
     row[0], row[1], row[2] = a
 
 
 @kernel
-def add(row, a):
+def add(row: np.ndarray, a: Vector) -> None:
     """Add a vector to the beginning of a row."""
     row[0], row[1], row[2] = row[0] + a[0], row[1] + a[1], row[2] + a[2]
 
 
 @kernel
-def put_all(row, numbers):
+def put_all(row: Doubles, numbers: Vector) -> None:
     """Write a tuple of any length to the beginning of a row."""
     for i in range(len(numbers)):
         row[i] = numbers[i]
 
 
 @kernel
-def applied_back(m, a):
+def applied_back(m: Any, a: Any) -> Vector:
     """Return `M' a`."""
     return (
         m[0] * a[0] + m[3] * a[1] + m[6] * a[2],

@@ -15,7 +15,7 @@ from planarfriction.compiler.calls import address_of
 from planarfriction.compiler.memory import place_of, row_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import batched_rates, cells, contacts, rate_law, rules, steps, vectors
+from planarfriction.kernels import batched_rates, cells, rate_law, rules, steps, vectors
 from planarfriction.laws.base import FrictionLaw
 
 __all__ = ["RateLaw", "dot", "norm", "plus", "ratio", "times"]
@@ -108,7 +108,7 @@ class RateLaw(FrictionLaw):
         twist[:, 0] = speed.reshape(-1)
         dt = 0.25 * self.largest_deflection / np.where(twist[:, 0] > 0.0, twist[:, 0], 1.0)
         step, single = self.functions(cells.POSITIONS).steps.step, self._single()
-        table = row_of(steps.Stepped(address_of(step, steps.WORDS), 2, 4, 1, place_of(single), single.size))
+        table = row_of(steps.Stepped(address_of(step), 2, 4, 1, place_of(single), single.size))
         z, new, pull = np.zeros((speed.size, 2)), np.empty((speed.size, 2)), np.empty((speed.size, 3))
         for _ in range(400):
             steps.ready(steps.step_many)(table, z, twist, _ALONE, dt, new, pull, np.empty(3))
@@ -133,7 +133,7 @@ class RateLaw(FrictionLaw):
         state, twist = np.zeros((len(z), 2)), np.zeros((len(z), 3))
         state[:, : z.shape[1]], twist[:, : v.shape[1]] = z, v
         rate, pull = np.empty_like(state), np.empty_like(twist)
-        function = address_of(self.functions(cells.POSITIONS).rates.evaluate, contacts.WORDS[0])
+        function = address_of(self.functions(cells.POSITIONS).rates.evaluate)
         batched_rates.evaluate(function, self._single(), state, twist, rate, pull)
         return rate, pull[:, :2]
 

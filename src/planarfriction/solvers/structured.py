@@ -57,7 +57,7 @@ def compiled_together() -> Iterator[None]:
         yield
         return
     functions = dict(enumerate(kernels.FUNCTIONS))
-    jobs = {function: job for job, (function, words) in functions.items() if missing(function, signature_of(words))}
+    jobs = {function: job for job, function in functions.items() if missing(function, signature_of(function))}
     processes = min(threads.processors() - 1, _MOST_PROCESSES, len(jobs) - 1)
     if processes < 1 or not together.possible():
         yield
@@ -68,7 +68,7 @@ def compiled_together() -> Iterator[None]:
 
 def serve() -> None:
     """Compile functions of the solver for another process."""
-    together.serve(lambda job: address_of(*kernels.FUNCTIONS[job]))
+    together.serve(lambda job: address_of(kernels.FUNCTIONS[job]))
 
 
 def start_of(state: np.ndarray) -> Progress:

@@ -19,7 +19,7 @@ from planarfriction.adapters.mujoco.loops.records import Host, Remembered, Scrat
 from planarfriction.adapters.mujoco.loops.responses import is_sparse, leaves_range, respond
 from planarfriction.compiler import callback, entry, jit, kernel
 from planarfriction.compiler.calls import address_of, c_address_of, call, call_c, pointer, shared_word
-from planarfriction.compiler.memory import arrays_at, at, doubles, integers, integers32
+from planarfriction.compiler.memory import Place, arrays_at, at, doubles, integers, integers32
 from planarfriction.kernels.coupling import shortening_of, step_all, too_far
 from planarfriction.kernels.coupling_rows import Problem
 from planarfriction.kernels.coupling_rows import read as read_patches
@@ -245,7 +245,7 @@ def _put_guess(host, m, p, s, kept, guess):
 
 
 @entry
-def plan(place_of_host, m, d):
+def plan(place_of_host: Place, m: Place, d: Place) -> None:
     """Add friction to the passive forces of the data d, for the step from where they are."""
     host = read(place_of_host)
     patches, kept = read_patches(host.patches), arrays_at(host.memory, integers(d + host.data.userdata)[0])
@@ -313,7 +313,7 @@ def is_served(host, m):
 
 def plan_address() -> int:
     """Return the address of `plan` in this process."""
-    return address_of(plan, "ppp")
+    return address_of(plan)
 
 
 def control_address() -> int:
