@@ -28,6 +28,7 @@ from planarfriction.kernels import coupling as kernels
 from planarfriction.kernels.coupling_rows import Patches, layout
 from planarfriction.kernels.following import Followers
 from planarfriction.models import FrictionModel
+from planarfriction.models.base import lever_of
 
 TOLERANCE = 1e-9
 """Default error of the twists [m/s]: a bristle is off by a thousandth of its largest deflection after a second."""
@@ -43,12 +44,6 @@ _WORTH_A_THREAD = 200
 
 _INPUTS = ("state", "dt", "twist", "normal_force", "wrench", "twist_response", "load_response", "moments")
 _PLACES = ("state", "dt", "free_twist", "free_load", "guess", "response", "load_response", "moments")
-
-
-def lever_of(model: FrictionModel) -> float:
-    """Return the lever arm [m] at which spins of a patch count as speeds."""
-    patch = model.patch
-    return math.sqrt(float((patch.positions**2).sum(axis=1).mean() + 0.5 * (patch.radii**2).mean()))
 
 
 @by_parts

@@ -36,7 +36,7 @@ ROOMS = {
     ),
     *("models", "online", "planning", "plots", "scenes", "solvers", "sweeps", "tensors", "torch", "warp"),
 }
-"""Layers that a call goes through; what describes and checks (patches, laws) may be asked from everywhere."""
+"""Layers that a call goes through; what describes (patches, surfaces, laws) may be asked from everywhere."""
 
 READERS = {"trace.py", "twins.py", "rewriting.py", "elements.py"}
 """Files that run the source of kernels over symbols or arrays."""

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.coupling import ITERATIONS, TOLERANCE, lever_of
+from planarfriction.coupling import ITERATIONS, TOLERANCE
 from planarfriction.export.c_source import Writer
 from planarfriction.export.c_values import Array, Fixed, Record, Scalar
 from planarfriction.export.loops import Loops
 from planarfriction.kernels import coupling
 from planarfriction.kernels.coupling_rows import Patches, layout
+from planarfriction.models.base import lever_of
 
 _STEP, _SLOPES = Fixed(0), Fixed(1)
 """Stand in place of the addresses of a patch's functions."""

@@ -251,6 +251,12 @@ class FrictionModel(ByValue):
         return [*inputs, None if held is None else centre_of(np.broadcast_to(held, (*batch, 2)), inputs[2])]
 
 
+def lever_of(model: FrictionModel) -> float:
+    """Return the lever arm [m] at which spins of a patch count as speeds."""
+    patch = model.patch
+    return math.sqrt(float((patch.positions**2).sum(axis=1).mean() + 0.5 * (patch.radii**2).mean()))
+
+
 def _named(law: FrictionLaw) -> str:
     """Return a law in few words, with its friction coefficients."""
     numbers = law.numbers

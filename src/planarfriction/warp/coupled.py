@@ -13,6 +13,7 @@ from planarfriction import coupling, validation
 from planarfriction.coupling import CoupledStep, HostStep
 from planarfriction.errors import InvalidValueError
 from planarfriction.models import FrictionModel
+from planarfriction.models.base import lever_of
 from planarfriction.warp import arrays
 from planarfriction.warp.kernels import Problems, kernel_of
 from planarfriction.warp.source import coupled_source_of, described
@@ -75,7 +76,7 @@ class CoupledPatches:
             if follow and not can[p]:
                 raise InvalidValueError("follows", "be False for a law with a reference_load", f"True of model {p}")
         self._follows = follows is not None or all(can)
-        radii = [coupling.lever_of(model) or 1.0 for model in self.models]
+        radii = [lever_of(model) or 1.0 for model in self.models]
         source = coupled_source_of(kinds, which, follows or can, radii, precision)
         self.state_shape = (sum(math.prod(model.state_shape) for model in self.models),)
         """Shape of the state of the patches of a world."""

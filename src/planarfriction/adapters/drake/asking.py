@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction.adapters.drake.shadow import Shadow
-from planarfriction.coupling import CoupledPatches, HostStep, lever_of
+from planarfriction.coupling import CoupledPatches, HostStep
 from planarfriction.kernels.coupling import solve_batch
+from planarfriction.models.base import lever_of
 
 PASSES = 12
 """Largest number of evaluations of the plant's step."""

@@ -27,8 +27,9 @@ from planarfriction.adapters.mujoco.patches import (
     surface_velocities,
 )
 from planarfriction.adapters.mujoco_warp.loops import geometry, responses
-from planarfriction.coupling import HostStep, lever_of
+from planarfriction.coupling import HostStep
 from planarfriction.errors import InvalidValueError
+from planarfriction.models.base import lever_of
 from planarfriction.warp import CoupledPatches
 
 DISPLACEMENT = "centre_x", "centre_y"
