@@ -145,8 +145,11 @@ def identify_joint(
     spans = SPANS if not base.by_torque else SPANS[-1:]
     kept = first = attempt(base, minimise(base, base.start(), spans))
     trials, tried = {"": first}, functools.partial(_with, progress=progress)
-    for term in chosen:
-        if term == "directional" and "load" not in kept.problem.terms:
+    again = ("stribeck",) if terms == "auto" else ()  # bristles may hide a fall of friction
+    for term in (*chosen, *again):
+        if term in kept.problem.terms or (term == "directional" and "load" not in kept.problem.terms):
+            continue
+        if term in trials and "bristles" not in kept.problem.terms:
             continue
         if terms != "auto":
             kept = Trial(*_more(kept, term), (), np.empty(0), np.empty(0))

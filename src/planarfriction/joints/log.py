@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -187,14 +188,13 @@ class JointLog(ByValue):
 
     def cut(self, parts: int) -> list[JointLog]:
         """Cut the log into parts of like length."""
-        fields = {
-            each: getattr(self, each) for each in ("time", "q", *COLUMNS) if getattr(self, each, None) is not None
-        }
+        values = {each: getattr(self, each, None) for each in ("time", "q", *COLUMNS)}
+        fields = {each: value for each, value in values.items() if value is not None}
         bounds = np.linspace(0, len(self.time), parts + 1).astype(int)
         more = {"drive": self.drive}
         return [
             JointLog(**{each: value[i:j] for each, value in fields.items()}, **more, name=f"{self.name}, part {k + 1}")
-            for k, (i, j) in enumerate(zip(bounds[:-1], bounds[1:], strict=True))
+            for k, (i, j) in enumerate(pairwise(bounds))
         ]
 
     @classmethod
@@ -214,9 +214,7 @@ class JointLog(ByValue):
             word = heading.split("[")[0].split("(")[0].strip().lower()
             headings.setdefault(ALIASES.get(word, word), heading)
         if missing := [each for each in ("t", "q") if each not in headings]:
-            raise FileError(
-                f"{path}: no column {missing[0]} (expected t [s], q [rad], and torque [N m], voltage or goal)"
-            )
+            raise FileError(f"{path}: no column {missing[0]} (t, q, and torque, voltage or goal)")
         names = ["t", "q", *(each for each in COLUMNS if each in headings)]
         read: dict[str, Any] = dict(zip(names, table.numbers([headings[each] for each in names]).T, strict=True))
         duty, supply = read.pop("duty", None), read.pop("supply", None)

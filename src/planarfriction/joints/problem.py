@@ -76,9 +76,7 @@ class Problem:
     @property
     def seen_off(self) -> bool:
         """True if a log moves while the drive is off."""
-        return any(
-            ((log.on == 0.0) & (np.abs(log.speed) > MOVING * np.abs(log.speed).max())).any() for log in self.logs
-        )
+        return any((moving(log) & (log.on == 0.0)).any() for log in self.logs)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -128,7 +126,7 @@ class Problem:
     # ------------------------------------------------------------------ errors
 
     def simulated(self, values: Mapping[str, float], log: JointLog, span: float = np.inf) -> np.ndarray:
-        """Simulate q and dq `[T, 2]` from goal or voltage; the run begins at the measured motion once every `span` [s]."""
+        """Simulate q and dq `[T, 2]` from goal or voltage; the run begins at the measured motion every `span` [s]."""
         motion = np.empty((len(log.time), 2))
         again = int(min(max(2.0, span * len(log.time) / (log.time[-1] - log.time[0])), 1e9))
         joint, plant = self.friction(values).rigid_numbers, self.plant_numbers(values, log)
@@ -173,7 +171,7 @@ class Problem:
         rows, right = [], []
         for log in self.logs:
             v, a, plant = log.speed, log.acceleration, self.plant
-            on, moves = log.on, np.abs(log.speed) > MOVING * np.abs(log.speed).max()
+            on, moves = log.on, moving(log)
             weight = GRAVITY * plant.length * np.sin(log.q - (plant.offset or 0.0))
             columns = {
                 "inertia": a,
@@ -211,7 +209,7 @@ class Problem:
             return [
                 {"load_external": load},
                 {"load_external": 0.3 * load, "load": 1.5 * load},
-                {"load_external": 2.0 * load},
+                {"load_external": min(2.0 * load, 0.9)},
             ]
         if term == "stribeck":
             fast = max(float(np.quantile(np.abs(log.speed), 0.9)) for log in self.logs)
@@ -221,3 +219,9 @@ class Problem:
         most = mu_c + values.get("rise", 0.0)
         bent = ((most / angle, time) for angle in (1e-4, 1e-3, 3e-3, 1e-2, 0.1) for time in (1e-3, 1e-2))
         return [{"sigma_0": stiffness, "sigma_1": time * stiffness} for stiffness, time in bent]
+
+
+def moving(log: JointLog) -> np.ndarray:
+    """Return the mask of samples that count as moving, `[T]`."""
+    speed = np.abs(log.speed)
+    return speed > MOVING * speed.max()

@@ -51,7 +51,7 @@ class Trial:
         return dict(zip(self.values, errors.tolist(), strict=True))
 
     def interval(self, name: str) -> tuple[float, float]:
-        """Compute the 95 % interval of an estimate from its spread, as factors where it is searched by its logarithm."""
+        """Compute the 95 % interval of an estimate from its spread; factors for those searched by logarithm."""
         from scipy.stats import t
 
         value, kind = self.values[name], PARAMETERS[name]

@@ -38,7 +38,7 @@ NOT = {
 
 def judge(kept: Trial, trials: Mapping[str, Trial]) -> tuple[Verdict, ...]:
     """Return all verdicts on a fit."""
-    return tuple([*_on_terms(kept, trials), *_on_drive(kept), *_on_logs(kept)])
+    return (*_on_terms(kept, trials), *_on_drive(kept), *_on_logs(kept))
 
 
 def _on_terms(kept: Trial, trials: Mapping[str, Trial]) -> Iterator[Verdict]:
@@ -76,12 +76,12 @@ def _on_drive(kept: Trial) -> Iterator[Verdict]:
         yield Verdict("torque_gain", True, text)
     else:
         yield Verdict("torque_gain", True, f"only kt/R = {gain:.3g} N m/V is known, neither kt nor R")
-        text = f"no log with the drive off: viscous friction and back-EMF cannot be told apart, {values['sigma_2']:.3g} N m s/rad"
-        yield Verdict("sigma_2", False, f"{text} is both")
-    if problem.plant.arm_mass is None and problem.torque_gain is None:
-        share = 50.0 / problem.plant.mass if problem.plant.mass else 0.0
+        text = "no log with the drive off: viscous friction and back-EMF cannot be told apart"
+        yield Verdict("sigma_2", False, f"{text}, {values['sigma_2']:.3g} N m s/rad is both")
+    if problem.plant.mass and problem.plant.arm_mass is None and problem.torque_gain is None:
+        share = 0.5 / problem.plant.mass  # half the mass of an arm counts, in %
         text = f"an arm without mass is assumed: all torques grow by {share:.2g} % for each 10 g of an arm"
-        yield Verdict("arm_mass", False, text.replace(f"{share:.2g}", f"{0.01 * share:.2g}"))
+        yield Verdict("arm_mass", False, text)
 
 
 def speed_lag(log: JointLog) -> float:

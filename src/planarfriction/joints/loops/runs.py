@@ -125,7 +125,7 @@ def run_plant(joint, plant, time, given, enabled, external, measured, again, ste
     for i in range(1, len(time)):
         if i % again == 0:
             q, v = measured[i - 1, 0], measured[i - 1, 1]
-        count = max(1, int(math.ceil((time[i] - time[i - 1]) / step - 1e-9)))
+        count = max(1, math.ceil((time[i] - time[i - 1]) / step - 1e-9))
         dt = (time[i] - time[i - 1]) / count
         on = enabled[i - 1]
         for j in range(count):
