@@ -108,7 +108,7 @@ def attempt(problem: Problem, values: dict[str, float]) -> Trial:
 def improves(more: Trial, less: Trial) -> bool:
     """Return True if errors of left-out groups fall by more than their scatter, and by `GAIN` at least."""
     gain, scatter = more.gain(less)
-    return gain > max(scatter, GAIN * float(less.short.mean()))
+    return gain > max(scatter, GAIN)
 
 
 def identify_joint(

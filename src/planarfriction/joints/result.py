@@ -36,11 +36,14 @@ class Trial:
     """
 
     def gain(self, less: Trial) -> tuple[float, float]:
-        """Compute by how much `short` falls below another trial's, and the scatter of that (95 %)."""
+        """Compute the share by which `short` falls below another trial's, and how far it may be off by the scatter.
+
+        Both are of the mean logarithm of the ratio over the groups; the second is one-sided, at 95 %.
+        """
         from scipy.stats import t
 
-        falls = less.short - self.short
-        return float(falls.mean()), float(t.ppf(0.975, len(falls) - 1) * falls.std(ddof=1) / np.sqrt(len(falls)))
+        falls = np.log(np.maximum(less.short, 1e-300) / np.maximum(self.short, 1e-300))
+        return float(falls.mean()), float(t.ppf(0.95, len(falls) - 1) * falls.std(ddof=1) / np.sqrt(len(falls)))
 
     @property
     def spread(self) -> dict[str, float]:

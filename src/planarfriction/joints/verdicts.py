@@ -47,7 +47,8 @@ def _on_terms(kept: Trial, trials: Mapping[str, Trial]) -> Iterator[Verdict]:
         if not term:
             continue
         gain, scatter = trial.gain(best)
-        numbers = f"errors of left-out logs fall by {gain:.2g} +- {scatter:.2g} of {best.short.mean():.2g} {unit}"
+        change = f"{'fall' if gain > 0.0 else 'grow'} by {100.0 * abs(gain):.2g} +- {100.0 * scatter:.2g} %"
+        numbers = f"errors of left-out logs {change}, from {best.short.mean():.2g} {unit}"
         good = term in kept.problem.terms
         if term == "load":
             numbers += f", b = {trial.values['load']:.2g}"
