@@ -6,10 +6,21 @@ numbers are in rad, N m, V and s.
 
 from planarfriction.joints.fit import identify_joint
 from planarfriction.joints.friction import JointFriction
+from planarfriction.joints.hosts import apply_to_spec, set_level, to_mjcf
 from planarfriction.joints.log import Drive, JointLog, Plant
 from planarfriction.joints.result import JointFit
 
-__all__ = ["Drive", "JointFit", "JointFriction", "JointLog", "Plant", "identify_joint"]
+__all__ = [
+    "Drive",
+    "JointFit",
+    "JointFriction",
+    "JointLog",
+    "Plant",
+    "apply_to_spec",
+    "identify_joint",
+    "set_level",
+    "to_mjcf",
+]
 
 
 def __dir__() -> list[str]:

@@ -55,6 +55,10 @@ class JointFriction(Checked):
         """The law as LuGre under the load 1, in N m and rad; a rigid joint bends by `RIGID`."""
         return LuGre(self.mu_c, self.mu_s, self.v_s, self.sigma_0 or self.mu_s / RIGID, self.sigma_1, self.sigma_2)
 
+    def load(self, tau_motor: float, tau_external: float) -> float:
+        """Compute the growth of the level [N m] at torques of the motor and of all else [N m]."""
+        return abs(self.load_motor * tau_motor - self.load_external * tau_external)
+
     @property
     def numbers(self) -> JointNumbers:
         """Numbers with bristles, as a step reads them."""

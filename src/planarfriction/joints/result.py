@@ -13,6 +13,7 @@ from planarfriction.identify.verdicts import Verdict
 from planarfriction.joints.friction import JointFriction
 from planarfriction.joints.log import JointLog, Plant
 from planarfriction.joints.problem import PARAMETERS, Problem
+from planarfriction.pictures import picture
 
 SHORT = 0.6
 """Time after which a simulated run begins again where terms are judged [s]."""
@@ -144,6 +145,10 @@ class JointFit:
         lines += [f"{name:34} {one:9.4g} {other:18.4g}" for name, one, other in rows]
         lines.append(f"{'mean':34} {self.trial.errors.mean():9.4g} {self.baseline.errors.mean():18.4g}")
         return "\n".join([*lines, "", *map(str, self.verdicts)])
+
+    def plot(self) -> Any:
+        """Draw a log with its simulation, what is left, and friction over speed at three loads."""
+        return picture("joint", self)
 
     def to_dict(self) -> dict[str, Any]:
         """Return numbers and texts for JSON."""

@@ -91,14 +91,18 @@ def run_measured(joint, time, speed, tau_motor, tau_external, taken):
 
 @kernel
 def speed_after(joint, z, speed, push, most, inertia, lost, dt):
-    """Compute the speed after an implicit step of `I dv/dt = push - lost v - friction` at a known level `most`.
+    """Compute the speed after a step of `I dv/dt = push - lost v - friction` at a known level `most`.
+
+    Viscous terms decay exactly, as in `formulas.relaxation`; dry friction is implicit.
 
     Rigid: `k v = b - clip(b, -most, most)`. Bristles, `z' = (z + dt v)/(1 + c |v|)` with `c = dt sigma_0/most`: the one
     root of a quadratic on the side to which all torque at rest points.
     """
     law = joint.law
-    k = inertia / dt + law.sigma_2 + lost
-    b = inertia / dt * speed + push
+    viscous = law.sigma_2 + lost
+    _, mean = formulas.relaxation(xp, viscous * dt / inertia)
+    k = inertia / (dt * mean)
+    b = (k - viscous) * speed + push
     if law.sigma_0 == 0.0:
         return (b - xp.minimum(xp.maximum(b, -most), most)) / k
     b += law.sigma_1 / dt * z
