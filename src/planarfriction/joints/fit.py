@@ -15,7 +15,7 @@ from planarfriction.joints.problem import PARAMETERS, TERMS, Problem
 from planarfriction.joints.result import SHORT, JointFit, Trial
 from planarfriction.joints.verdicts import judge
 
-SPANS = (0.2, SHORT, np.inf)
+SPANS = (SHORT, 0.6, np.inf)
 """Times [s] after which a simulated run begins again at the measured motion: short runs have one minimum, the last is
 the whole log."""
 

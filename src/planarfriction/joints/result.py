@@ -15,7 +15,7 @@ from planarfriction.joints.log import JointLog, Plant
 from planarfriction.joints.problem import PARAMETERS, Problem
 from planarfriction.pictures import picture
 
-SHORT = 0.6
+SHORT = 0.2
 """Time after which a simulated run begins again where terms are judged [s]."""
 
 

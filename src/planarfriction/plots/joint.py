@@ -13,13 +13,13 @@ SHARES = (0.0, 0.5, 1.0)
 
 
 def plot_joint(fit: Any) -> style.PlotFigure:
-    """Draw the log of median left-out error with its simulation, both residuals, and friction over speed by load.
+    """Draw the log that gains most from the fit, what is left of it, and friction over speed by load.
 
     Grey is the fit of Coulomb and viscous friction alone.
     """
     problem, base = fit.trial.problem, fit.baseline.problem
-    errors = fit.trial.errors[:: problem.parts]
-    log = problem.logs[int(np.argsort(errors)[len(errors) // 2])]
+    gains = fit.baseline.errors - fit.trial.errors
+    log = problem.logs[int(np.argmax(gains)) // problem.parts]
     if problem.by_torque:
         measured, runs = log.torque, (base.torque(fit.baseline.values, log), fit.torque(log))
     else:
