@@ -41,7 +41,7 @@ class Drive(Checked):
     """
 
     kp: float = checked(validation.positive)
-    """Gain as it is set in the servo."""
+    """Gain as it is set in the servo [-]."""
     supply: float = checked(validation.positive)
     """Voltage at no load [V]."""
     gain: float = checked(validation.positive, default=1.0)
@@ -187,7 +187,10 @@ class JointLog(ByValue):
         return self.on * self.drive.voltage(self.drive.duty(self.goal - self.q))
 
     def cut(self, parts: int) -> list[JointLog]:
-        """Cut the log into parts of like length."""
+        """Cut the log into parts of like length.
+
+        Raises InvalidValueError for parts of fewer than ten samples.
+        """
         values = {each: getattr(self, each, None) for each in ("time", "q", *COLUMNS)}
         fields = {each: value for each, value in values.items() if value is not None}
         bounds = np.linspace(0, len(self.time), parts + 1).astype(int)
