@@ -155,6 +155,7 @@ def identify_joint(
             kept = Trial(*_more(kept, term), (), np.empty(0), np.empty(0))
             continue
         more = tried(kept, term)
+        trials.pop(term, None)  # a second look stands behind what it is compared with
         trials[term] = more
         kept = more if improves(more, kept) else kept
     if terms != "auto":

@@ -37,10 +37,7 @@ class Trial:
     """
 
     def gain(self, less: Trial) -> tuple[float, float]:
-        """Compute the share by which `short` falls below another trial's, and how far it may be off by the scatter.
-
-        Both are of the mean logarithm of the ratio over the groups; the second is one-sided, at 95 %.
-        """
+        """Compute the mean logarithm of another trial's `short` over this one's, and its scatter (one-sided, 95 %)."""
         from scipy.stats import t
 
         falls = np.log(np.maximum(less.short, 1e-300) / np.maximum(self.short, 1e-300))

@@ -42,19 +42,19 @@ def judge(kept: Trial, trials: Mapping[str, Trial]) -> tuple[Verdict, ...]:
 
 
 def _on_terms(kept: Trial, trials: Mapping[str, Trial]) -> Iterator[Verdict]:
-    unit, terms, best = "N m" if kept.problem.by_torque else "rad", (), trials[""]
+    best = trials[""]
     for term, trial in trials.items():
         if not term:
             continue
         gain, scatter = trial.gain(best)
-        change = f"{'fall' if gain > 0.0 else 'grow'} by {100.0 * abs(gain):.2g} +- {100.0 * scatter:.2g} %"
-        numbers = f"errors of left-out logs {change}, from {best.short.mean():.2g} {unit}"
+        ratio, low, high = np.exp([-gain, -gain - scatter, -gain + scatter])
+        numbers = f"errors of left-out logs are {ratio:.2f} ({low:.2f} to {high:.2f}) of those without it"
         good = term in kept.problem.terms
         if term == "load":
             numbers += f", b = {trial.values['load']:.2g}"
         yield Verdict(term, good, f"{WORDS[term] if good else NOT[term]} ({numbers})")
         if good:
-            best, terms = trial, (*terms, term)
+            best = trial
     yield from _on_bounds(kept)
 
 
