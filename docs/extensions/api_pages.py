@@ -41,7 +41,7 @@ SUBJECTS = {
     "Embed": (
         "Friction inside other simulators, in loops of your own, or in C.",
         "state, wrench = model.step(model.rest(), (0.01, 0.0, 1.0), normal_force=2.0, dt=1e-3)",
-        ("coupling", "environments", "export", "adapters", "warp"),
+        ("sliding_body", "coupling", "environments", "export", "adapters", "warp"),
     ),
     "Learn": (
         "Rollouts and scenes have exact derivatives, in NumPy, PyTorch and JAX.",
@@ -51,7 +51,7 @@ SUBJECTS = {
     "Measure": (
         "Logs of motion and force give the parameters of a contact.",
         'found = pf.identify.identify_lugre(pf.Log.from_csv("log.csv"), patch)',
-        ("identify",),
+        ("identify", "joints"),
     ),
     "Plan": (
         "Grips that hold, turn or slide a part, pushes, and controllers that do not know the friction.",

@@ -7,6 +7,7 @@ from . import families as families
 from . import formulas as formulas
 from . import geometry as geometry
 from . import identify as identify
+from . import joints as joints
 from . import laws as laws
 from . import limit_surface as limit_surface
 from . import models as models

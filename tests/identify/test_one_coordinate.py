@@ -165,6 +165,10 @@ def test_bounds_are_called_by_their_names():
     assert str(verdicts.judge_parameter(evidence, 1)) == "mu_s: not identifiable, the fit ran into the bound 0.6 -"
     low = dataclasses.replace(evidence, values=np.array([0.1, 0.1]))
     assert "no friction above mu_c was seen: equal to mu_c" in str(verdicts.judge_parameter(low, 1))
+    alone = {"names": ("mu_s",), "errors": np.zeros(1), "correlations": np.eye(1), "at_bound": np.array([True])}
+    for held, words in ((0.1, "the fit ran into the bound 0.6"), (0.6, "no friction above mu_c was seen")):
+        held = dataclasses.replace(evidence, values=np.array([0.6]), jacobian=np.ones((2, 1)), held_mu_c=held, **alone)
+        assert words in str(verdicts.judge_parameter(held, 0))
 
 
 # ---------------------------------------------------------------------- stiffness and load

@@ -178,6 +178,7 @@ def identify(logs: tuple[Path, ...], patch: str | None, size: dict[str, Any], **
       planarfriction identify slow.csv fast.csv --patch pad.csv --cell-size 0.001
       planarfriction identify log.csv --parameters mu_c,mu_s,v_s --start sigma_0=1e5 --start sigma_1=100
       planarfriction identify plan slow.csv --patch disc
+      planarfriction identify joint arm.csv --inertia 0.05
     """
     from planarfriction.cli import identify as command
     from planarfriction.cli.options import find_patch

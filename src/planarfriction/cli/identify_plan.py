@@ -9,35 +9,42 @@ import click
 from click.shell_completion import CompletionItem
 
 import planarfriction as pf
+from planarfriction.cli import identify_joint
+from planarfriction.cli.identify_joint import joint
 from planarfriction.cli.options import FILE, map_options, patch_option
 
 NAME = "plan"
 
 SHORT_HELP = "Suggest which motion to measure next."
 
+WORDS = {NAME: SHORT_HELP, identify_joint.NAME: identify_joint.SHORT_HELP}
+"""Subcommands of `identify`, with their help."""
+
 
 class FitOrPlan(click.Command):
-    """`identify`: fits the logs that follow, unless the first word is that of the plan."""
+    """`identify`: fits the logs that follow, unless the first word is that of a subcommand."""
 
     def make_context(
         self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
     ) -> click.Context:
-        """Make the context of the fit, or of the plan."""
-        if args[:1] == [NAME]:
-            return plan.make_context(f"{info_name} {NAME}", args[1:], parent, **extra)
+        """Make the context of the fit, or of a subcommand."""
+        if args and args[0] in WORDS:
+            return (plan if args[0] == NAME else joint).make_context(
+                f"{info_name} {args[0]}", args[1:], parent, **extra
+            )
         return super().make_context(info_name, args, parent, **extra)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the options, then the other command."""
+        """Write the options, then the other commands."""
         super().format_options(ctx, formatter)
         with formatter.section("Commands"):
-            formatter.write_dl([(NAME, f"{SHORT_HELP} See identify {NAME} --help.")])
+            formatter.write_dl([(name, f"{help} See identify {name} --help.") for name, help in WORDS.items()])
 
 
 def complete_log(ctx: click.Context, parameter: object, incomplete: str) -> list[CompletionItem]:
-    """Return completions of a log: files, and the word `plan` where it may stand."""
-    fits = NAME.startswith(incomplete) and not ctx.params.get("logs")
-    words = [CompletionItem(NAME, help=SHORT_HELP)] if fits else []
+    """Return completions of a log: files, and the names of subcommands where they may stand."""
+    first = not ctx.params.get("logs")
+    words = [CompletionItem(name, help=help) for name, help in WORDS.items() if first and name.startswith(incomplete)]
     return [*words, CompletionItem(incomplete, type="file")]
 
 

@@ -141,6 +141,14 @@ GRIP = {"grip.h": "_grip.h", "grip.c": "_grip.c"}
 """Ends of the names of the files of a controller."""
 
 
+def checked_name(name: Any) -> None:
+    """Check the name of a library; raises InvalidValueError for one that is no name of C, or that of a header."""
+    if not (isinstance(name, str) and re.fullmatch(r"[a-zA-Z]\w*", name, re.ASCII) and len(name) <= LONGEST_NAME):
+        raise InvalidValueError("name", f"be a letter, then letters, digits and _, {LONGEST_NAME} in all", name)
+    if name.lower() in HEADERS:
+        raise InvalidValueError("name", "not be that of a header of C", name)
+
+
 def export_c(
     model: Any,
     folder: Any,
@@ -161,10 +169,7 @@ def export_c(
     Raises InvalidValueError for a name that is no name of C, an unknown precision, and models without source and
     controllers without source (see `pieces_of`, `grip_of`); FileError if the folder cannot be written.
     """
-    if not (isinstance(name, str) and re.fullmatch(r"[a-zA-Z]\w*", name, re.ASCII) and len(name) <= LONGEST_NAME):
-        raise InvalidValueError("name", f"be a letter, then letters, digits and _, {LONGEST_NAME} in all", name)
-    if name.lower() in HEADERS:
-        raise InvalidValueError("name", "not be that of a header of C", name)
+    checked_name(name)
     validation.choice("precision", precision, PRECISIONS)
     validation.instance("casadi", casadi, bool, "True or False")
     if (casadi or controller is not None) and precision != "double":

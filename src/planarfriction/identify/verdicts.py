@@ -207,6 +207,8 @@ class Evidence:
     """Growth of the cost if the contact may not slip at all."""
     largest_coefficient: float = np.inf
     """Largest friction over load that was fitted [-]."""
+    held_mu_c: float = np.inf
+    """The mu_c that was not estimated [-]."""
 
     @property
     def torque(self) -> bool:
@@ -366,7 +368,7 @@ def _no_stribeck(evidence: Evidence) -> str:
 
 def _on_bound(evidence: Evidence, i: int) -> Verdict:
     name = evidence.names[i]
-    if name == "mu_s" and evidence.values[i] <= SAME * evidence.value("mu_c", float(evidence.values[i])):
+    if name == "mu_s" and evidence.values[i] <= SAME * evidence.value("mu_c", evidence.held_mu_c):
         reason = speed_gap(evidence.speeds, evidence.value("v_s", 1e-3)) or "no friction above mu_c was seen"
         return Verdict(name, False, f"{reason}: equal to mu_c")
     return Verdict(name, False, f"the fit ran into the bound {evidence.values[i]:.3g} {ALL[name].unit}")

@@ -252,6 +252,7 @@ def _evidence(best: Candidate, errors: np.ndarray, histories: Sequence[Mapping[s
         jacobian=u.jacobian[:, :count],
         speeds=np.concatenate([each[0] for each in sliding]),
         spins=np.concatenate([each[1] for each in sliding]),
+        held_mu_c=float(problem.law.numbers.mu_c),
         loads=np.array([mean_load(log) for log in problem.logs]),
         measured=np.any([log.channels for log in problem.logs], axis=0),
         spoiled=int((np.abs(problem.distances(fit.values, fit.sigma)) > SPOILED).sum()) + left_out,

@@ -110,12 +110,14 @@ def measured(
     slides: the path and final pose of a cube on a table, from its first 8 poses. pushes: the twist of an object that is
     pushed slowly, from the wrench. series: twists and wrenches during whole pushes. onsets: the final pose of a push
     from its touch, and the peak of the force at breakaway. Each model is fitted to the training cases and scored on
-    the others, with bootstrap intervals. --own adds your own function (docs/measured.md).
+    the others, with bootstrap intervals. --own adds your own function (docs/measured.md). The task joints, which runs
+    only by its name, fits the friction of a servo from eight logs (docs/joints.md).
 
     \b
     Examples:
       planarfriction measured --out results/
       planarfriction measured --task slides --only "exact surface" --own my_model.py:predict
+      planarfriction measured --task joints
       planarfriction measured --list
     """
     from planarfriction import validation
@@ -129,8 +131,13 @@ def measured(
     if list_only:
         rows = [[name, each.words, "" if each.installed else f"[{each.extra}]"] for name, each in LIBRARY.items()]
         print_table("Models", ["name", "description", "needs"], rows)
-        print_table("Tasks", ["name", "description"], [[task.name, task.title] for task in TASKS.values()])
+        rows = [[task.name, task.title] for task in TASKS.values()]
+        print_table(
+            "Tasks", ["name", "description"], [*rows, ["joints", "Friction of a servo from its goal and position"]]
+        )
         return 0
+    if tasks == ("joints",):
+        return _joints(tables, folder, as_json)
     validation.count("--seed", seed, 0)
     models, left_out = _models(only, own)
     if folder is not None:
@@ -151,6 +158,25 @@ def measured(
     if wrong is not None:
         raise wrong
     return code
+
+
+def _joints(tables: Path | None, folder: Path | None, as_json: bool) -> int:
+    """Fit the joint, print what was found, and draw it."""
+    import json
+
+    from planarfriction.cli.console import note, work_progress
+    from planarfriction.cli.output import write_picture
+    from planarfriction.writing import make_folder
+    from planarfriction_studies.measured.joints import fit_joints
+
+    if folder is not None:
+        make_folder(folder)
+    with work_progress("measured") as progress:
+        fit = fit_joints(tables, progress=progress)
+    print(json.dumps(fit.to_dict(), indent=2) if as_json else fit.table())
+    if folder is not None:
+        note(f"wrote {write_picture(fit.plot(), folder / 'joints.png')}")
+    return 0
 
 
 def _models(only: Sequence[str], own: Sequence[str]) -> tuple[dict[str, Any], list[str]]:

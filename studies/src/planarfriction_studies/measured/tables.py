@@ -20,6 +20,8 @@ TABLES = {
     "series": "mlab_pushes.csv.gz",
     "onsets": "mlab_onsets_pushes.csv",
     "forces": "mlab_onsets.csv.gz",
+    "joints": "xl330_joints.csv.gz",
+    "joint logs": "xl330_joints_logs.csv",
 }
 """Files of the tables by name."""
 

@@ -1,0 +1,178 @@
+"""Fits of the friction of a joint, and the choice of its terms by logs that were left out."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.joints.log import JointLog, Plant, as_joint_logs
+from planarfriction.joints.problem import PARAMETERS, TERMS, Problem
+from planarfriction.joints.result import SHORT, JointFit, Trial
+from planarfriction.joints.verdicts import judge
+
+SPANS = (SHORT, 0.6, np.inf)
+"""Times [s] after which a simulated run begins again at the measured motion: short runs have one minimum, the last is
+the whole log."""
+
+GROUPS = 4
+"""Least number of groups that are left out in turn; fewer logs are cut into parts."""
+
+DIFFERENCE = 1e-3
+"""Step of differences, over the size of a parameter: a joint that sticks or not is smooth above it."""
+
+GAIN = 0.01
+"""Least improvement of left-out errors that a term must make, over the errors."""
+
+BEST = 2
+"""Number of starts of a term that are followed to the end."""
+
+
+class Coordinates:
+    """Scaled values of the parameters, their bounds, and the way back."""
+
+    def __init__(self, names: Sequence[str], start: Mapping[str, float]):
+        self.names, kinds = tuple(names), [PARAMETERS[each] for each in names]
+        self._log = np.array([each.logarithmic for each in kinds])
+        self._scale = np.array([max(abs(start[name]), kind.scale) for name, kind in zip(names, kinds, strict=True)])
+        low, high = (np.array([getattr(each, end) for each in kinds]) for end in ("low", "high"))
+        self.bounds = self._from(low), self._from(high)
+        self.start = np.clip(self._from([start[each] for each in names]), *self.bounds)
+
+    def _from(self, values: Any) -> np.ndarray:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self._log, np.log(values), np.array(values) / self._scale)
+
+    def values(self, x: np.ndarray) -> dict[str, float]:
+        """Return the parameters by name."""
+        with np.errstate(over="ignore"):
+            return dict(zip(self.names, np.where(self._log, np.exp(x), x * self._scale).tolist(), strict=True))
+
+
+def minimise(problem: Problem, start: Mapping[str, float], spans: Sequence[float] = SPANS, without: int = -1) -> dict:
+    """Return the values of least squared errors, then of least softened ones, which large errors sway less."""
+    from scipy.optimize import least_squares
+
+    values = dict(start)
+    for stage, span in enumerate([*spans, spans[-1]]):
+        at = Coordinates(problem.names, values)
+
+        def errors(x: np.ndarray, at: Coordinates = at, span: float = span) -> np.ndarray:
+            return np.concatenate(problem.errors(at.values(x), span, without))
+
+        def slopes(x: np.ndarray, errors: Callable = errors, at: Coordinates = at) -> np.ndarray:
+            columns, here = [], errors(x)
+            for i in range(len(x)):
+                step = DIFFERENCE if x[i] + DIFFERENCE <= at.bounds[1][i] else -DIFFERENCE
+                columns.append((errors(x + step * (np.arange(len(x)) == i)) - here) / step)
+            return np.column_stack(columns)
+
+        soft: dict[str, Any] = {}
+        if stage == len(spans):
+            soft = {"loss": "soft_l1", "f_scale": max(float(np.median(np.abs(errors(at.start)))), 1e-12)}
+        inside = np.clip(at.start, at.bounds[0] + 1e-6, at.bounds[1] - 1e-6)
+        found = least_squares(errors, inside, slopes, at.bounds, xtol=1e-6, ftol=1e-6, gtol=1e-9, max_nfev=40, **soft)
+        values = at.values(found.x)
+    return values
+
+
+def cost(problem: Problem, values: Mapping[str, float], span: float = np.inf) -> float:
+    """Compute the mean absolute error of all groups, [rad] or [N m]."""
+    return float(np.mean([np.abs(each).mean() for each in problem.errors(values, span)]))
+
+
+def fit_term(problem: Problem, term: str, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the best values with one term more than `values` have, from the best of its starts."""
+    starts = [{**values, **guess} for guess in problem.guesses(term, values)]
+    first = SPANS[0] if not problem.by_torque else np.inf
+    ranked = [starts[0], *sorted(starts[1:], key=lambda each: cost(problem, each, first))[: BEST - 1]]
+    spans = SPANS if not problem.by_torque else SPANS[-1:]
+    return min((minimise(problem, each, spans) for each in ranked), key=lambda each: cost(problem, each))
+
+
+def attempt(problem: Problem, values: dict[str, float]) -> Trial:
+    """Fit a problem with each group left out, and measure the error of that group."""
+    folds, errors, short = [], [], []
+    for i in range(len(problem.groups)):
+        fold = minimise(problem, values, SPANS[-1:], without=i)
+        folds.append(fold)
+        errors.append(float(np.abs(problem.errors(fold)[i]).mean()))
+        short.append(float(np.abs(problem.errors(fold, SHORT)[i]).mean()))
+    return Trial(problem, values, tuple(folds), np.array(errors), np.array(short))
+
+
+def improves(more: Trial, less: Trial) -> bool:
+    """Return True if errors of left-out groups fall by more than their scatter, and by `GAIN` at least."""
+    gain, scatter = more.gain(less)
+    return gain > max(scatter, GAIN)
+
+
+def identify_joint(
+    logs: JointLog | Sequence[JointLog],
+    plant: Plant,
+    *,
+    torque_gain: float | None = None,
+    terms: Sequence[str] | str = "auto",
+    progress: Callable[[str], None] | None = None,
+) -> JointFit:
+    """Estimate the friction of a joint, and of plant and drive what is not known, from logs of its motion.
+
+    Logs with a torque are fitted to the torque that the measured motion takes; others to the position that a run from
+    goal or voltage gives. `torque_gain` is a known kt/R [N m/V]. `terms` are some of "load", "stribeck", "bristles" and
+    "directional", beside Coulomb and viscous friction; "auto" keeps a term only if logs that were left out improve by
+    more than their scatter. Fewer than four logs are cut into parts that are left out in turn.
+
+    Raises InvalidValueError for unknown terms, logs of both kinds, and a plant and drive that leave the scale of the
+    torques open.
+    """
+    logs, progress = as_joint_logs(logs), progress or (lambda words: None)
+    plant = validation.instance("plant", plant, Plant, "a Plant")
+    gain = None if torque_gain is None else validation.positive("torque_gain", torque_gain)
+    chosen = tuple(TERMS) if terms == "auto" else tuple(validation.choices("terms", terms, TERMS))
+    if "directional" in chosen and "load" not in chosen:
+        raise InvalidValueError("terms", "have load with directional", chosen)
+    if logs[0].torque is None and gain is None and not plant.mass and not plant.inertia:
+        raise InvalidValueError("plant", "have a mass or an inertia, or torque_gain be given", plant)
+    parts = -(-GROUPS // len(logs)) if len(logs) < GROUPS else 1
+    if logs[0].torque is None and parts > 1:
+        logs, parts = tuple(each for log in logs for each in log.cut(parts)), 1
+    base = Problem(logs, plant, gain, (), parts)
+    progress("Coulomb and viscous friction")
+    spans = SPANS if not base.by_torque else SPANS[-1:]
+    kept = first = attempt(base, minimise(base, base.start(), spans))
+    trials, tried = {"": first}, functools.partial(_with, progress=progress)
+    again = ("stribeck",) if terms == "auto" else ()  # bristles may hide a fall of friction
+    for term in (*chosen, *again):
+        if term in kept.problem.terms or (term == "directional" and "load" not in kept.problem.terms):
+            continue
+        if term in trials and "bristles" not in kept.problem.terms:
+            continue
+        if terms != "auto":
+            kept = Trial(*_more(kept, term), (), np.empty(0), np.empty(0))
+            continue
+        more = tried(kept, term)
+        trials.pop(term, None)  # a second look stands behind what it is compared with
+        trials[term] = more
+        kept = more if improves(more, kept) else kept
+    if terms != "auto":
+        progress("left-out logs")
+        kept = attempt(kept.problem, kept.values)
+    elif "load" in kept.problem.terms[:-1] and "directional" not in kept.problem.terms:
+        rest = base.with_terms([each for each in kept.problem.terms if each != "load"])
+        less = attempt(rest, minimise(rest, {each: kept.values[each] for each in rest.names}, spans))
+        kept = kept if improves(kept, less) else less
+    return JointFit(kept, first, trials, judge(kept, trials))
+
+
+def _more(trial: Trial, term: str) -> tuple[Problem, dict[str, float]]:
+    problem = trial.problem.with_terms([*trial.problem.terms, term])
+    return problem, fit_term(problem, term, trial.values)
+
+
+def _with(trial: Trial, term: str, progress: Callable[[str], None]) -> Trial:
+    progress(f"with {term}")
+    return attempt(*_more(trial, term))

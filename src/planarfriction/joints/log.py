@@ -1,0 +1,246 @@
+"""Logs of one joint, the servo that drives it, and the plant that it moves; radians, newton metres, volts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from planarfriction import validation
+from planarfriction.described import described
+from planarfriction.equality import ByValue, Checked, checked
+from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.identify.logs import LEAST_SAMPLES, differentiated, increasing
+from planarfriction.reading import Table
+
+GRAVITY = 9.81
+"""Standard acceleration of gravity of the fits [m/s^2]."""
+
+ALIASES = {
+    **{"time": "t", "position": "q", "angle": "q", "theta": "q", "tau": "torque", "speed": "dq", "velocity": "dq"},
+    **{"omega": "dq", "tau_external": "external"},
+}
+"""Other names of columns, in small letters."""
+
+COLUMNS = ("torque", "dq", "enabled", "goal", "duty", "voltage", "supply", "external")
+"""Columns beside t and q."""
+
+
+@described
+@dataclass(frozen=True)
+class Drive(Checked):
+    """Position servo: `V = duty (supply - sag |duty|)`, `duty = kp gain (goal - q)` within -1 and 1.
+
+    Raises InvalidValueError for numbers that are not positive (`sag`: negative, or not below `supply`).
+    """
+
+    kp: float = checked(validation.positive)
+    """Gain as it is set in the servo [-]."""
+    supply: float = checked(validation.positive)
+    """Voltage at no load [V]."""
+    gain: float = checked(validation.positive, default=1.0)
+    """Duty per angle at `kp = 1` [1/rad]."""
+    sag: float = checked(validation.non_negative, default=0.0)
+    """Voltage that is lost at full duty [V]."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.sag >= self.supply:
+            raise InvalidValueError("sag", "be below supply", self.sag)
+
+    def voltage(self, duty: np.ndarray) -> np.ndarray:
+        """Compute the voltage [V] at a duty."""
+        return duty * (self.supply - self.sag * np.abs(duty))
+
+    def duty(self, error: np.ndarray) -> np.ndarray:
+        """Compute the duty at an error `goal - q` [rad]."""
+        return np.clip(self.kp * self.gain * error, -1.0, 1.0)
+
+
+@described
+@dataclass(frozen=True)
+class Plant(Checked):
+    """Inertia on a joint, or a pendulum; numbers that are None are estimated.
+
+    `I = inertia + (mass + arm_mass/3) length^2`, torque `-(mass + arm_mass/2) g length sin(q - offset)`.
+
+    Raises InvalidValueError for a negative mass, length or inertia, and for a pendulum without mass or length.
+    """
+
+    inertia: float | None = checked(validation.non_negative, default=None)
+    """Moment of inertia besides mass and arm, such as that of rotor and gears [kg m^2]."""
+    mass: float = checked(validation.non_negative, default=0.0)
+    """Mass at the end of the arm [kg]; 0 for no pendulum."""
+    length: float = checked(validation.non_negative, default=0.0)
+    """Length of the arm [m]."""
+    arm_mass: float | None = checked(validation.non_negative, default=None)
+    """Mass of the arm, spread over its length [kg]."""
+    offset: float | None = checked(validation.number, default=None)
+    """Angle at which the pendulum hangs [rad]."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.mass > 0.0) != (self.length > 0.0):
+            raise InvalidValueError("length", "be positive with a mass, and only then", self.length)
+        if not self.mass:
+            self._set(arm_mass=self.arm_mass or 0.0, offset=self.offset or 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class JointLog(ByValue):
+    """Motion of one joint over time, T samples, with its torque, its voltage, or the goal of its servo.
+
+    Raises InvalidValueError for fewer than ten samples, wrong shapes, numbers that are not finite, times that do not
+    increase, and a log without torque, voltage and goal, or with a goal and no drive.
+    """
+
+    time: np.ndarray
+    """Sample times [s], `[T]`."""
+    q: np.ndarray
+    """Angle of the joint [rad], `[T]`."""
+    torque: np.ndarray | None = None
+    """Torque of the motor on the joint [N m], `[T]`."""
+    dq: np.ndarray | None = None
+    """Speed as the joint reports it [rad/s], `[T]`; it is only checked against q."""
+    enabled: np.ndarray | None = None
+    """1 while the drive is on, `[T]`; None: always."""
+    goal: np.ndarray | None = None
+    """Commanded angle [rad], `[T]`."""
+    voltage: np.ndarray | None = None
+    """Voltage of the motor [V], `[T]`."""
+    external: np.ndarray | None = None
+    """Known torque of all else on the joint but gravity [N m], `[T]`."""
+    drive: Drive | None = None
+    """Servo that follows the goal."""
+    name: str = "joint"
+    """Name for messages and plots."""
+
+    if TYPE_CHECKING:  # what is given may be more than what is kept
+
+        def __init__(
+            self,
+            time: ArrayLike,
+            q: ArrayLike,
+            torque: ArrayLike | None = None,
+            dq: ArrayLike | None = None,
+            enabled: ArrayLike | None = None,
+            goal: ArrayLike | None = None,
+            voltage: ArrayLike | None = None,
+            external: ArrayLike | None = None,
+            drive: Drive | None = None,
+            name: str = "joint",
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        validation.instance("name", self.name, str, "a text")
+        time = increasing(self.time, f"time of {self.name}", LEAST_SAMPLES)
+        given = {name: getattr(self, name) for name in ("q", *COLUMNS) if hasattr(self, name)}
+        self._set(time=time, **{
+            name: validation.array(name, value, (len(time),)) for name, value in given.items() if value is not None
+        })  # fmt: skip
+        if self.drive is not None:
+            validation.instance("drive", self.drive, Drive, "a Drive")
+        if self.torque is None and self.voltage is None and (self.goal is None or self.drive is None):
+            raise InvalidValueError(self.name, "hold a torque, a voltage, or a goal with a drive", "none of them")
+
+    @cached_property
+    def speed(self) -> np.ndarray:
+        """Slope of a parabola through seven samples of q [rad/s], `[T]`."""
+        return derivative(self.time, self.q)
+
+    @cached_property
+    def acceleration(self) -> np.ndarray:
+        """Slope of the speed [rad/s^2], `[T]`."""
+        return derivative(self.time, self.speed)
+
+    @cached_property
+    def on(self) -> np.ndarray:
+        """Share of the drive that is on, 1 or 0, `[T]`."""
+        return np.ones(len(self.time)) if self.enabled is None else (self.enabled > 0.5).astype(float)
+
+    @cached_property
+    def outside(self) -> np.ndarray:
+        """Known torque of all else [N m], 0 where none is given, `[T]`."""
+        return np.zeros(len(self.time)) if self.external is None else self.external
+
+    @cached_property
+    def motion(self) -> np.ndarray:
+        """Measured q and its slope [rad, rad/s], `[T, 2]`."""
+        return np.column_stack([self.q, self.speed])
+
+    @cached_property
+    def volts(self) -> np.ndarray:
+        """Voltage of the motor [V], 0 while the drive is off, `[T]`: measured, or that of the servo at the measured q.
+
+        Raises InvalidValueError for a log with a torque only.
+        """
+        if self.voltage is not None:
+            return self.on * self.voltage
+        if self.goal is None or self.drive is None:
+            raise InvalidValueError(self.name, "hold a voltage, or a goal with a drive", "neither")
+        return self.on * self.drive.voltage(self.drive.duty(self.goal - self.q))
+
+    def cut(self, parts: int) -> list[JointLog]:
+        """Cut the log into parts of like length.
+
+        Raises InvalidValueError for parts of fewer than ten samples.
+        """
+        values = {each: getattr(self, each, None) for each in ("time", "q", *COLUMNS)}
+        fields = {each: value for each, value in values.items() if value is not None}
+        bounds = np.linspace(0, len(self.time), parts + 1).astype(int)
+        more = {"drive": self.drive}
+        return [
+            JointLog(**{each: value[i:j] for each, value in fields.items()}, **more, name=f"{self.name}, part {k + 1}")
+            for k, (i, j) in enumerate(pairwise(bounds))
+        ]
+
+    @classmethod
+    def from_csv(cls, path: str | Path, *, drive: Drive | None = None) -> JointLog:
+        """Read a log from a CSV file with a heading: t [s], q [rad], and any of torque [N m], dq [rad/s], enabled,
+        goal [rad], voltage [V], external [N m]; without a voltage, duty and supply [V] together make it.
+
+        Other columns are ignored; position, angle and theta are accepted for q, speed, velocity and omega for dq, tau
+        for torque. A `drive` makes the goal count, and a voltage is then not read.
+
+        Raises FileError in one line for what is wrong in the file.
+        """
+        path = validation.path("path", path)
+        table = Table(path)
+        headings: dict[str, str] = {}
+        for heading in table.names:
+            word = heading.split("[")[0].split("(")[0].strip().lower()
+            headings.setdefault(ALIASES.get(word, word), heading)
+        if missing := [each for each in ("t", "q") if each not in headings]:
+            raise FileError(f"{path}: no column {missing[0]} (t, q, and torque, voltage or goal)")
+        names = ["t", "q", *(each for each in COLUMNS if each in headings)]
+        read: dict[str, Any] = dict(zip(names, table.numbers([headings[each] for each in names]).T, strict=True))
+        duty, supply = read.pop("duty", None), read.pop("supply", None)
+        if duty is not None and supply is not None and "voltage" not in read:
+            read["voltage"] = duty * supply
+        if drive is not None and "goal" in read:
+            read.pop("voltage", None)
+        try:
+            return cls(read.pop("t"), read.pop("q"), **read, drive=drive, name=path.stem)
+        except InvalidValueError as error:
+            raise FileError(f"{path}: {error}") from None
+
+
+def derivative(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Compute the slope of a parabola through seven samples, `[T]`."""
+    return differentiated(time, np.column_stack([values, *np.zeros((2, len(values)))]))[:, 0]
+
+
+def as_joint_logs(logs: JointLog | Sequence[JointLog]) -> tuple[JointLog, ...]:
+    """Return one log or several as a tuple, or raise InvalidValueError."""
+    result = (logs,) if isinstance(logs, JointLog) else tuple(logs) if isinstance(logs, Sequence) else ()
+    if not result or not all(isinstance(each, JointLog) for each in result):
+        raise InvalidValueError("logs", "be a JointLog or a list of them", logs)
+    if len({each.torque is None for each in result}) > 1:
+        raise InvalidValueError("logs", "all hold a torque, or none", "some do")
+    return result

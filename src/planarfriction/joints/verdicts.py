@@ -1,0 +1,135 @@
+"""Verdicts on the fit of a joint: what the logs say, what they leave open, and what is wrong in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from planarfriction.identify.verdicts import Verdict
+from planarfriction.joints.log import JointLog
+from planarfriction.joints.result import Trial
+
+LAGS = np.arange(-20, 61) * 1e-3
+"""Delays of a reported speed that are tried [s]."""
+
+LATE = 3e-3
+"""Delay of a reported speed above which it is named [s]."""
+
+FULL, STANDING, LONG = 0.999, 0.02, 0.1
+"""Duty that counts as full, share of the largest speed below which a joint stands, and time that it stands [s]."""
+
+WORDS = {
+    "load": "the level grows with the torque through the gears",
+    "stribeck": "friction falls with speed from rest on",
+    "bristles": "the joint bends before it slips",
+    "directional": "torque of the motor and of the load raise the level by different shares",
+}
+"""Meaning of each term."""
+
+NOT = {
+    "load": "not load-dependent as far as these logs tell",
+    "stribeck": "no fall of friction with speed was seen",
+    "bristles": "bristles not identifiable: give rigid friction, or measure slow reversals",
+    "directional": "no difference between motor and load driving was seen",
+}
+"""Meaning of a term that was not kept."""
+
+
+def judge(kept: Trial, trials: Mapping[str, Trial]) -> tuple[Verdict, ...]:
+    """Return all verdicts on a fit."""
+    return (*_on_terms(kept, trials), *_on_drive(kept), *_on_logs(kept))
+
+
+def _on_terms(kept: Trial, trials: Mapping[str, Trial]) -> Iterator[Verdict]:
+    best = trials[""]
+    for term, trial in trials.items():
+        if not term:
+            continue
+        gain, scatter = trial.gain(best)
+        ratio, low, high = np.exp([-gain, -gain - scatter, -gain + scatter])
+        numbers = f"errors of left-out logs are {ratio:.2f} ({low:.2f} to {high:.2f}) of those without it"
+        good = term in kept.problem.terms
+        if term == "load":
+            numbers += f", b = {trial.values['load']:.2g}"
+        yield Verdict(term, good, f"{WORDS[term] if good else NOT[term]} ({numbers})")
+        if good:
+            best = trial
+    yield from _on_bounds(kept)
+
+
+def _on_bounds(kept: Trial) -> Iterator[Verdict]:
+    for name, error in kept.spread.items():
+        value = kept.values[name]
+        if name in ("sigma_0", "sigma_1", "v_s", "rise") and not 2.0 * error < value:
+            yield Verdict(name, False, f"spread {error:.2g} of {value:.2g} between left-out logs")
+
+
+def _on_drive(kept: Trial) -> Iterator[Verdict]:
+    problem, values = kept.problem, kept.values
+    if problem.by_torque:
+        return
+    gain = values.get("torque_gain", problem.torque_gain or 0.0)
+    if "back_emf" in values:
+        emf = values["back_emf"]
+        kt, resistance = emf / gain, emf / gain**2
+        text = f"kt/R = {gain:.3g} N m/V; with the drive off: kt = {kt:.3g} N m/A, R = {resistance:.3g} Ohm"
+        yield Verdict("torque_gain", True, text)
+    else:
+        yield Verdict("torque_gain", True, f"only kt/R = {gain:.3g} N m/V is known, neither kt nor R")
+        text = "no log with the drive off: viscous friction and back-EMF cannot be told apart"
+        yield Verdict("sigma_2", False, f"{text}, {values['sigma_2']:.3g} N m s/rad is both")
+    if problem.plant.mass and problem.plant.arm_mass is None and problem.torque_gain is None:
+        share = 0.5 / problem.plant.mass  # half the mass of an arm counts, in %
+        text = f"an arm without mass is assumed: all torques grow by {share:.2g} % for each 10 g of an arm"
+        yield Verdict("arm_mass", False, text)
+
+
+def speed_lag(log: JointLog) -> float:
+    """Estimate by how much the reported speed lags the slope of q [s]."""
+    inner = slice(len(LAGS), -len(LAGS)) if len(log.time) > 4 * len(LAGS) else slice(None)
+    misses = [float(np.abs(np.interp(log.time - lag, log.time, log.speed) - log.dq)[inner].mean()) for lag in LAGS]
+    return float(LAGS[int(np.argmin(misses))])
+
+
+def standing(log: JointLog) -> np.ndarray:
+    """Return the mask of samples that stand at full duty for `LONG`, `[T]`."""
+    if log.goal is None or log.drive is None:
+        return np.zeros(len(log.time), dtype=bool)
+    speed = np.abs(log.speed)
+    full = (np.abs(log.drive.duty(log.goal - log.q)) >= FULL) & (log.on > 0.0)
+    mask = full & (speed < STANDING * speed.max())
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    for first, last in edges.reshape(-1, 2):
+        if log.time[last - 1] - log.time[first] < LONG:
+            mask[first:last] = False
+    return mask
+
+
+def _on_logs(kept: Trial) -> Iterator[Verdict]:
+    problem = kept.problem
+    lags = [speed_lag(log) for log in problem.logs if log.dq is not None]
+    if lags and abs(lag := float(np.median(lags))) > LATE:
+        text = f"the reported speed lags by {1e3 * lag:.0f} ms ({1e3 * min(lags):.0f} to {1e3 * max(lags):.0f})"
+        yield Verdict("dq", False, f"{text}: the slope of q was used")
+    if problem.by_torque:
+        return
+    for i, log in enumerate(problem.logs):
+        mask = standing(log)
+        if mask.any():
+            yield from _on_standing(kept, i, mask)
+
+
+def _on_standing(kept: Trial, i: int, mask: np.ndarray) -> Iterator[Verdict]:
+    """Compare a log that stands at full duty with what the others say: it must lie within the level of friction."""
+    log, values = kept.problem.logs[i], kept.folds[i]
+    plant, joint = kept.problem.plant_numbers(values, log), kept.problem.friction(values)
+    driven = plant.torque_gain * log.volts[mask]
+    outside = (log.outside - plant.moment * np.sin(log.q - plant.offset))[mask]
+    most = joint.mu_s + np.abs(joint.load_motor * driven - joint.load_external * outside)
+    over = float(np.median(np.abs(driven + outside) - most))
+    seconds = float(mask.sum() * np.median(np.diff(log.time)))
+    where = f"{log.name}: saturated and standing for {seconds:.2g} s at {np.median(log.q[mask]):.2f} rad"
+    if over > 0.0:
+        text = f"this log contradicts the others, by which {over:.2g} N m are left over to move it"
+        yield Verdict("fit", False, f"{where}: {text}; look for a current limit, heat or a stop")

@@ -1,0 +1,77 @@
+"""Friction of a joint in C, against the step of the library."""
+
+import ctypes
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from planarfriction.errors import InvalidValueError
+from planarfriction.export.joint import export_joint_c
+from planarfriction.joints import JointFriction
+from planarfriction.joints.friction import RIGID
+from tests.support.c_libraries import STRICT
+
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+
+FRICTION = JointFriction(0.8, 0.3, 0.2, 0.1, 1.2, 0.05, 400.0, 2.0)
+
+
+def compiled(friction, folder):
+    """Export and compile; return the function."""
+    files = export_joint_c(friction, folder)
+    assert [each.name for each in files] == ["friction.h", "friction.c"]
+    command = "gcc", *STRICT, "-O1", "-shared", "-fPIC", "friction.c", "-o", "friction.so", "-lm"
+    subprocess.run(command, cwd=folder, check=True)
+    function = ctypes.CDLL(folder / "friction.so").friction_joint_torque
+    function.restype = ctypes.c_double
+    function.argtypes = [ctypes.POINTER(ctypes.c_double)] + 4 * [ctypes.c_double]
+    return function
+
+
+@pytest.mark.parametrize("friction", [FRICTION, JointFriction(0.03, 0.005, 0.2, 0.2)])
+def test_steps_agree_with_the_library(friction, tmp_path):
+    """Random speeds from sticking to sliding; the step of NumPy is written here once more."""
+    function, state, z = compiled(friction, tmp_path), ctypes.c_double(0.0), 0.0
+    rng, law = np.random.default_rng(0), friction.law
+    for _ in range(500):
+        speed = rng.normal() * 10.0 ** rng.uniform(-4.0, 1.0)
+        motor, outside, dt = rng.normal(), rng.normal(), 10.0 ** rng.uniform(-5.0, -2.0)
+        found = function(ctypes.byref(state), speed, motor, outside, dt)
+        level = law.mu_c + (law.mu_s - law.mu_c) * np.exp(-((speed / law.v_s) ** 2))
+        level += abs(friction.load_motor * motor - friction.load_external * outside)
+        rate = abs(speed) * law.sigma_0 / level
+        z = z * np.exp(-rate * dt) + speed * -np.expm1(-rate * dt) / rate
+        wanted = law.sigma_0 * z + law.sigma_1 * (speed - rate * z) + law.sigma_2 * speed
+        assert state.value == pytest.approx(z, rel=1e-9, abs=1e-15)
+        assert found == pytest.approx(wanted, rel=1e-9, abs=1e-12)
+
+
+def test_a_rigid_joint_bends_by_one_milliradian(tmp_path):
+    function, state = compiled(JointFriction(0.5), tmp_path), ctypes.c_double(0.0)
+    for _ in range(1000):
+        torque = function(ctypes.byref(state), 1.0, 0.0, 0.0, 1e-3)
+    assert torque == pytest.approx(0.5) and state.value == pytest.approx(RIGID)
+
+
+def test_what_is_no_number_changes_nothing(tmp_path):
+    function, state = compiled(FRICTION, tmp_path), ctypes.c_double(1e-4)
+    for values in ((np.nan, 0, 0, 1e-3), (1.0, np.inf, 0, 1e-3), (1.0, 0, np.nan, 1e-3), (1.0, 0, 0, 0.0)):
+        assert function(ctypes.byref(state), *values) == 0.0 and state.value == 1e-4
+
+
+def test_nothing_is_allocated(tmp_path):
+    compiled(FRICTION, tmp_path)
+    subprocess.run(["gcc", "-std=c99", "-O2", "-c", "friction.c"], cwd=tmp_path, check=True)
+    nm = subprocess.run(["nm", "friction.o"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+    kinds = {line.split()[-1]: line.split()[-2] for line in nm.splitlines() if ".LC" not in line}
+    assert set(kinds) <= {"friction_joint_torque", "exp", "pow", "log"} and "d" not in map(str.lower, kinds.values())
+    assert not re.search(r"\b(while|for|goto)\b", (tmp_path / "friction.c").read_text().split("*/", 1)[1])
+
+
+def test_names_of_c_are_checked(tmp_path):
+    for name in ("2nd", "math", "a-b"):
+        with pytest.raises(InvalidValueError, match="name must"):
+            export_joint_c(FRICTION, tmp_path, name=name)
