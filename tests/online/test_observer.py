@@ -14,8 +14,8 @@ from numba import njit
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from planarfriction.online import FrictionObserver, Measurement, Sensors
+from planarfriction.online.loops import filter_state, square_root
 from planarfriction.online.loops import friction_filter as kernels
-from planarfriction.online.loops import square_root
 from planarfriction_studies.rig import Gripper, Parts
 
 LAW = pf.LuGre(mu_c=0.5, mu_s=0.55, v_s=2e-3, sigma_2=0.1)
@@ -56,6 +56,16 @@ def test_a_slip_in_many_directions_determines_friction_and_radius():
     assert found.slip > 0.95
     low, high = found.interval()[0]
     assert low < 0.7 < high < 0.75
+
+
+def test_stiffness_that_does_not_grow_with_the_load_changes_nothing():
+    # sliding friction does not depend on bristles
+    fixed = FrictionObserver(
+        pf.DistributedModel(PATCH, pf.LuGre(**vars(LAW) | {"reference_load": 3.0})), surface=SURFACE
+    )
+    ours = FrictionObserver(pf.DistributedModel(PATCH, LAW), surface=SURFACE)
+    for sample in sliding(count=60):
+        assert fixed.update(sample) == ours.update(sample)
 
 
 def test_a_slide_without_a_turn_does_not_determine_the_radius():
@@ -111,7 +121,7 @@ def test_bad_samples_are_said_and_lose_nothing(what):
             time = sample.time if flag == 2 else each.time + 5e-4
             odd = own.update(sample._replace(time=time))
             assert odd.flags & flag
-            assert np.isfinite(own.state[: kernels.TIME]).all()
+            assert np.isfinite(own.state[: filter_state.TIME]).all()
     assert found.flags == 0
     assert found.mu_c == pytest.approx(float(clean.mu_c), rel=1e-3)
     assert found.radius == pytest.approx(float(clean.radius), rel=1e-2)
@@ -224,7 +234,7 @@ def updated(state, h, column):
 def test_measurements_and_spreads_are_those_of_a_kalman_filter():
     rng = np.random.default_rng(0)
     n = kernels.N
-    state, column = np.zeros(kernels.STATE), np.zeros(n)
+    state, column = np.zeros(filter_state.STATE), np.zeros(n)
     root = np.tril(rng.normal(size=(n, n)))
     state[kernels.ROOT : kernels.ROOT + n * n] = root.ravel()
     state[:n] = mean = rng.normal(size=n)
@@ -248,11 +258,11 @@ def moved(own, state, column):
 def test_errors_of_the_count_do_not_add_up():
     # x = (remainder e, twist, ...); a window of v counts: twist = v + (e - e')/span, e' again and kept
     rng, n, span = np.random.default_rng(1), kernels.N, 1.0 / 120.0
-    own, column, state = observer()._filter, np.zeros(n), np.zeros(kernels.STATE)
+    own, column, state = observer()._filter, np.zeros(n), np.zeros(filter_state.STATE)
     root = np.tril(rng.normal(size=(n, n)))
     state[kernels.ROOT : kernels.ROOT + n * n] = root.ravel()
-    state[:3], state[kernels.CHAIN], state[kernels.OLD + 8] = (1e-6, 2e-6, -1e-6), 3.0, span
-    state[kernels.OLD + 5 : kernels.OLD + 8] = 0.01, 0.02, 0.03
+    state[:3], state[filter_state.CHAIN], state[filter_state.OLD + 8] = (1e-6, 2e-6, -1e-6), 3.0, span
+    state[filter_state.OLD + 5 : filter_state.OLD + 8] = 0.01, 0.02, 0.03
     before = state[:3].copy()
     moved(own, state, column)
     map_ = np.eye(n)

@@ -10,9 +10,9 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
-from planarfriction.laws.base import refuse_fixed_stiffness
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models import FrictionModel
+from planarfriction.online.loops import filter_state
 from planarfriction.online.loops import friction_filter as kernels
 from planarfriction.online.sensors import Measurement, Sensors
 
@@ -134,7 +134,6 @@ class FrictionObserver:
         self.sensors: Any = (
             Sensors() if sensors is None else validation.instance("sensors", sensors, Sensors, "Sensors")
         )
-        refuse_fixed_stiffness(model.law, "FrictionObserver")
         self.tolerance = validation.positive("tolerance", tolerance)
         spreads = {"mu_spread": mu_spread, "ratio_spread": ratio_spread, "radius_spread": radius_spread}
         prior = np.array([validation.positive(name, value) for name, value in spreads.items()])
@@ -156,12 +155,12 @@ class FrictionObserver:
         unsure = np.abs(self._filter.conjugate) @ validation.non_negative_array("bias", bias, (3,))
         fresh = [kernels.FRESH] * 3
         root = np.diag(np.concatenate([self._filter.remainder, fresh, prior, np.maximum(unsure, 1e-9)]))
-        self.state = state = np.zeros(validation.batched(batch, (kernels.STATE,)))
-        state[..., kernels.MU : kernels.BIAS] = middle
-        state[..., kernels.TARED] = (unsure <= np.sqrt(self._filter.noise)).all()
+        self.state = state = np.zeros(validation.batched(batch, (filter_state.STATE,)))
+        state[..., filter_state.MU : filter_state.BIAS] = middle
+        state[..., filter_state.TARED] = (unsure <= np.sqrt(self._filter.noise)).all()
         state[..., kernels.ROOT : kernels.ROOT + n * n] = root.ravel()
-        state[..., kernels.SLIP], state[..., kernels.TIME] = 1e-3, -math.inf
-        state[..., [kernels.BOUND, kernels.PEAK, kernels.GAUGE]] = -10.0
+        state[..., filter_state.SLIP], state[..., filter_state.TIME] = 1e-3, -math.inf
+        state[..., [filter_state.BOUND, filter_state.PEAK, filter_state.GAUGE]] = -10.0
 
     def update(self, measurement: Measurement) -> Estimate:
         """Take a sample of every part, with NaN or None for what is missing; return what is known now.
@@ -176,7 +175,7 @@ class FrictionObserver:
         Raises InvalidValueError as `update` does.
         """
         validation.instance("measurement", measurement, Measurement, "a Measurement")
-        batch, state = self.state.shape[:-1], self.state.reshape(-1, kernels.STATE)
+        batch, state = self.state.shape[:-1], self.state.reshape(-1, filter_state.STATE)
         velocity, samples = measurement.slip_velocity, np.empty((*batch, 8))
         try:
             samples[..., 0], samples[..., 1:4], samples[..., 4] = measurement[:3]
@@ -190,7 +189,7 @@ class FrictionObserver:
     @property
     def bias(self) -> np.ndarray:
         """Estimated bias of the measured wrench, `[..., 3]` [N, N, N m]."""
-        return -self.state[..., kernels.BIAS : kernels.N] @ self._filter.frame
+        return -self.state[..., filter_state.BIAS : kernels.N] @ self._filter.frame
 
     def information(self) -> np.ndarray:
         """Return the information of the samples so far on the logs of mu_c, mu_s/mu_c and the radius, `[..., 3, 3]`.
@@ -199,7 +198,7 @@ class FrictionObserver:
         """
         n = kernels.N
         root = self.state[..., kernels.ROOT : kernels.ROOT + n * n].reshape(*self.state.shape[:-1], n, n)[
-            ..., kernels.MU : kernels.BIAS, :
+            ..., filter_state.MU : filter_state.BIAS, :
         ]
         return np.linalg.inv(root @ np.swapaxes(root, -1, -2)) - np.diag(1.0 / self._filter.prior_spread**2)
 
