@@ -32,7 +32,6 @@ ROOMS = {
         "identify",
         "jax",
         "kernels",
-        "limit_surface",
     ),
     *("models", "online", "planning", "plots", "scenes", "solvers", "sweeps", "tensors", "torch", "warp"),
 }

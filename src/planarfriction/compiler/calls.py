@@ -16,11 +16,13 @@ from llvmlite.binding import add_symbol
 from numba import types
 from numba.extending import intrinsic
 
-from planarfriction.compiler.memory import place_of
+from planarfriction.compiler.memory import Doubles, place_of
 
 _POINTER = types.CPointer(types.float64)
-_ARGUMENTS = {"Place": types.int64, "int": types.int64, "Doubles": _POINTER, "float": types.float64}
-"""Types of arguments by their annotations."""
+_KINDS = {int: types.int64, Doubles: _POINTER, float: types.float64}
+_NAMES = {"Place": types.int64, "int": types.int64, "Doubles": _POINTER, "float": types.float64}
+_ARGUMENTS: dict[Any, types.Type] = {**_KINDS, **_NAMES}
+"""Types of arguments by their annotations, which may be names."""
 
 
 def signature_of(function: Any) -> tuple:
