@@ -111,7 +111,7 @@ def test_contacts_are_called_what_they_are_called_in_results():
             1.0,
             "body has mass, inertia, position, angle, velocity, gravity, outline, size, got 'mas' (did you",
         ),
-        ("finger.law.mu_c", 1.0, "velocity, fingers, got 'finger' (did you mean 'fingers'?)"),
+        ("finger.law.mu_c", 1.0, "velocity, spring, fingers, got 'finger' (did you mean 'fingers'?)"),
         ("fingers.lwa.mu_c", 1.0, "got 'lwa' (did you mean 'law'?)"),
         ("fingers.law.mu", 1.0, "fingers.law has kind, mu_c, mu_s, v_s, sigma_0, sigma_1"),
         ("fingers.patch.radios", 1.0, "got 'radios' (did you mean 'radius'?)"),

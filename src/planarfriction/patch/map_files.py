@@ -263,7 +263,10 @@ def _read_npy(path: Path, _: MapReading) -> np.ndarray:
 def _array(path: Path, content: bytes) -> np.ndarray:
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # of a damaged header, which NumPy reads as source code
-        values = np.load(io.BytesIO(content), allow_pickle=False)
+        try:
+            values = np.load(io.BytesIO(content), allow_pickle=False)
+        except Warning as warning:
+            raise FileError(f"pressure map {path}: not a readable {path.suffix} file ({warning})") from None
     return _real(path, values)
 
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.equality import ByValue, checked
+from planarfriction.errors import InvalidValueError
 from planarfriction.geometry import rotate
 from planarfriction.scenes.body import floats
 from planarfriction.scenes.signal import Signal, as_signal
@@ -64,9 +65,13 @@ class Spring(ByValue):
 
         It acts at the centre of mass, world axes [N, N, N m]; `time` `[...]` [s] tells the pose of the anchor.
 
-        Raises InvalidValueError for times or poses that are not finite.
+        Raises InvalidValueError for times or poses that are not finite, or do not belong together.
         """
-        pose = validation.finite_numbers("pose", pose)
+        pose, time = validation.finite_numbers("pose", pose), validation.finite_numbers("time", time)
+        if pose.shape[-1:] != (3,) or time.shape not in ((), pose.shape[:-1]):
+            raise InvalidValueError(
+                "pose", f"have the shape (..., 3) with one for each of {time.shape} times", pose.shape
+            )
         arm = rotate(self.at, pose[..., 2])
         stretch = self.anchor(time) - pose - np.concatenate([arm, np.zeros_like(arm[..., :1])], -1)
         wrench = stretch * [self.stiffness, self.stiffness, self.torsion]

@@ -123,8 +123,9 @@ class Friction:
     def _say_alone(self, d: Any) -> None:
         """Warn, once, if data have moved on by steps without friction."""
         self._used[:] = [True]
-        steps = (d.time - d.userdata[self._memory.next]) / d.model.opt.timestep
-        if 0.5 < steps < 1e9 and abs(steps - round(steps)) < 1e-6 and _ALONE not in self._said:
+        last = d.userdata[self._memory.next]  # 0 before the first step: the data may come from elsewhere
+        steps = (d.time - last) / d.model.opt.timestep
+        if last != 0.0 and 0.5 < steps < 1e9 and abs(steps - round(steps)) < 1e-6 and _ALONE not in self._said:
             self._said.add(_ALONE)
             line = f"the time of these data went on by {round(steps)} steps without patch friction"
             warnings.warn(f"{line}: {_ALONE}", stacklevel=4)
