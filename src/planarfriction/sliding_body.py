@@ -116,7 +116,8 @@ class SlidingBody(ByValue):
         end = self.patches.step(state, HostStep(free, load, np.zeros(free.shape[-2:]), coupled), dt)
         if not end.converged.all():
             count = f"{np.count_nonzero(~end.converged)} of {end.converged.size} bodies"
-            raise SolverError(f"the step of a body did not converge ({count}, off by {end.residual.max():.1e} m/s)")
+            most = f"off by {end.residual.max():.1e} m/s at dt up to {dt.max():.3g} s"
+            raise SolverError(f"the step of a body did not converge ({count}, {most})")
         friction = np.einsum("...i,...im->...m", end.wrench.reshape(*end.wrench.shape[:-2], -1), to_patches)
         return BodyStep(end.state, pushed + response * friction, friction)
 
