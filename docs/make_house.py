@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import sys
+import textwrap
 import tomllib
 from pathlib import Path
 
@@ -63,7 +64,7 @@ def box(axes: plt.Axes, x: float, y: float, width: float, colour: str, title: st
         axes.text(x + 0.1, y + 0.32, text, fontsize=8, va="center")
     else:
         axes.text(x + 0.1, y + 0.43, title, fontsize=8.5, weight="bold", va="center")
-        axes.text(x + 3.4, y + 0.43, text if len(text) < 112 else text[:109] + "...", fontsize=7.2, va="center")
+        axes.text(x + 3.4, y + 0.43, textwrap.fill(text, 116), fontsize=7.2 if len(text) < 117 else 5.6, va="center")
 
 
 if __name__ == "__main__":
