@@ -12,7 +12,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.geometry import rotate
 from planarfriction.identify.logs import Log
 from planarfriction.identify.result import Identification
-from planarfriction.identify.slides import Slide, SlidingBody, window_twists
+from planarfriction.identify.slides import MassProperties, Slide, window_twists
 from planarfriction.identify.verdicts import Verdict
 from planarfriction.patch import ContactPatch
 
@@ -101,7 +101,7 @@ def check_logs(logs: Sequence[Log], patch: ContactPatch, names: Sequence[str] = 
     return tuple(findings)
 
 
-def check_slides(slides: Sequence[Slide], patch: ContactPatch, body: SlidingBody) -> None:
+def check_slides(slides: Sequence[Slide], patch: ContactPatch, body: MassProperties) -> None:
     """Check slides of a body on `patch`: units of time, places and angles, and trackers that froze.
 
     Raises InvalidValueError, one line, for what no fit can make sense of.
@@ -324,7 +324,7 @@ def check_sampling(log: Log, sigma_0: float, sigma_1: float) -> Finding | None:
 # ---------------------------------------------------------------------- slides
 
 
-def check_slide_units(slides: Sequence[Slide], patch: ContactPatch, body: SlidingBody) -> Finding | None:
+def check_slide_units(slides: Sequence[Slide], patch: ContactPatch, body: MassProperties) -> Finding | None:
     """Check that decelerations are those of friction, and alike in all slides, for times in s, places in m and angles
     in rad."""
     size = _size_at(body.mass * body.gravity, patch)
@@ -344,7 +344,7 @@ def check_slide_units(slides: Sequence[Slide], patch: ContactPatch, body: Slidin
     return None
 
 
-def _friction_of_slides(slides: Sequence[Slide], body: SlidingBody, size: float, unit: float) -> np.ndarray:
+def _friction_of_slides(slides: Sequence[Slide], body: MassProperties, size: float, unit: float) -> np.ndarray:
     """Compute friction over load, `|(a, I alpha/(m size))|/g` > 0, between windows of moving slides."""
     found = []
     for slide in slides:

@@ -15,8 +15,8 @@ from planarfriction.identify.problem import Problem
 from planarfriction.identify.result import Identification
 from planarfriction.identify.search import Fit, interruptible, multistart, refine
 from planarfriction.identify.slides import (
+    MassProperties,
     Slide,
-    SlidingBody,
     as_slides,
     contradictions,
     improve_start,
@@ -65,7 +65,7 @@ Build = Callable[..., Any]
 def identify_motion(
     slides: Slide | Sequence[Slide],
     patch: ContactPatch,
-    body: SlidingBody,
+    body: MassProperties,
     *,
     parameters: Sequence[str] = ("mu_c", "contact_radius"),
     start: LuGre = DRY,
@@ -119,7 +119,7 @@ def identify_motion(
     """
     slides = as_slides(slides)
     names = check_names(parameters, MOTION_PARAMETERS)
-    validation.instance("body", body, SlidingBody, "a SlidingBody")
+    validation.instance("body", body, MassProperties, "MassProperties")
     if type(start) is not LuGre:  # a subclass may compute something else from the parameters that are fitted
         raise InvalidValueError("start", "be a LuGre law", start)
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
@@ -151,7 +151,7 @@ class SlideProblem(Problem):
         self,
         slides: Sequence[Slide],
         patch: ContactPatch,
-        body: SlidingBody,
+        body: MassProperties,
         names: tuple[str, ...],
         law: LuGre,
         build: Build,
