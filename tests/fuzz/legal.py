@@ -154,7 +154,7 @@ def objects() -> dict[str, Any]:
 
 
 SPECIAL: dict[str, dict[str, Any]] = {
-    "Contact": {"pressure": "fixed", "height": 0.0},
+    "Contact": {"pressure": "fixed", "height": 0.0, "edge": False},
     "SlidingBody": {"models": DISCS, "positions": (0.0, 0.0), "angles": 0.0},
     "SlidingBody.step": {
         "state": Fresh(lambda: np.zeros(np.prod(DISCS.state_shape))),

@@ -75,9 +75,11 @@ def test_a_plate_pulled_off_brakes_with_all_of_the_load_to_the_end(model, late):
 @pytest.mark.parametrize(("model", "off"), list(zip(PADS, (2.5e-4, 6e-5, 1e-4), strict=True)))
 def test_the_torque_is_that_of_the_covered_part(model, off):
     for edge in np.linspace(-0.009, 0.009, 7):
-        outline = [(-0.1, -0.05), (edge, -0.05), (edge, 0.05), (-0.1, 0.05)]
+        middle = [(edge, 0.0), (edge, 0.0)]  # twice, and over the centre of a cell
+        outline = [(-0.1, -0.05), (edge, -0.05), *middle, (edge, 0.05), (-0.1, 0.05)]
         body = pf.Body(1e3, 1e3, velocity=(0.0, -0.1, 0.0), gravity=(0.0, 0.0), outline=outline)
         data = pf.simulate(pf.Scene(body, [pf.Contact(model, LOAD, edge=True)], 0.01)).data
+        assert np.isfinite(data.tau).all()
         assert float(data.tau[-1, 0] / data.fy[-1, 0]) == pytest.approx(0.5 * (edge - 0.5 * WIDTH), abs=off)
 
 
@@ -172,6 +174,8 @@ def test_what_an_edge_cannot_have_is_refused():
         dataclasses.replace(scene, body=still, start="equilibrium")
     with pytest.raises(InvalidValueError, match="edge of contact 'contact' must be False for derivatives of scenes"):
         scene_sensitivities(scene, ["mu"])
+    with pytest.raises(InvalidValueError, match="outline must enclose an area where a contact has an edge"):
+        pf.simulate(dataclasses.replace(scene, body=dataclasses.replace(still, outline=np.ones((3, 2)))))
     fixed = dataclasses.replace(PADS[-1], law=dataclasses.replace(LAW, reference_load=1.0))
     with pytest.raises(InvalidValueError, match="law must have no reference_load for an edge"):
         pf.simulate(dataclasses.replace(scene, contacts=[dataclasses.replace(pad, model=fixed)]))
