@@ -83,6 +83,26 @@ def test_the_torque_is_that_of_the_covered_part(model, off):
         assert float(data.tau[-1, 0] / data.fy[-1, 0]) == pytest.approx(0.5 * (edge - 0.5 * WIDTH), abs=off)
 
 
+def test_half_a_disc_spins_as_a_disc_of_half_the_area_about_its_centroid():
+    model, torque = pf.DistributedModel(square(11).patch.discs(1), LAW), []
+    off = 4.0 * model.patch.radii[0] / (3.0 * np.pi)
+    for edge, centre in ((0.1, 0.0), (0.0, -off)):
+        outline = [(-0.1, -0.05), (edge, -0.05), (edge, 0.05), (-0.1, 0.05)]
+        body = pf.Body(1e3, 1e3, velocity=(0.0, -centre, 1.0), gravity=(0.0, 0.0), outline=outline)
+        data = pf.simulate(pf.Scene(body, [pf.Contact(model, LOAD, edge=True)], 1e-3)).data.isel(time=-1, contact=0)
+        torque.append(float(data.tau - centre * data.fy))
+    assert torque[1] == pytest.approx(np.sqrt(0.5) * torque[0], rel=1e-3)
+
+
+def test_a_contact_without_load_ends_at_the_same_place():
+    """No force jumps there, which would shorten the steps: the end is looked for."""
+    pulled = slide(square(5), (0.0, -1.0, 0.0), start="sliding")
+    light = dataclasses.replace(pulled, contacts=[dataclasses.replace(pulled.contacts[0], normal_force=0.0)])
+    data, place = pf.simulate(light).data, float(pf.simulate(pulled).data.y[-1])
+    assert float(data.y[-1]) == pytest.approx(place, abs=2e-6)
+    assert float(data.ended[0]) == float(data.time[-1]) == pytest.approx(-place, abs=2e-6)
+
+
 @pytest.mark.parametrize("velocity", [(0.0, -0.3, 20.0), (0.5, 0.2, -8.0), (0.05, -0.25, 0.0)])
 def test_no_energy_comes_from_the_edge(velocity):
     place = {"position": (0.01, -0.03), "angle": 0.3, "save_every": 1e-3, "stop_speed": 1e-4}
