@@ -21,14 +21,47 @@ from planarfriction.kernels.passes import Passes
 from planarfriction.kernels.steps import StepFunctions, step_functions
 from planarfriction.kernels.vectors import Vector, plus, put, three
 
-SLOPES = LANES * 2 * DISC.size**2
-"""Numbers of a block of derivatives."""
+RESULTS = LANES * 2 * DISC.size**2
+"""Numbers of the results of a block of cells: derivatives, or rates or bristles, row by row."""
+
+BLOCK = RESULTS + LANES * 12
+"""Numbers of a block of cells: results, and copies of up to eight numbers, of the bristle and of the weight."""
 
 
 @kernel
-def _rows_from(contact: CellsContact, z: Doubles, first: int, out: Doubles) -> Rows:
-    """Return the rows of the cells of a contact from one on."""
-    return Rows(at(contact.cells, first), at(z, first), at(contact.weights, first), out, contact.count)
+def _copy(count: int, source: Doubles, target: Doubles) -> None:
+    for i in range(count):
+        target[i] = source[i]
+
+
+@kernel
+def _in_place(contact: CellsContact, z: Doubles, first: int, lanes: int, out: Doubles, block: Doubles) -> Any:
+    """Return the rows of cells of a contact from one on, and their number."""
+    rows = Rows(at(contact.cells, first), at(z, first), at(contact.weights, first), out, contact.count)
+    return rows, min(lanes, contact.count - first)
+
+
+def _filled(numbers: int, size: int) -> Any:
+    """Return a function like `_in_place` that copies cells into a block, filled up with cells without load.
+
+    Loops over it need not ask which of their rows overlap: that takes as long as a loop over a few dozen cells.
+    """
+    bristle, weight = RESULTS + numbers * LANES, RESULTS + (numbers + size) * LANES
+
+    @kernel
+    def filled(contact: CellsContact, z: Doubles, first: int, lanes: int, out: Doubles, block: Doubles) -> Any:
+        n, count = contact.count, min(lanes, contact.count - first)
+        for m in range(numbers + size + 1):
+            for i in range(count, lanes):
+                block[RESULTS + m * LANES + i] = 0.0
+        for m in range(numbers):
+            _copy(count, at(contact.cells, m * n + first), at(block, RESULTS + m * LANES))
+        for m in range(size):
+            _copy(count, at(z, m * n + first), at(block, bristle + m * LANES))
+        _copy(count, at(contact.weights, first), at(block, weight))
+        return Rows(at(block, RESULTS), at(block, bristle), at(block, weight), out, LANES), lanes
+
+    return filled
 
 
 def _run(written: Passes) -> Any:
@@ -42,35 +75,45 @@ def _run(written: Passes) -> Any:
     return passed
 
 
-def evaluate(contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, *, rate: Any) -> None:
+def evaluate(
+    contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, *, cell_rows: Any, rate: Any, copied: int
+) -> None:
     """Write `z'`, and `W`."""
-    record, twist, total = cells.read(contact), three(v), (0.0, 0.0, 0.0)
+    record, twist, total, block = cells.read(contact), three(v), (0.0, 0.0, 0.0), scratch(BLOCK)
     n, (_, lanes) = record.count, divided(record.count)
     for first in range(0, n, lanes):
-        rows = _rows_from(record, z, first, at(zdot, first))
-        total = plus(total, 1.0, rate(record.law, twist, 0.0, rows, min(lanes, n - first)))
+        rows, count = cell_rows(record, z, first, lanes, block if copied > 0 else at(zdot, first), block)
+        total = plus(total, 1.0, rate(record.law, twist, 0.0, rows, count))
+        for m in range(copied):
+            _copy(min(lanes, n - first), at(block, m * LANES), at(zdot, m * n + first))
     put(w, total)
 
 
-def linearise(contact: Place, z: Doubles, v: Doubles, lin: Doubles, *, bristle: Any, slope: Any) -> None:
+def linearise(
+    contact: Place, z: Doubles, v: Doubles, lin: Doubles, *, bristle: Any, cell_rows: Any, slope: Any
+) -> None:
     """Write A and F of each cell (see `general_cells`)."""
-    record, twist, block = cells.read(contact), three(v), scratch(SLOPES)
+    record, twist, block = cells.read(contact), three(v), scratch(BLOCK)
     n, (_, lanes) = record.count, divided(record.count)
     for first in range(0, n, lanes):
-        count = min(lanes, n - first)
-        slope(record.law, twist, 0.0, _rows_from(record, z, first, block), count)
+        rows, count = cell_rows(record, z, first, lanes, block, block)
+        slope(record.law, twist, 0.0, rows, count)
         for m in range(2 * bristle.size * bristle.size):
-            for i in range(count):
-                lin[m * n + first + i] = block[m * LANES + i]
+            _copy(min(lanes, n - first), at(block, m * LANES), at(lin, m * n + first))
 
 
-def step(contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, advance: Any) -> None:
+def step(
+    contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, cell_rows: Any, advance: Any,
+    copied: int,
+) -> None:  # fmt: skip
     """Advance the bristles by `dt` at a held twist, and write the wrench at the end."""
-    record, twist, total = cells.read(contact), three(v), (0.0, 0.0, 0.0)
+    record, twist, total, block = cells.read(contact), three(v), (0.0, 0.0, 0.0), scratch(BLOCK)
     n, (_, lanes) = record.count, divided(record.count)
     for first in range(0, n, lanes):
-        rows = _rows_from(record, z, first, at(new, first))
-        total = plus(total, 1.0, advance(record.law, twist, dt, rows, min(lanes, n - first)))
+        rows, count = cell_rows(record, z, first, lanes, block if copied > 0 else at(new, first), block)
+        total = plus(total, 1.0, advance(record.law, twist, dt, rows, count))
+        for m in range(copied):
+            _copy(min(lanes, n - first), at(block, m * LANES), at(new, m * n + first))
     put(out, total)
 
 
@@ -88,6 +131,9 @@ def functions_of_cells(size: int, turned: bool, leans: bool) -> CellFunctions:
     bristle = general_cells.bristle(kind.element.evaluate, kind.element.step, size, linear=True)
     model = {"lever": kind.lever, "bristle": bristle, "read": cells.read}
     templates, slope = (evaluate, linearise, *general_cells.RATES[2:]), _run(slope_passes(kind))
-    rates = functions_of(kind.name, templates, **model, rate=_run(rate_passes(kind)), slope=slope)
-    steps = step_functions(kind.name, (step, general_cells.slopes), **model, advance=_run(step_passes(kind)))
+    copied = size if size == DISC.size else 0  # points come by the hundred
+    model["cell_rows"] = _filled(kind.numbers + 2 * kind.leans, size) if copied else _in_place
+    rates = functions_of(kind.name, templates, **model, rate=_run(rate_passes(kind)), slope=slope, copied=copied)
+    advance = _run(step_passes(kind))
+    steps = step_functions(kind.name, (step, general_cells.slopes), **model, advance=advance, copied=copied)
     return CellFunctions(rates, steps)

@@ -50,7 +50,7 @@ _ANGLE, _LOOKS, _DOUBT = 0.1, 8, 10.0
 
 # A contact with more bristle states than this has a twist for each of many cells, of which none holds the patch alone:
 # looks would cost a quarter of the time and find nothing.
-_MANY = 100
+_MANY = 50
 
 # Share of a step over which the rates are compared to see how they change with the time alone: what it leaves out is
 # far below any tolerance, and so is what rounding makes of it.
