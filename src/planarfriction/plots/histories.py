@@ -120,7 +120,7 @@ def _draw_panels(axes: Sequence[Any], chosen: Sequence[str], known: Mapping[str,
 
 
 def _finish(figure: Any, axes: Sequence[Any], chosen: Sequence[str], known: Mapping[str, pf.Solution]) -> None:
-    """Align labels, keep those of the last row, and add a legend, by the lines of a panel of contacts if there is one."""
+    """Align labels, keep those of time in the last row, and add a legend."""
     figure.align_ylabels(axes)
     for above in axes[:-1] if len(chosen) < len(_PANELS) else ():
         above.set_xlabel("")
