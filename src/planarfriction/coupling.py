@@ -25,8 +25,7 @@ from planarfriction.equality import ByValue, by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LARGEST
 from planarfriction.kernels import coupling as kernels
-from planarfriction.kernels.coupling_rows import Patches, layout
-from planarfriction.kernels.following import Followers
+from planarfriction.kernels.coupling_rows import Followers, Patches, layout
 from planarfriction.models import FrictionModel
 from planarfriction.models.base import lever_of
 
@@ -344,7 +343,7 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
     patches = Patches(
         count=len(models),
         states=int(bounds[-1]),
-        solve=kernels.solve_address(),
+        solve=address_of(kernels.solve),
         steps=steps,
         slopes=slopes,
         firsts=firsts,

@@ -33,7 +33,7 @@ from planarfriction.kernels.forward import forward
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rollouts import Bars, Inputs, row_of
 from planarfriction.kernels.settle import factor_at, softening, stiffened, within
-from planarfriction.kernels.vectors import Vector, add, plus, scatter, three, times
+from planarfriction.kernels.vectors import Vector, add, clear, plus, scatter, three, times
 
 PARAMETERS = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
 """Numbers of the law that derivatives are taken by."""
@@ -59,8 +59,7 @@ def _lay(w: Doubles, blocks: int, levers: np.ndarray, numbers: int = BLOCK) -> N
     per_block = levers.shape[0] // blocks
     for k in range(blocks):
         block = at(w, k * numbers)
-        for i in range(numbers):
-            block[i] = 0.0
+        clear(block, numbers)
         for i in range(per_block):
             block[i] = levers[k * per_block + i]
 
@@ -91,8 +90,7 @@ def _read(w: Doubles, field: int, values: np.ndarray, n: int, size: int, numbers
 def _forget(w: Doubles, blocks: int, field: int, size: int) -> None:
     for k in range(blocks):
         block = at(w, k * BLOCK + field)
-        for i in range(size * LANES):
-            block[i] = 0.0
+        clear(block, size * LANES)
 
 
 @kernel
