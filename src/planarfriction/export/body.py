@@ -29,15 +29,15 @@ def body_of(model: Any, precision: str) -> dict[str, Any]:
     row = layout(1, 0, 0, 0)
     counts = {name: part.stop - part.start for name, part in row.slices.items()}
     record = np.dtype([(name, "f8", (count,)) for name, count in counts.items() if count])
-    patches = Patches(**dict.fromkeys(Patches._fields, Fixed(0)))._replace(  # pyright: ignore
+    own = Patches(**dict.fromkeys(Patches._fields, Fixed(0)))._replace(  # pyright: ignore
         count=Fixed(1), steps=_STEP, slopes=_SLOPES, radius=Array("lever_arm", (1,), fixed=True)
     )
     writer, p = Writer(), Record("p", record)
     loops = Loops(writer, {record: "search_t"})
-    loops.replaced[coupling._step] = lambda arguments: _FUNCTIONS[arguments[2]]
+    loops.replaced[coupling._step] = lambda given: _FUNCTIONS[given[2]]
     loops.replaced[coupling._load_slopes] = lambda _: "(void)"  # the load is given
-    loops.add(coupling.prepare, (patches, p))
-    loops.add(coupling.search, (patches, p, Scalar("tolerance"), Fixed(ITERATIONS)))
+    loops.add(coupling.prepare, (own, p))
+    loops.add(coupling.search, (own, p, Scalar("tolerance"), Fixed(ITERATIONS)))
     functions = re.sub(r"\breal\b", "double", "\n\n".join(loops.functions))
     functions = re.sub(r"\b(\w+_of_vectors)\b", r"\1_in_double", functions)  # others are in the other precision
     return {

@@ -33,7 +33,7 @@ from planarfriction.kernels.forward import forward
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rollouts import Bars, Inputs, row_of
 from planarfriction.kernels.settle import factor_at, softening, stiffened, within
-from planarfriction.kernels.vectors import Vector, add, clear, plus, scatter, three, times
+from planarfriction.kernels.vectors import Vector, add, plus, scatter, three, times
 
 PARAMETERS = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
 """Numbers of the law that derivatives are taken by."""
@@ -59,7 +59,8 @@ def _lay(w: Doubles, blocks: int, levers: np.ndarray, numbers: int = BLOCK) -> N
     per_block = levers.shape[0] // blocks
     for k in range(blocks):
         block = at(w, k * numbers)
-        clear(block, numbers)
+        for i in range(numbers):
+            block[i] = 0.0
         for i in range(per_block):
             block[i] = levers[k * per_block + i]
 
@@ -90,7 +91,8 @@ def _read(w: Doubles, field: int, values: np.ndarray, n: int, size: int, numbers
 def _forget(w: Doubles, blocks: int, field: int, size: int) -> None:
     for k in range(blocks):
         block = at(w, k * BLOCK + field)
-        clear(block, size * LANES)
+        for i in range(size * LANES):
+            block[i] = 0.0
 
 
 @kernel
