@@ -195,11 +195,7 @@ class CoupledPatches(ByValue):
             axes[name] = array.shape[:cut]
         batch = axes["state"]
         if any(each != batch for each in axes.values()):
-            try:
-                batch = np.broadcast_shapes(*axes.values())
-            except ValueError:
-                shapes = ", ".join(str(list(each)) for each in axes.values())
-                raise InvalidValueError("batch axes", "broadcast", f"shapes {shapes}") from None
+            batch = validation.common_shape("batch axes", axes.values())
         count, words = math.prod(batch), self._packed.words
         if count * words > validation.MOST_NUMBERS:
             rule = f"hold at most {validation.MOST_NUMBERS // words} environments of these patches"
