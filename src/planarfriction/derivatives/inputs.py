@@ -95,7 +95,10 @@ def checked(
         if value.min(initial=0.0) < 0.0:
             raise InvalidValueError(name, "be >= 0", float(value.min()))
     axes = state.shape[: -len(inner)], twist.shape[:-2], load.shape[:-1], packed.rows.shape[:-1], *more
-    batch = validation.common_shape("batch axes", axes)
+    try:
+        batch = np.broadcast_shapes(*axes)
+    except ValueError:
+        raise InvalidValueError("batch axes", "broadcast", f"shapes {', '.join(str(list(a)) for a in axes)}") from None
     count = int(np.prod(batch))
     return RolloutInputs(
         packed,
