@@ -13,7 +13,7 @@ import difflib
 import math
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -368,8 +368,12 @@ def keys(name: str, data: Any, required: Iterable[str], optional: Iterable[str] 
 
 def broadcast(**arrays: np.ndarray) -> tuple[int, ...]:
     """Return the common shape of `arrays`, or raise an error that names them and their shapes."""
+    return common_shape(" and ".join(arrays), [each.shape for each in arrays.values()])
+
+
+def common_shape(name: str, shapes: Collection[tuple[int, ...]], rule: str = "broadcast") -> tuple[int, ...]:
+    """Return the shape to which all `shapes` broadcast."""
     try:
-        return np.broadcast_shapes(*(each.shape for each in arrays.values()))
+        return np.broadcast_shapes(*shapes)
     except ValueError:
-        shapes = ", ".join(str(list(each.shape)) for each in arrays.values())
-        raise InvalidValueError(" and ".join(arrays), "broadcast", f"shapes {shapes}") from None
+        raise InvalidValueError(name, rule, f"shapes {', '.join(str(list(each)) for each in shapes)}") from None

@@ -30,7 +30,7 @@ class CompiledDistributed(CompiledModel):
     """Machine form of a `DistributedModel` with a law on a patch."""
 
     def __init__(self, law: Any, patch: Any) -> None:
-        self.law, self.patch = law, patch
+        self.law, self.patch, self.depends_on_load = law, patch, patch.depends_on_load
         self.size = patch.bristles
         """Number of bristles of a cell: two of a point, three of a disc."""
         self.reference = 0.0 if law.reference_load is None else law.reference_load
@@ -52,11 +52,6 @@ class CompiledDistributed(CompiledModel):
         return CellsContact(self.law.numbers, numbers.shape[1], numbers, weights), matrices * self.size**2
 
     # ------------------------------------------------------------------ at given loads
-
-    @functools.cached_property
-    def fixed(self) -> PackedModel | None:
-        """See `CompiledModel`."""
-        return None if self.patch.depends_on_load else self.with_all_states([None])
 
     def at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, PackedModel]]:
         """See `CompiledModel`; all rows at once, each with its own weights."""

@@ -37,8 +37,9 @@ PARAMETERS = (
 )
 """Parameters of `ReducedModelPublished`, in the order of their vector; units as in `LuGre`, [m], [m^2], [m], [m]."""
 
-_POSITIVE = ("sigma_0", "mu_c", "mu_s", "v_s", "gamma", "contact_radius")
-_NON_NEGATIVE = ("sigma_1", "sigma_2", "second_moment")
+POSITIVE = ("sigma_0", "mu_c", "mu_s", "v_s", "gamma", "contact_radius")
+NON_NEGATIVE = ("sigma_1", "sigma_2", "second_moment")
+"""Parameters by their ranges; the breakaway ratio is in [0, 1), the centre of pressure anywhere."""
 
 
 class Family(NamedTuple):
@@ -218,10 +219,15 @@ def _checked(parameters: Any, names: tuple[str, ...]) -> np.ndarray:
         low, high = float(column.min(initial=np.inf)), float(column.max(initial=-np.inf))
         if not np.isfinite(column).all():
             raise InvalidValueError(name, "be finite", "NaN or infinity")
-        if name in _POSITIVE and not low > 0.0:
-            raise InvalidValueError(name, "be > 0", low)
-        if name in _NON_NEGATIVE and not low >= 0.0:
-            raise InvalidValueError(name, "be >= 0", low)
-        if name == "breakaway_ratio" and not (low >= 0.0 and high < 1.0):
-            raise InvalidValueError(name, "be in [0, 1)", low if low < 0.0 else high)
+        check_range(name, low, high)
     return values
+
+
+def check_range(name: str, low: float, high: float) -> None:
+    """Raise InvalidValueError unless a parameter may have values from `low` to `high`."""
+    if name in POSITIVE and not low > 0.0:
+        raise InvalidValueError(name, "be > 0", low)
+    if name in NON_NEGATIVE and not low >= 0.0:
+        raise InvalidValueError(name, "be >= 0", low)
+    if name == "breakaway_ratio" and not (low >= 0.0 and high < 1.0):
+        raise InvalidValueError(name, "be in [0, 1)", low if low < 0.0 else high)

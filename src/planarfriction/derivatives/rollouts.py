@@ -292,13 +292,9 @@ def _stepped(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any) -> 
     state = model.rest() if state is None else validation.numbers("state", state)
     twist, load, dt = sequences(twist, normal_force, dt)
     inner = model.state_shape
-    try:
-        batch = np.broadcast_shapes(state.shape[: -len(inner)], twist.shape[:-2], load.shape[:-1])
-        state = np.broadcast_to(state, (*batch, *inner))
-    except ValueError:
-        shapes = ", ".join(str(list(a.shape)) for a in (state, twist, load))
-        raise InvalidValueError("state, twist and normal_force", "broadcast", f"shapes {shapes}") from None
-    wrenches = np.empty((*batch, len(dt), 3))
+    axes = state.shape, (*twist.shape[:-2], *inner), (*load.shape[:-1], *inner)
+    state = np.broadcast_to(state, validation.common_shape("state, twist and normal_force", axes))
+    wrenches = np.empty((*state.shape[: -len(inner)], len(dt), 3))
     for t, step in enumerate(dt):
         state, wrenches[..., t, :] = model.step(state, twist[..., t, :], load[..., t], step)
     return Rollout(np.array(state), wrenches)

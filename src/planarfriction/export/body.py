@@ -39,6 +39,7 @@ def body_of(model: Any, precision: str) -> dict[str, Any]:
     loops.add(coupling.prepare, (own, p))
     loops.add(coupling.search, (own, p, Scalar("tolerance"), Fixed(ITERATIONS)))
     functions = re.sub(r"\breal\b", "double", "\n\n".join(loops.functions))
+    functions = re.sub(r"\b(\w+_of_vectors)\b", r"\1_in_double", functions)  # others are in the other precision
     return {
         "fields": [f"{name}[{count}]" for name, count in counts.items() if f"p->{name}" in functions],
         "functions": functions,

@@ -10,10 +10,11 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.checks import check_slides
+from planarfriction.identify.fit import Fit
 from planarfriction.identify.parameters import check_names, fitted_law, scaled_patch
 from planarfriction.identify.problem import Problem
 from planarfriction.identify.result import Identification
-from planarfriction.identify.search import Fit, interruptible, multistart, refine
+from planarfriction.identify.search import interruptible, multistart, refine
 from planarfriction.identify.slides import (
     MassProperties,
     Slide,

@@ -13,12 +13,12 @@ import numpy as np
 
 from planarfriction.described import described
 from planarfriction.identify.decimation import samples_of
+from planarfriction.identify.fit import Fit
 from planarfriction.identify.held import Pull
 from planarfriction.identify.logs import Log
 from planarfriction.identify.loss import SPOILED
 from planarfriction.identify.parameters import ALL, SOFT_FINGER, bristles_of
 from planarfriction.identify.rig import CHANNELS
-from planarfriction.identify.search import Fit
 from planarfriction.identify.uncertainty import HELD_OUT, STRAIN, Uncertainty
 
 TWO_SIDED = 1.96

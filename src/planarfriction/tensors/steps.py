@@ -7,7 +7,7 @@ from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
 
 from planarfriction import validation
-from planarfriction.derivatives.parameters import PARAMETERS
+from planarfriction.derivatives.parameters import PARAMETERS, check_range
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import settle
@@ -172,6 +172,14 @@ class TensorModel:
             rule = f"have shape [..., {len(self.names)}] ({', '.join(self.names)})"
             raise InvalidValueError("parameters", rule, f"shape {list(shape)}")
         return parameters
+
+    def _in_range(self, values: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return physical values; raise InvalidValueError for one that can be read and is out of its range."""
+        for name, value in values.items():
+            seen = self.xp.extremes(name, value)
+            if seen is not None:
+                check_range(name, *seen)
+        return values
 
     def _number(self, name: str, value: Any) -> Any:
         return self.xp.real(name, value)

@@ -155,7 +155,9 @@ class FrictionModule(TensorModel, nn.Module):
     def _vector(self, parameters: Tensor | None) -> Tensor:
         if parameters is None:
             return self.physical()
-        return self._counted(parameters, parameters.shape[-1] if parameters.ndim else 0, parameters.shape)
+        vector = self._counted(parameters, parameters.shape[-1] if parameters.ndim else 0, parameters.shape)
+        self._in_range(self._named(vector))
+        return vector
 
 
 def _like(by: Any, values: Any) -> Any:
