@@ -22,11 +22,11 @@ the whole log."""
 GROUPS = 4
 """Least number of groups that are left out in turn; fewer logs are cut into parts."""
 
-DIFFERENCE = 1e-3
-"""Step of differences, over the size of a parameter: a joint that sticks or not is smooth above it."""
-
 GAIN = 0.01
 """Least improvement of left-out errors that a term must make, over the errors."""
+
+FINE = 1e-5
+"""Share of the squared errors that a step of the search must gain: far below what one log more or less changes."""
 
 BEST = 2
 """Number of starts of a term that are followed to the end."""
@@ -52,30 +52,33 @@ class Coordinates:
         with np.errstate(over="ignore"):
             return dict(zip(self.names, np.where(self._log, np.exp(x), x * self._scale).tolist(), strict=True))
 
+    def slopes(self, x: np.ndarray) -> np.ndarray:
+        """Compute the slopes of the parameters by their scaled values, `[P]`."""
+        return np.where(self._log, np.exp(x), self._scale)
+
 
 def minimise(problem: Problem, start: Mapping[str, float], spans: Sequence[float] = SPANS, without: int = -1) -> dict:
-    """Return the values of least squared errors, then of least softened ones, which large errors sway less."""
+    """Return the values of least squared errors, then of least softened ones, which large errors sway less.
+
+    Runs begin again after each of the `spans` in turn; softened errors are those of whole runs.
+    """
     from scipy.optimize import least_squares
 
     values = dict(start)
-    for stage, span in enumerate([*spans, spans[-1]]):
+    for stage, span in enumerate([*spans, np.inf]):
         at = Coordinates(problem.names, values)
 
         def errors(x: np.ndarray, at: Coordinates = at, span: float = span) -> np.ndarray:
             return np.concatenate(problem.errors(at.values(x), span, without))
 
-        def slopes(x: np.ndarray, errors: Callable = errors, at: Coordinates = at) -> np.ndarray:
-            columns, here = [], errors(x)
-            for i in range(len(x)):
-                step = DIFFERENCE if x[i] + DIFFERENCE <= at.bounds[1][i] else -DIFFERENCE
-                columns.append((errors(x + step * (np.arange(len(x)) == i)) - here) / step)
-            return np.column_stack(columns)
+        def slopes(x: np.ndarray, at: Coordinates = at, span: float = span) -> np.ndarray:
+            return problem.slopes(at.values(x), span, without) * at.slopes(x)
 
         soft: dict[str, Any] = {}
         if stage == len(spans):
             soft = {"loss": "soft_l1", "f_scale": max(float(np.median(np.abs(errors(at.start)))), 1e-12)}
         inside = np.clip(at.start, at.bounds[0] + 1e-6, at.bounds[1] - 1e-6)
-        found = least_squares(errors, inside, slopes, at.bounds, xtol=1e-6, ftol=1e-6, gtol=1e-9, max_nfev=40, **soft)
+        found = least_squares(errors, inside, slopes, at.bounds, xtol=1e-6, ftol=FINE, gtol=1e-9, max_nfev=40, **soft)
         values = at.values(found.x)
     return values
 
@@ -98,7 +101,7 @@ def attempt(problem: Problem, values: dict[str, float]) -> Trial:
     """Fit a problem with each group left out, and measure the error of that group."""
     folds, errors, short = [], [], []
     for i in range(len(problem.groups)):
-        fold = minimise(problem, values, SPANS[-1:], without=i)
+        fold = minimise(problem, values, (), without=i)
         folds.append(fold)
         errors.append(float(np.abs(problem.errors(fold)[i]).mean()))
         short.append(float(np.abs(problem.errors(fold, SHORT)[i]).mean()))
