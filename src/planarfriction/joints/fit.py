@@ -28,6 +28,9 @@ GAIN = 0.01
 FINE = 1e-5
 """Share of the squared errors that a step of the search must gain: far below what one log more or less changes."""
 
+MOST = 40
+"""Most steps of a search."""
+
 BEST = 2
 """Number of starts of a term that are followed to the end."""
 
@@ -62,25 +65,44 @@ def minimise(problem: Problem, start: Mapping[str, float], spans: Sequence[float
 
     Runs begin again after each of the `spans` in turn; softened errors are those of whole runs.
     """
-    from scipy.optimize import least_squares
-
     values = dict(start)
-    for stage, span in enumerate([*spans, np.inf]):
-        at = Coordinates(problem.names, values)
+    for span in spans:
+        values = _descended(problem, values, span, without, np.inf)
+    width = float(np.median(np.abs(np.concatenate(problem.errors(values, np.inf, without)))))
+    return _descended(problem, values, np.inf, without, max(width, 1e-12))
 
-        def errors(x: np.ndarray, at: Coordinates = at, span: float = span) -> np.ndarray:
-            return np.concatenate(problem.errors(at.values(x), span, without))
 
-        def slopes(x: np.ndarray, at: Coordinates = at, span: float = span) -> np.ndarray:
-            return problem.slopes(at.values(x), span, without) * at.slopes(x)
+def _descended(problem: Problem, values: Mapping[str, float], span: float, without: int, width: float) -> dict:
+    """Minimise `sum 2 w^2 (sqrt(1 + (e/w)^2) - 1)`, squares for an infinite width w, by damped steps within bounds."""
+    at = Coordinates(problem.names, values)
+    x, damping = at.start, 1e-3
 
-        soft: dict[str, Any] = {}
-        if stage == len(spans):
-            soft = {"loss": "soft_l1", "f_scale": max(float(np.median(np.abs(errors(at.start)))), 1e-12)}
-        inside = np.clip(at.start, at.bounds[0] + 1e-6, at.bounds[1] - 1e-6)
-        found = least_squares(errors, inside, slopes, at.bounds, xtol=1e-6, ftol=FINE, gtol=1e-9, max_nfev=40, **soft)
-        values = at.values(found.x)
-    return values
+    def errors(x: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        found = np.concatenate(problem.errors(at.values(x), span, without))
+        if not np.isfinite(width):
+            return found, np.ones(1), float(found @ found)
+        root = np.sqrt(1.0 + (found / width) ** 2)
+        return found, 1.0 / root, float(2.0 * width**2 * np.sum(root - 1.0))
+
+    here, weights, cost = errors(x)
+    for _ in range(MOST):
+        slopes = problem.slopes(at.values(x), span, without) * at.slopes(x)
+        down, matrix = -slopes.T @ (weights * here), slopes.T @ (slopes * np.broadcast_to(weights, here.shape)[:, None])
+        free = ((x > at.bounds[0]) | (down > 0.0)) & ((x < at.bounds[1]) | (down < 0.0))
+        down, matrix = down[free], matrix[np.ix_(free, free)]
+        scale, before = np.diag(matrix) + 1e-12 * np.trace(matrix) + 1e-300, cost
+        while cost == before and damping < 1e9:
+            tried = x.copy()
+            tried[free] += np.linalg.solve(matrix + damping * np.diag(scale), down)
+            tried = np.clip(tried, *at.bounds)
+            found = errors(tried)
+            if found[2] < cost:
+                x, (here, weights, cost) = tried, found
+            damping *= 0.1 if cost < before else 8.0
+        if not before - cost > FINE * before:
+            break
+        damping = max(damping, 1e-9)
+    return at.values(x)
 
 
 def cost(problem: Problem, values: Mapping[str, float], span: float = np.inf) -> float:

@@ -13,6 +13,7 @@ from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit
 
+
 class PlantNumbers(NamedTuple):
     """Numbers of a plant and its motor as the loops read them."""
 
@@ -34,7 +35,6 @@ class PlantNumbers(NamedTuple):
     """Voltage that is lost at full duty [V]."""
 
 
-
 VARIED = (
     *("inertia", "moment", "offset", "torque_gain", "back_emf"),
     *("mu_c", "mu_s", "v_s", "sigma_0", "sigma_1", "sigma_2", "load_motor", "load_external"),
@@ -53,8 +53,9 @@ def run_plant(joint, plant, time, given, enabled, external, measured, again, ste
     most. `seeds` `[13, P]` are the slopes of `VARIED` by P parameters, `lanes` `[9, P]` is memory.
 
     A step solves `I dv/dt = driven + outside - viscous v - friction` at the level of its start, torques half-way.
-    Viscous terms decay exactly (`formulas.relaxation`), dry friction is implicit: bristles `z' = (z + dt v)/(1 + c |v|)`
-    with `c = dt sigma_0/most`, the one root of a quadratic on the side to which all torque at rest points.
+    Viscous terms decay exactly (`formulas.relaxation`), dry friction is implicit: bristles
+    `z' = (z + dt v)/(1 + c |v|)` with `c = dt sigma_0/most`, the one root of a quadratic on the side to which all
+    torque at rest points.
     """
     law, moment = joint.law, plant.moment
     bristles, count_of_lanes = law.sigma_0 > 0.0, seeds.shape[1]
