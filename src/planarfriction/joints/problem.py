@@ -50,6 +50,9 @@ TERMS: dict[str, tuple[str, ...]] = {
 }
 """Terms beside Coulomb and viscous friction, in the order in which they are tried, with their parameters."""
 
+NEEDS = {"directional": "load"}
+"""Terms that stand beside another alone."""
+
 STEP = 2e-3
 """Longest step of a simulated run [s]: a tenth of it moves positions by 4e-5 rad on average, with bristles by 5e-4."""
 
