@@ -57,7 +57,7 @@ class Coordinates:
 
     def slopes(self, x: np.ndarray) -> np.ndarray:
         """Compute the slopes of the parameters by their scaled values, `[P]`."""
-        return np.where(self._log, np.exp(x), self._scale)
+        return np.where(self._log, np.exp(np.where(self._log, x, 0.0)), self._scale)
 
 
 def minimise(problem: Problem, start: Mapping[str, float], spans: Sequence[float] = SPANS, without: int = -1) -> dict:
@@ -124,7 +124,7 @@ def attempt(problem: Problem, values: dict[str, float], progress: Callable[[str]
     folds, errors, short = [], [], []
     words = " and ".join(problem.terms) or "Coulomb and viscous friction"
     for i, name in enumerate(problem.groups):
-        progress(f"{words}, without {name}")
+        progress(f"{words}; left out: {name}")
         fold = minimise(problem, values, (), without=i)
         folds.append(fold)
         errors.append(float(np.abs(problem.errors(fold)[i]).mean()))
@@ -158,10 +158,13 @@ def identify_joint(
     Raises InvalidValueError for unknown terms, logs of both kinds, and a plant and drive that leave the scale of the
     torques open.
     """
+    if progress is not None and not callable(progress):
+        raise InvalidValueError("progress", "be a function of words, or None", progress)
     logs, progress = as_joint_logs(logs), progress or (lambda words: None)
     plant = validation.instance("plant", plant, Plant, "a Plant")
     gain = None if torque_gain is None else validation.positive("torque_gain", torque_gain)
-    chosen = tuple(TERMS) if terms == "auto" else tuple(validation.choices("terms", terms, TERMS))
+    auto = isinstance(terms, str) and terms == "auto"
+    chosen = () if auto else tuple(validation.choices("terms", terms, TERMS))
     for term, other in NEEDS.items():
         if term in chosen and other not in chosen:
             raise InvalidValueError("terms", f"have {other} with {term}", chosen)
@@ -174,7 +177,7 @@ def identify_joint(
     spans = SPANS if not base.by_torque else SPANS[-1:]
     kept = first = attempt(base, minimise(base, base.start(), spans), progress)
     pairs: dict[str, tuple[Trial, Trial]] = {}
-    if terms != "auto":
+    if not auto:
         problem, values = base, dict(first.values)
         for term in chosen:
             problem, values = _with(problem, values, term)
