@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction import coupling, derivatives, limit_surface, models
+from planarfriction import coupling, derivatives, joints, limit_surface, models
 from planarfriction.compiler import threads, together
 from planarfriction.compiler.notice import expect_compilation, watched
 from planarfriction.families import MODELS
@@ -86,6 +86,7 @@ def _parts() -> list[Part]:
         Part("derivatives of scenes in reverse", functools.partial(_reverse, reduced)),
         *_of(published, "reduced-published", *_WORK),
         Part("limit surfaces", functools.partial(_surfaces, patch)),
+        Part("joints", _joints),
     ]
 
 
@@ -136,6 +137,12 @@ def _roll(model: Any) -> None:
     derivatives.rollout_vjp(model, *arguments, np.ones((2, 3)))
     derivatives.rollout_jacobian(model, *arguments)
     derivatives.rollout_jvp(model, *arguments)
+
+
+def _joints() -> None:
+    time, plant = np.linspace(0.0, 0.1, 20), joints.Plant(inertia=1.0)
+    for given in ({"torque": np.cos(time)}, {"voltage": np.cos(time)}):
+        joints.identify_joint([joints.JointLog(time, np.sin(20.0 * time), **given)] * 4, plant, terms=())
 
 
 def _surfaces(patch: ContactPatch) -> None:

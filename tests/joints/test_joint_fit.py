@@ -102,7 +102,20 @@ def test_a_term_must_gain_more_than_its_scatter():
     base = trial([1.0, 2.0, 1.0, 3.0])
     assert improves(trial([0.8, 1.7, 0.8, 2.4]), base)
     assert not improves(trial([0.5, 2.4, 0.6, 3.3]), base)  # two better, two worse
-    assert not improves(trial([0.999, 1.998, 0.999, 2.997]), base)  # evenly, but hardly
+    assert not improves(trial([0.9, 1.8, 0.9, 2.7]), base)  # evenly, but as little as a wrong term may
+
+
+def test_steps_are_told_and_may_end_a_fit():
+    told = []
+
+    def progress(words):
+        told.append(words)
+        if len(told) == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        identify_joint(servo_logs(SERVO), PENDULUM, progress=progress)
+    assert told[-1] == "Coulomb and viscous friction; left out: log 2"
 
 
 def test_logs_are_read_and_refused(tmp_path):

@@ -56,8 +56,12 @@ class JointFriction(Checked):
         return LuGre(self.mu_c, self.mu_s, self.v_s, self.sigma_0 or self.mu_s / RIGID, self.sigma_1, self.sigma_2)
 
     def load(self, tau_motor: float, tau_external: float) -> float:
-        """Compute the growth of the level [N m] at torques of the motor and of all else [N m]."""
-        return abs(self.load_motor * tau_motor - self.load_external * tau_external)
+        """Compute the growth of the level [N m] at torques of the motor and of all else [N m].
+
+        Raises InvalidValueError for torques that are not finite.
+        """
+        motor, outside = validation.number("tau_motor", tau_motor), validation.number("tau_external", tau_external)
+        return abs(self.load_motor * motor - self.load_external * outside)
 
     @property
     def numbers(self) -> JointNumbers:

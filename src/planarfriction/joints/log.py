@@ -54,13 +54,20 @@ class Drive(Checked):
         if self.sag >= self.supply:
             raise InvalidValueError("sag", "be below supply", self.sag)
 
-    def voltage(self, duty: np.ndarray) -> np.ndarray:
-        """Compute the voltage [V] at a duty."""
+    def voltage(self, duty: ArrayLike) -> np.ndarray:
+        """Compute the voltage [V] at a duty within -1 and 1.
+
+        Raises InvalidValueError for numbers that are not finite.
+        """
+        duty = validation.finite_numbers("duty", duty)
         return duty * (self.supply - self.sag * np.abs(duty))
 
-    def duty(self, error: np.ndarray) -> np.ndarray:
-        """Compute the duty at an error `goal - q` [rad]."""
-        return np.clip(self.kp * self.gain * error, -1.0, 1.0)
+    def duty(self, error: ArrayLike) -> np.ndarray:
+        """Compute the duty at an error `goal - q` [rad].
+
+        Raises InvalidValueError for numbers that are not finite.
+        """
+        return np.clip(self.kp * self.gain * validation.finite_numbers("error", error), -1.0, 1.0)
 
 
 @described
@@ -191,6 +198,7 @@ class JointLog(ByValue):
 
         Raises InvalidValueError for parts of fewer than ten samples.
         """
+        parts = validation.count("parts", parts, at_most=len(self.time) // LEAST_SAMPLES)
         values = {each: getattr(self, each, None) for each in ("time", "q", *COLUMNS)}
         fields = {each: value for each, value in values.items() if value is not None}
         bounds = np.linspace(0, len(self.time), parts + 1).astype(int)
