@@ -48,8 +48,7 @@ class PublishedModel(TensorModel):
         return published.numbers_of(self.xp, values, self.surface, self.root)
 
 
-def few_discs(name: str, patch: ContactPatch, law: FrictionLaw, cells: int, options: dict[str, Any]) -> ContactPatch:
-    """Return the discs on which the reduced model `name` is the distributed one, and take its settings from options."""
+def few_discs(name: str, patch: ContactPatch, law: FrictionLaw, cells: int) -> ContactPatch:
+    """Return the discs on which the reduced model `name` is the distributed one."""
     TensorModel.refuse(patch, law, name)
-    replaced = {each: options.pop(each) for each in models.ReducedModel.REPLACED if each in options}
-    return models.ReducedModel(patch, law, cells=cells, **replaced).reduction.patch
+    return models.ReducedModel(patch, law, cells=cells).reduction.patch
