@@ -20,10 +20,10 @@ from planarfriction.adapters.mujoco.patches import (
     Placed,
     check_once,
     check_options,
+    layout_of,
     memory,
     parameters_in,
     place_of_parameters,
-    room_of,
     surface_velocities,
 )
 from planarfriction.adapters.mujoco_warp.loops import geometry, responses
@@ -95,7 +95,7 @@ class Friction:
             mujoco.mj_forward(m, d)
             self.data = mjw.put_data(m, d, nworld=worlds, nconmax=nconmax, njmax=njmax)
         prepared = m.nuserdata if any(each.pair >= 0 for each in self.placed) else 0
-        size = room_of(patches, m.nv)
+        size = layout_of(patches, m.nv).size
         self._memory = self.data.userdata if prepared else wp.zeros((worlds, size), dtype=float)
         self._at = memory(patches, m.nv, prepared or size)
         self._make(worlds)
