@@ -99,7 +99,7 @@ def needing(package: str, extra: str) -> Iterator[None]:
     """Raise MissingExtraError where an import in the block lacks a package: `package` is what `extra` brings."""
     try:
         yield
-    except (ModuleNotFoundError, MissingExtraError) as error:
+    except ImportError as error:
         if (error.name or "").startswith("planarfriction"):
             raise
         raise MissingExtraError(package, extra) from None
