@@ -28,3 +28,10 @@ def test_it_is_that_of_numpy(front, cells):
     for found, expected in zip(ours.step(state, twist, 2.0, 1e-3), model.step(state, twist, 2.0, 1e-3), strict=True):
         # in single precision, which is what both libraries take of themselves
         np.testing.assert_allclose(np.asarray(found.tolist()), expected, rtol=2e-5, atol=2e-5 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("option", ["parts", "segments", "speeds", "load_error"])
+def test_an_option_that_it_had_says_what_to_write_instead(front, option):
+    with pytest.raises(pf.FrictionError, match=f"^{option} must be left out: write cells=") as caught:
+        front.ReducedModel(pf.ContactPatch.disc(0.02), LAW, **{option: 1})
+    assert "\n" not in str(caught.value)

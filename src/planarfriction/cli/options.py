@@ -111,9 +111,19 @@ def complete_patch(context: object, parameter: object, incomplete: str) -> list[
     return [*names, CompletionItem(incomplete, type="file")]
 
 
-_CELLS = "Number of discs of the reduced model. Default: 24, or the file's."
+def _replaced(context: object, parameter: click.Parameter, value: Any) -> None:
+    """Refuse an option that another one has replaced."""
+    if value is not None:
+        raise InvalidValueError(
+            "--parts", "be left out: write --cells, the number of discs of the reduced model", value
+        )
 
-cells_option = click.option("--cells", type=int, help=_CELLS)
+
+def cells_option(function: Any) -> Any:
+    """Add `--cells`, and a clear line for what stood in its place."""
+    words = "Number of discs of the reduced model. Default: 24, or the file's."
+    old = click.option("--parts", hidden=True, expose_value=False, callback=_replaced)
+    return click.option("--cells", type=int, help=words)(old(function))
 
 
 def patch_option(default: str, name: str = "patch") -> Callable[[Any], Any]:

@@ -117,4 +117,4 @@ class ReducedModel(DistributedModel):
         cells: int = Reference.cells,
         **options: Any,
     ) -> None:
-        super().__init__(few_discs("jax.ReducedModel", patch, law, cells), law, normal_force, **options)
+        super().__init__(few_discs("jax.ReducedModel", patch, law, cells, options), law, normal_force, **options)

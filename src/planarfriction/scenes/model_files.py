@@ -167,9 +167,9 @@ def _surface_from_dict(parent: Section, patch: Any) -> Any:
 
 def _arguments(table: Section, make: Callable[..., Any], *others: str) -> dict[str, Any]:
     """Return the values of a table for the parameters of `make`, checked to be neither unknown nor missing."""
-    parameters = _parameters(make)
-    table.only([*others, *parameters])
+    parameters, replaced = _parameters(make), getattr(make, "REPLACED", ())  # the member itself refuses the latter
+    table.only([*others, *parameters, *replaced])
     for name, parameter in parameters.items():
         if parameter.default is parameter.empty:
             table.get(name)
-    return {name: value for name, value in table.data.items() if name in parameters}
+    return {name: value for name, value in table.data.items() if name in (*parameters, *replaced)}

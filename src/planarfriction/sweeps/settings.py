@@ -114,11 +114,14 @@ def _set(table: Any, parts: list[str], value: Any, path: str, where: str, valid:
     inner = table[key]
     if isinstance(inner, str) and key in _BY_NAME:
         inner = {_BY_NAME[key]: inner}
-    return {**table, key: _set(inner, rest, value, path, name, _keys(key, inner))}
+    return {**table, key: _set(inner, rest, value, path, name, _keys(key, inner, rest[0]))}
 
 
-def _keys(key: str, table: Any) -> list[str] | None:
-    """Return the keys that a table may have, or None if only those that are written are known."""
+def _keys(key: str, table: Any, wanted: str) -> list[str] | None:
+    """Return the keys that a table may have, or None if only those that are written are known.
+
+    An old name that is `wanted` is among them: its member says what to write instead.
+    """
     if key == "body":
         return list(BODY_KEYS)
     family, kind = _FAMILIES.get(key, (None, ""))
@@ -126,6 +129,7 @@ def _keys(key: str, table: Any) -> list[str] | None:
         return None
     make = family.get(table.get(kind, "lugre"))
     more = [] if make is None else [name for name in inspect.signature(make).parameters if name not in ("patch", "law")]
+    more += [wanted] if wanted in getattr(make, "REPLACED", ()) else []
     return list(dict.fromkeys([kind, *more, *table, *(("metric", "asymmetry") if key == "patch" else ())]))
 
 

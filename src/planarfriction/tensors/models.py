@@ -48,7 +48,8 @@ class PublishedModel(TensorModel):
         return published.numbers_of(self.xp, values, self.surface, self.root)
 
 
-def few_discs(name: str, patch: ContactPatch, law: FrictionLaw, cells: int) -> ContactPatch:
-    """Return the discs on which the reduced model `name` is the distributed one."""
+def few_discs(name: str, patch: ContactPatch, law: FrictionLaw, cells: int, options: dict[str, Any]) -> ContactPatch:
+    """Return the discs on which the reduced model `name` is the distributed one, and take its settings from options."""
     TensorModel.refuse(patch, law, name)
-    return models.ReducedModel(patch, law, cells=cells).reduction.patch
+    replaced = {each: options.pop(each) for each in models.ReducedModel.REPLACED if each in options}
+    return models.ReducedModel(patch, law, cells=cells, **replaced).reduction.patch

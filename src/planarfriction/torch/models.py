@@ -154,5 +154,5 @@ class ReducedModel(DistributedModel):
         cells: int = Reference.cells,
         **options: Any,
     ):
-        super().__init__(few_discs("torch.ReducedModel", patch, law, cells), law, normal_force, **options)
+        super().__init__(few_discs("torch.ReducedModel", patch, law, cells, options), law, normal_force, **options)
         self.patch = patch
