@@ -336,14 +336,19 @@ def path(name: str, value: Any) -> Path:
     return Path(value)  # pyright: ignore[reportArgumentType]
 
 
+def hint(value: Any, valid: Iterable[str]) -> str:
+    """Return " (did you mean 'x'?)" with the one of `valid` that is nearest to a text, or nothing."""
+    near = difflib.get_close_matches(value[:200], valid, n=1) if isinstance(value, str) else []
+    return f" (did you mean {near[0]!r}?)" if near else ""
+
+
 def choice(name: str, value: Any, valid: Iterable[str]) -> str:
     """Return `value` if it is one of `valid`, or raise an error that names the nearest valid one."""
     valid = list(valid)
     if isinstance(value, str) and value in valid:
         return value
-    near = difflib.get_close_matches(value[:200], valid, n=1) if isinstance(value, str) else []
-    given = f"{value!r} (did you mean {near[0]!r}?)" if near else quoted(value)
-    raise InvalidValueError(name, f"be one of {', '.join(valid)}", given)
+    near = hint(value, valid)
+    raise InvalidValueError(name, f"be one of {', '.join(valid)}", f"{value!r}{near}" if near else quoted(value))
 
 
 def choices(name: str, value: Any, valid: Iterable[str]) -> list[str]:

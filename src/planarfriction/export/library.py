@@ -83,37 +83,8 @@ PRECISIONS = {"double": LARGEST, "float": 1e9}
 LONGEST_NAME = 40
 """Characters of the name of a library: compilers of C99 tell apart names of 63, and files have such names too."""
 
-HEADERS = [
-    "assert",
-    "complex",
-    "ctype",
-    "errno",
-    "fenv",
-    "float",
-    "inttypes",
-    "iso646",
-    "limits",
-    "locale",
-    "math",
-    "setjmp",
-    "signal",
-    "stdalign",
-    "stdarg",
-    "stdatomic",
-    "stdbool",
-    "stddef",
-    "stdint",
-    "stdio",
-    "stdlib",
-    "stdnoreturn",
-    "string",
-    "tgmath",
-    "threads",
-    "time",
-    "uchar",
-    "wchar",
-    "wctype",
-]
+HEADERS = """assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg
+stdatomic stdbool stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar wchar wctype"""
 """Headers of C, which a library of that name would hide."""
 
 PARAMETERS = {
@@ -145,7 +116,7 @@ def checked_name(name: Any) -> None:
     """Check the name of a library; raises InvalidValueError for one that is no name of C, or that of a header."""
     if not (isinstance(name, str) and re.fullmatch(r"[a-zA-Z]\w*", name, re.ASCII) and len(name) <= LONGEST_NAME):
         raise InvalidValueError("name", f"be a letter, then letters, digits and _, {LONGEST_NAME} in all", name)
-    if name.lower() in HEADERS:
+    if name.lower() in HEADERS.split():
         raise InvalidValueError("name", "not be that of a header of C", name)
 
 

@@ -30,7 +30,4 @@ __all__ = [
     "identify_motion",
     "predict_slide",
 ]
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__dir__ = __all__.copy

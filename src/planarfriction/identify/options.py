@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.described import described
 from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.rig import GROUPS, check_groups
@@ -39,7 +38,6 @@ def _bristles(_: str, value: Any) -> ElastoPlastic | float | str | None:
     return value if value == "auto" else LuGre(elasto_plastic=value).elasto_plastic
 
 
-@described
 @dataclass(frozen=True)
 class FitOptions(Checked):
     """Options of `identify_lugre` that few fits change.

@@ -13,7 +13,6 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.derivatives.scene_inputs import STATES
-from planarfriction.described import described
 from planarfriction.equality import ByValue, Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.logs import increasing, unwrapped
@@ -81,7 +80,6 @@ class Slide(ByValue):
         return Slide(self.time[:samples], self.pose[:samples], self.twist, self.name)
 
 
-@described
 @dataclass(frozen=True)
 class MassProperties(Checked):
     """Mass and inertia of a body that slides, and gravity.

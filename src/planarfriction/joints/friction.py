@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from planarfriction import validation
-from planarfriction.described import described
 from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
@@ -16,7 +15,6 @@ RIGID = 1e-3
 """Angle [rad] that a rigid joint bends before it slips, where a step needs bristles: the resolution of encoders."""
 
 
-@described
 @dataclass(frozen=True)
 class JointFriction(Checked):
     """Friction torque of a joint: `g(v) + |b_m tau_m - b_e tau_e|` in steady sliding, and `sigma_2 v`.

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.described import described
 from planarfriction.equality import ByValue, Checked, checked
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.identify.logs import LEAST_SAMPLES, differentiated, increasing
@@ -32,7 +31,6 @@ COLUMNS = ("torque", "dq", "enabled", "goal", "duty", "voltage", "supply", "exte
 """Columns beside t and q."""
 
 
-@described
 @dataclass(frozen=True)
 class Drive(Checked):
     """Position servo: `V = duty (supply - sag |duty|)`, `duty = kp gain (goal - q)` within -1 and 1.
@@ -70,7 +68,6 @@ class Drive(Checked):
         return np.clip(self.kp * self.gain * validation.finite_numbers("error", error), -1.0, 1.0)
 
 
-@described
 @dataclass(frozen=True)
 class Plant(Checked):
     """Inertia on a joint, or a pendulum; numbers that are None are estimated.

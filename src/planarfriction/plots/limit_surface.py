@@ -9,7 +9,7 @@ from matplotlib import colormaps
 
 import planarfriction as pf
 from planarfriction import geometry, validation
-from planarfriction.errors import InvalidValueError, MissingExtraError
+from planarfriction.errors import InvalidValueError, needing
 from planarfriction.families import SURFACES
 from planarfriction.plots import style
 
@@ -76,11 +76,9 @@ def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any
     Raises MissingExtraError without plotly, the extra `[plotly]`, and InvalidValueError unless both are limit surfaces.
     """
     names, scaled, limit = _sampled(surface, beside)
-    try:
+    with needing("plotly", "plotly"):
         from plotly import graph_objects as go
         from plotly.subplots import make_subplots
-    except ImportError:
-        raise MissingExtraError("plotly", "plotly") from None
     figure = make_subplots(cols=len(names), specs=[[{"type": "scene"}] * len(names)], subplot_titles=names)
     for column, (directions, mesh) in enumerate(scaled):
         points = dict(zip("xyz", np.moveaxis(mesh, -1, 0), strict=True))
