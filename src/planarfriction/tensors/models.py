@@ -26,11 +26,6 @@ class CellsModel(TensorModel):
         """Shape of the state of one contact, `(2, N)` of points, `(3, N)` of discs."""
         return distributed.KINDS[len(self.positions)].bristles, self.positions.shape[1]
 
-    @property
-    def obstacle(self) -> str:
-        """Reason why compiled rollouts do not take the model, or an empty text."""
-        return super().obstacle or distributed.obstacle(self.positions)
-
     def _shape(self, values: Mapping[str, Any]) -> distributed.Cells:
         return distributed.Cells(self.positions, self.weights)
 

@@ -71,7 +71,9 @@ class DistributedModel(FrictionModule, CellsModel):
 
     def compiled(self) -> Compiled:
         """Return the model as compiled rollouts take it."""
-        return Compiled(functools.partial(pack_cells, self.elasto_plastic), (self.positions, self.weights))
+        reference = () if self.reference_load is None else (self.reference_load,)
+        pack = functools.partial(pack_cells, self.elasto_plastic)
+        return Compiled(pack, (self.positions, *reference), (self.weights,))
 
 
 class SurfaceBuffers(nn.Module):
