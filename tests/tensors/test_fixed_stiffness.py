@@ -18,7 +18,9 @@ LAWS = {
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("kind", ["points", "turned points", "leaning points", "discs", "turned discs", "leaning discs"])
+@pytest.mark.parametrize(
+    "kind", ["points", "turned points", "leaning points", "discs", "turned discs", "leaning discs"]
+)
 def test_values_are_those_of_numpy(front, kind, law):  # noqa: F811
     model, ours = pf.DistributedModel(patch(kind), LAWS[law]), front.model(patch(kind), LAWS[law])
     z, v, f = samples(model.state_shape)
