@@ -39,7 +39,7 @@ class CompiledDistributed(CompiledModel):
         if self.reference > 0.0:
             from planarfriction.kernels import fixed_stiffness
 
-            self._contact = fixed_stiffness.RATES_OF[self.size, patch.anisotropic]
+            self._contact = fixed_stiffness.rates_of(self.size, patch.anisotropic, patch.asymmetric)
         cells = len(patch.positions)
         super().__init__(functions, (self.size, cells), (self.size, self.size, cells))
 
@@ -49,7 +49,8 @@ class CompiledDistributed(CompiledModel):
     def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         """Return the record of a contact, and how many numbers of a linearisation each cell has."""
         matrices = MATRICES if self.reference > 0.0 else LINEAR
-        return CellsContact(self.law.numbers, numbers.shape[1], numbers, weights), matrices * self.size**2
+        lean = numbers[-2 if self.patch.asymmetric else len(numbers) :]
+        return CellsContact(self.law.numbers, numbers.shape[1], numbers, lean, weights), matrices * self.size**2
 
     # ------------------------------------------------------------------ at given loads
 

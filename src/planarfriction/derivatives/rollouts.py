@@ -106,7 +106,7 @@ def rollout(
     Each step is a `model.step`. `normal_force` broadcasts with `[..., T]`: one number, one for each step, or
     one for each contact `[..., 1]`; `dt` is one number or `[T]`; leading axes broadcast. `parameters` `[..., P]` (see
     `parameter_names`) replace the model's own; the limit surface stays as it is, in scaled coordinates.
-    Models run in compiled code, batches on all processors; cells with a `RateLaw` or an asymmetry step in Python, as
+    Models run in compiled code, batches on all processors; cells with a `RateLaw` step in Python, as
     does `ReducedModelPublished` where its shape follows the load.
 
     Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for `parameters` if the model cannot take
@@ -179,6 +179,26 @@ def rollout_vjp(
         sum_to(np.shape(normal_force), inputs.of_all(bars.load)),
         sum_to(np.shape(vector), inputs.of_all(rows_bar[:, family.columns])),
     )
+
+
+def weights_vjp(
+    model: Packed, state: Any, twist: Any, normal_force: Any, dt: Any, wrenches_bar: Any, weights: np.ndarray, *,
+    parameters: Any = None, states: Any = None,
+) -> np.ndarray:  # fmt: skip
+    """Compute the gradient of `sum(wrenches_bar wrenches)` of a `rollout` by the `weights` `[..., N]` of its cells.
+
+    Other arguments are as in `rollout_vjp`. Raises InvalidValueError as `rollout_vjp` does.
+    """
+    inputs = checked(model, state, twist, normal_force, dt, parameters, [weights.shape[:-1]])
+    (count, size), steps, shares = inputs.state.shape, len(inputs.dt), inputs.model.family.shares
+    cotangents = rows_of("wrenches_bar", wrenches_bar, (steps, 3), inputs.batch)
+    if states is None:
+        on_the_way = _roll(inputs, steps)[2]
+    else:
+        on_the_way = rows_of("states", states, (steps, *inputs.model.inner), inputs.batch).reshape(-1, steps, size)
+    found, compiled = np.zeros((count, weights.shape[-1])), inputs.compiled()
+    share(compiled, count, lambda *span: shares(compiled, on_the_way, cotangents, span, found))  # pyright: ignore
+    return sum_to(weights.shape, inputs.of_all(found))
 
 
 def rollout_jacobian(

@@ -17,6 +17,7 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import address_of, call
 from planarfriction.compiler.memory import Doubles, Integers, Packed, Place, arrays_at, at, exists, layout, reader
+from planarfriction.kernels import cells
 from planarfriction.kernels.contacts import (
     BACK_SUBSTITUTE,
     CALLS,
@@ -32,7 +33,6 @@ from planarfriction.kernels.contacts import (
     contact_map,
     contact_map_slopes,
 )
-from planarfriction.kernels.law import law_of
 from planarfriction.kernels.settle import bring_back, factor_at
 from planarfriction.kernels.small_matrices import applied, inverse
 from planarfriction.kernels.springs import add_spring_slopes, spring_wrench
@@ -193,9 +193,8 @@ def settle_all(system: SystemRecord, piece: int, y: Doubles) -> None:
     """
     for c in range(system.size):
         if hardly_loaded(system, piece, c):
-            first, size = system.contacts.state[c], system.contacts.bristle[c]
-            count, factor = (system.contacts.state[c + 1] - first) // size, 1.0 / NO_LOAD
-            bring_back(law_of(record_of(system, piece, c)), size, at(y, first), factor, count)
+            contact, size = cells.read(record_of(system, piece, c)), system.contacts.bristle[c]
+            bring_back(contact, size, at(y, system.contacts.state[c]), 1.0 / NO_LOAD)
 
 
 @kernel

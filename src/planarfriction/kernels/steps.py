@@ -187,7 +187,7 @@ def _step_fixed(
     stepped(table.function, record, table.size, s, factor, z, inputs, dt, new, unit)
     put(wrench_load, plus(three(unit), 1.0, change))
     by_twist = at(unit, SLOPES)
-    unscale(record, table.size, z, factor, s // table.size, by_twist, at(by_twist, 3 * s), at(by_twist, 6 * s))
+    unscale(record, table.size, z, factor, by_twist, at(by_twist, 3 * s), at(by_twist, 6 * s))
 
 
 @kernel

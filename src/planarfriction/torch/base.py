@@ -26,9 +26,11 @@ class Compiled(NamedTuple):
     """A model as compiled rollouts take it."""
 
     pack: Callable[..., Packed]
-    """Function that makes the model from the `buffers` as NumPy arrays."""
+    """Function that makes the model from the weights, if there are any, and the `buffers` as NumPy arrays."""
     buffers: tuple[Tensor, ...]
     """The model's own numbers of the patch."""
+    weights: tuple[Tensor, ...] = ()
+    """The weights of the cells, if there are cells: they can have gradients."""
 
 
 _BRISTLES = {False: "plain", True: "elasto-plastic"}
