@@ -80,7 +80,7 @@ def _parts() -> list[Part]:
     return [
         *_of(cells, "distributed", *_WORK),
         *_of(grooved, "anisotropic", "scenes", "rollouts"),
-        *_of(reduced, "reduced", "scenes", "steps", "derivatives of scenes"),
+        *_of(reduced, "reduced", *_WORK),
         Part("coupled patches", functools.partial(_couple, [cells, reduced, published, grooved])),
         *([Part("steps inside MuJoCo", _host)] if find_spec("mujoco") else []),
         Part("derivatives of scenes in reverse", functools.partial(_reverse, reduced)),
