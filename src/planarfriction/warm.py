@@ -16,7 +16,7 @@ from planarfriction.compiler import threads, together
 from planarfriction.compiler.notice import expect_compilation, watched
 from planarfriction.families import MODELS
 from planarfriction.laws import LuGre
-from planarfriction.patch import ContactPatch, friction_metric
+from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, friction_metric
 from planarfriction.scenes import SolverOptions, in_hand, simulate
 
 _INSTANT = 1e-3
@@ -80,7 +80,7 @@ def _parts() -> list[Part]:
     return [
         *_of(cells, "distributed", *_WORK),
         *_of(grooved, "anisotropic", "scenes", "rollouts"),
-        *_of(reduced, "reduced", "scenes", "steps", "derivatives of scenes"),
+        *_of(reduced, "reduced", *_WORK),
         Part("coupled patches", functools.partial(_couple, [cells, reduced, published, grooved])),
         *([Part("steps inside MuJoCo", _host)] if find_spec("mujoco") else []),
         Part("derivatives of scenes in reverse", functools.partial(_reverse, reduced)),
@@ -151,6 +151,8 @@ def _surfaces(patch: ContactPatch) -> None:
         surface = kind(patch)
         surface.jacobian((0.01, 0.0, 1.0))
         surface.twist(surface.wrench((0.01, 0.0, 1.0)))
+    for each in (ContactPatch.rectangle(0.01, cells=5), PUBLISHED_PATCHES["NonConvex1"]()):
+        each.grid_error()  # by the loops of polygons
 
 
 _WORK = {"scenes": _simulate, "steps": _step, "rollouts": _roll, "derivatives of scenes": _derive}

@@ -546,7 +546,8 @@ def test_other_engines_stop(name):
     package = engines.MODULES[name]
     pytest.importorskip(package, reason=f"needs {package}: {SOURCES.get(name, f'the extra [{name}]')}")
     module = __import__(f"planarfriction_studies.referee.engines.{name}", fromlist=["ENGINES"])
-    assert [judge(CASES[case], module.ENGINES[0]).mark for case in ("stop", "stribeck")] == ["ok", "-"]
+    verdicts = [judge(CASES[case], module.ENGINES[0]) for case in ("stop", "stribeck")]
+    assert [each.mark for each in verdicts] == ["ok", "-"], verdicts[0].reason
 
 
 @pytest.mark.slow

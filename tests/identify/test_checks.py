@@ -335,10 +335,10 @@ def test_run_writes_logs_that_identify_reads(solution, tmp_path, capsys):
     read, direct = Log.from_csv(path), Log.from_solution(solution)
     assert np.array_equal(read.twist, direct.twist) and np.array_equal(read.wrench, direct.wrench)
     two = tmp_path / "two.csv"
-    write_csv(
-        two, columns | {name.replace("pad", "other"): 2 * values for name, values in columns.items() if "." in name}
-    )
-    assert np.array_equal(Log.from_csv(two, contact="other").twist, 2 * direct.twist)
+    other = {name.replace("pad", "other"): 2 * values for name, values in columns.items() if "." in name}
+    write_csv(two, columns | other | {"other.t": columns["time"] + 1.0})
+    double = Log.from_csv(two, contact="other")
+    assert np.array_equal(double.twist, 2 * direct.twist) and double.time[0] == 1.0  # a contact may have its own clock
     start = [
         f"--start={name}={getattr(LAW, name)}" for name in ("mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2")
     ]

@@ -89,6 +89,13 @@ def test_a_log_that_stands_at_full_duty_is_named():
     assert "stuck: saturated and standing for" in words(fit) and "contradicts the others" in words(fit)
 
 
+@pytest.mark.parametrize("seconds, stands", [(0.05, False), (0.3, True)])
+def test_a_joint_stands_from_a_tenth_of_a_second_on(seconds, stands):
+    t = 0.005 * np.arange(400)
+    q = np.clip(t, 0.0, 1.0) + np.clip(t - 1.0 - seconds, 0.0, None)
+    assert standing(JointLog(t, q, goal=np.full(400, 99.0), drive=Drive(800.0, 7.3, 0.0029))).any() == stands
+
+
 def test_a_late_speed_is_measured():
     log = servo_logs(SERVO)[1]
     late = np.interp(log.time - 0.019, log.time, log.speed)

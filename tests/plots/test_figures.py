@@ -78,6 +78,13 @@ def test_pressure_map_is_heavy_at_the_top_and_in_kilopascal():
     assert labels(patch_axes(figure)) == {"x [mm]", "y [mm]"}
 
 
+def test_ticks_of_lengths_are_in_the_unit_of_their_label():
+    axes = style.new_figure(2.0, 2.0).add_subplot()
+    for largest, drawn, label, tick in ((0.01, 10.0, "y [mm]", "10"), (3.0, -2000.0, "y [m]", "\N{MINUS SIGN}2")):
+        style.show_lengths(axes, largest)  # drawn in mm
+        assert (axes.get_ylabel(), axes.yaxis.get_major_formatter()(drawn)) == (label, tick)
+
+
 def test_centre_of_pressure_is_marked():
     patch = PUBLISHED_PATCHES["LineGrad"]()
     for line in patch_axes(plots.plot_patch(patch)).get_lines():

@@ -50,7 +50,10 @@ class JointFriction(Checked):
 
     @property
     def law(self) -> LuGre:
-        """The law as LuGre under the load 1, in N m and rad; a rigid joint bends by `RIGID`."""
+        """The law as LuGre under the load 1, in N m and rad; a rigid joint bends by `RIGID`.
+
+        Raises InvalidValueError for a rigid joint above 1e47 N m, whose stiffness no law takes.
+        """
         return LuGre(self.mu_c, self.mu_s, self.v_s, self.sigma_0 or self.mu_s / RIGID, self.sigma_1, self.sigma_2)
 
     def load(self, tau_motor: float, tau_external: float) -> float:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from planarfriction import validation
 from planarfriction.equality import ByValue, Checked, checked
 from planarfriction.errors import FileError, InvalidValueError
-from planarfriction.identify.logs import LEAST_SAMPLES, differentiated, increasing
+from planarfriction.identify.logs import LEAST_SAMPLES, increasing, slopes
 from planarfriction.reading import Table
 
 GRAVITY = 9.81
@@ -156,12 +156,12 @@ class JointLog(ByValue):
     @cached_property
     def speed(self) -> np.ndarray:
         """Slope of a parabola through seven samples of q [rad/s], `[T]`."""
-        return derivative(self.time, self.q)
+        return slopes(self.time, self.q[:, None])[:, 0]
 
     @cached_property
     def acceleration(self) -> np.ndarray:
         """Slope of the speed [rad/s^2], `[T]`."""
-        return derivative(self.time, self.speed)
+        return slopes(self.time, self.speed[:, None])[:, 0]
 
     @cached_property
     def on(self) -> np.ndarray:
@@ -234,11 +234,6 @@ class JointLog(ByValue):
             return cls(read.pop("t"), read.pop("q"), **read, drive=drive, name=path.stem)
         except InvalidValueError as error:
             raise FileError(f"{path}: {error}") from None
-
-
-def derivative(time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Compute the slope of a parabola through seven samples, `[T]`."""
-    return differentiated(time, np.column_stack([values, *np.zeros((2, len(values)))]))[:, 0]
 
 
 def as_joint_logs(logs: JointLog | Sequence[JointLog]) -> tuple[JointLog, ...]:
