@@ -66,6 +66,10 @@ class CellKind(NamedTuple):
     numbers: int
     leans: bool = False
     """True for elements whose law is a `Leaning`."""
+    law: Any = LawNumbers
+    """Record of the numbers of the law."""
+    linear: bool = True
+    """See `general_cells.Bristle`."""
 
 
 @kernel
@@ -95,16 +99,13 @@ class Rows(NamedTuple):
     n: int
 
 
-_LAW = {f"law.{name}": f"law.{name}" for name in LawNumbers._fields}
-
-
 class _Symbols:
     """Arguments of the functions of a cell in a trace."""
 
     def __init__(self, trace: Trace, kind: CellKind) -> None:
         self.trace = trace
         numbers = self.several("c", kind.numbers + 2 * kind.leans)
-        law = LawNumbers(*(Number(trace, name) for name in _LAW))
+        law = kind.law(*(Number(trace, f"{kind.law.__name__}.{name}") for name in kind.law._fields))
         self.law = Leaning(law, numbers[-2:]) if kind.leans else law
         self.cell, self.z, self.v = numbers[: kind.numbers], self.several("z", kind.element.size), self.several("v", 3)
         self.dt, self.weight = Number(trace, "dt"), Number(trace, "weight")
@@ -125,8 +126,10 @@ def _rows(letter: str, field: str, count: int) -> dict[str, str]:
     return {f"{letter}{m}": f"block.{field}[{m} * block.n + i]" for m in range(count)}
 
 
-_SHARED = {**_LAW, **{f"v{m}": f"v[{m}]" for m in range(3)}, "dt": "shared[0]"}
-"""Sources of the symbols that all cells share."""
+def _shared(kind: CellKind) -> dict[str, str]:
+    """Return the sources of the symbols that all cells share."""
+    law = {f"{kind.law.__name__}.{name}": f"law.{name}" for name in kind.law._fields}
+    return {**law, **{f"v{m}": f"v[{m}]" for m in range(3)}, "dt": "shared[0]"}
 
 
 _PULL = {f"p{m}": f"shared[{m + 3}]" for m in range(3)} | {"load": "shared[1]", "keeps": "shared[2]"}
@@ -136,13 +139,13 @@ _PULL = {f"p{m}": f"shared[{m + 3}]" for m in range(3)} | {"load": "shared[1]", 
 def _in_block(kind: CellKind) -> dict[str, str]:
     """Return the sources of the symbols of cells in a block."""
     vectors = _fields("c", 0, kind.numbers + 2 * kind.leans) | _fields("z", Z, kind.element.size)
-    return {**_SHARED, **vectors, "weight": f"block[{WEIGHT} + i]"}
+    return {**_shared(kind), **vectors, "weight": f"block[{WEIGHT} + i]"}
 
 
 def _in_rows(kind: CellKind) -> dict[str, str]:
     """Return the sources of the symbols of cells in `Rows`."""
     vectors = _rows("c", "cells", kind.numbers + 2 * kind.leans) | _rows("z", "z", kind.element.size)
-    return {**_SHARED, **vectors, "weight": "block.weights[0 + i]"}
+    return {**_shared(kind), **vectors, "weight": "block.weights[0 + i]"}
 
 
 def _step_of(kind: CellKind) -> Callable[[Trace], Any]:
@@ -226,17 +229,19 @@ def rate_passes(kind: CellKind) -> Passes:
 
 
 def slope_passes(kind: CellKind) -> Passes:
-    """Write the derivatives of the rates of cells in `Rows`, by state and velocity."""
+    """Write the derivatives of the rates of cells in `Rows` by state and velocity, and of tractions unless linear."""
     element = kind.element
     written = derive(element.evaluate, ("z", "u"), ("z", "u"))
-    units = [tuple(float(m == j) for m in range(element.size)) for j in range(element.size)]
+    count = element.size if kind.linear else 2 * element.size
+    units = [tuple(float(m == j) for m in range(2 * element.size)) for j in range(count)]
 
     def slopes(trace: Trace) -> Any:
         s = _Symbols(trace, kind)
         _, tape = twin(written.forth)(s.law, s.z, s.u)
-        rows = [twin(written.back)(tape, (unit, (0.0,) * element.size)) for unit in units]
-        return tuple(by_z for by_z, _ in rows), tuple(by_u for _, by_u in rows)
+        rows = [twin(written.back)(tape, (unit[: element.size], unit[element.size :])) for unit in units]
+        halves = [rows[first : first + element.size] for first in range(0, count, element.size)]
+        return tuple(tuple(row[which] for row in half) for half in halves for which in range(2))
 
-    stores = [f"block.out[{m * LANES} + i]" for m in range(2 * element.size**2)]  # of a block: that lies apart
+    stores = [f"block.out[{m * LANES} + i]" for m in range(2 * count * element.size)]  # of a block: that lies apart
     name, division = f"slopes of {element.name}", element.slopes._asdict()
     return passes(name, traced(slopes), _in_rows(kind), stores, **division)

@@ -57,8 +57,6 @@ class Bristle(NamedTuple):
 
     evaluate: Any
     """`(law, z, u)`: return z' and the traction."""
-    step: Any
-    """`(law, z, u, dt)`: return the bristle after dt and its traction."""
     linearise: Any
     """`(law, z, u)`: return z' and the traction with their derivatives, as `CellSlopes`."""
     linearise_step: Any
@@ -82,7 +80,7 @@ def bristle(evaluate: Any, step: Any, size: int = 2, linear: bool = False) -> Br
     linearise = slopes_of(evaluate, size) if evaluate else None  # not needed for steps alone, nor steps for rates
     readers = reader_of(size), reader_of(size * size)
     of_step = slopes_of(step, size) if step else None
-    return Bristle(evaluate, step, linearise, of_step, size, *readers, *_ALGEBRA[size], linear)
+    return Bristle(evaluate, linearise, of_step, size, *readers, *_ALGEBRA[size], linear)
 
 
 def slopes_of(function: Any, size: int) -> Any:
@@ -270,21 +268,6 @@ def pull_back(
     put(rows.d_twist, total)
 
 
-def step(
-    contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, lever: Lever, bristle: Bristle,
-    read: Any,
-) -> None:  # fmt: skip
-    """Advance the bristles by `dt` at a held twist, and write the wrench at the end."""
-    record, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
-    n = record.count
-    for i in range(n):
-        cell = lever.of(record, i)
-        end, t = bristle.step(lever.law(record, i, v), bristle.vector(z, i, n), lever.seen(cell, twist), dt)
-        scatter(new, i, n, end)
-        total = plus(total, record.weights[i], lever.wrench(cell, t))
-    put(out, total)
-
-
 @kernel
 def _put_cell(
     lever: Lever, bristle: Bristle, cell: Vector, weight: float, linear: CellSlopes, i: int, n: int, out: Doubles
@@ -319,4 +302,3 @@ def slopes(
 
 
 RATES = evaluate, linearise, factor, eliminate, back_substitute, change, solve_transposed, pull_back
-STEPS = step, slopes
