@@ -14,6 +14,7 @@ import numpy as np
 from planarfriction.described import described
 from planarfriction.identify.decimation import samples_of
 from planarfriction.identify.held import Pull
+from planarfriction.identify.loads import TWO_LOADS
 from planarfriction.identify.logs import Log
 from planarfriction.identify.loss import SPOILED
 from planarfriction.identify.parameters import ALL, SOFT_FINGER, bristles_of
@@ -197,6 +198,8 @@ class Evidence:
     """Part of the sliding speeds that comes from spin, `r |omega|` [m/s]."""
     loads: np.ndarray
     """Normal force of each log [N]."""
+    load_ratio: float = 1.0
+    """Largest load over the least, also within logs [-]."""
     measured: np.ndarray = field(default_factory=lambda: np.full(3, True))
     """Mask of the measured ones of fx, fy, tau, `[3]`."""
     spoiled: int = 0
@@ -289,7 +292,7 @@ def _on_data(evidence: Evidence, u: Uncertainty) -> list[Verdict]:
         text = f"{evidence.spoiled} values are off by more than {SPOILED:g} times the noise"
         end = "they were left out" if evidence.robust else 'the loss "soft_l1" would leave them out'
         found.append(Verdict("fit", True, f"{text}: {end}"))
-    if "sigma_0" in evidence.names and evidence.loads.max() < ONE_LOAD * evidence.loads.min():
+    if "sigma_0" in evidence.names and evidence.load_ratio < TWO_LOADS:
         stiffness = evidence.value("sigma_0", 0.0) * float(np.median(evidence.loads))
         text = f"one load only: sigma_0 f_N = {stiffness:.3g} N/m is known, not if the stiffness grows with the load"
         found.append(Verdict("fit", True, text))
