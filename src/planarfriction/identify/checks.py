@@ -54,9 +54,6 @@ TRAVEL, SLOW, SPEEDY = 0.1, 0.2, 10.0
 """Displacement between two samples, as a share of the contact radius, and time [s] that are long for slow sampling;
 speed [m/s] that is more likely one in mm/s."""
 
-ALIKE = 0.05
-"""Share within which loads count as one."""
-
 LEAST_MOUNTED, LEAST_TURN = np.radians(20.0), 0.5
 """Angle between the axes of force and motion [rad] that no anisotropy and no calibration explains; turn of the contact
 [rad] below which axes of the world and of the contact are the same."""
@@ -94,14 +91,14 @@ class Finding:
         return f"{self.name} should {self.rule}, got {self.found}"
 
 
-def check_logs(logs: Sequence[Log], patch: ContactPatch, names: Sequence[str] = ()) -> tuple[Finding, ...]:
-    """Check logs of a contact on `patch` from which `names` are to be estimated; returns what is odd about them.
+def check_logs(logs: Sequence[Log], patch: ContactPatch) -> tuple[Finding, ...]:
+    """Check logs of a contact on `patch`; returns what is odd about them.
 
     Raises InvalidValueError, one line, for what no fit can make sense of.
     """
-    findings = [*(finding for log in logs for finding in check_log(log, patch)), *check_loads(logs, names)]
+    findings = tuple(finding for log in logs for finding in check_log(log, patch))
     _refuse(findings)
-    return tuple(findings)
+    return findings
 
 
 def check_slides(slides: Sequence[Slide], patch: ContactPatch, body: SlidingBody) -> list[Finding]:
@@ -302,16 +299,6 @@ def check_unloaded(log: Log, size: float) -> Finding | None:
     rule = f"be > 0 where there is friction (it is 0 in {bare.sum()} samples)"
     text = f"friction of {np.median(force[bare]):.3g} N there: does the load cell have an offset?"
     return Finding(f"normal_force of {log.name}", rule, text)
-
-
-def check_loads(logs: Sequence[Log], names: Sequence[str]) -> list[Finding]:
-    """Check that loads differ if a parameter is wanted that shows only then."""
-    wanted = [name for name in names if name in ("n", "k", "k_per_newton")]
-    loads = np.array([_load(log) for log in logs])
-    if not wanted or loads.max() > (1.0 + ALIKE) * loads.min():
-        return []
-    rule = f"differ between logs to determine {', '.join(wanted)}"
-    return [Finding("normal_force", rule, f"{loads.mean():.4g} N throughout")]
 
 
 def check_sampling(log: Log, sigma_0: float, sigma_1: float) -> Finding | None:

@@ -107,7 +107,7 @@ def identify_lugre(
     kinds, given = _start_laws(start, options.elasto_plastic, names)
     if models == (LEAD,) and kinds[0].reference_load is not None:
         raise InvalidValueError("model", "be 'reduced' or 'distributed' for a law with a reference_load", model)
-    findings = check_logs(logs, patch, names)
+    findings = check_logs(logs, patch)
     whole, logs = logs, decimated(logs, size_of(logs[0], patch), options.samples)
     noise = first_noise(logs) if options.noise is None else np.array(options.noise)
     if given is not None and not patch.depends_on_load and models != (LEAD,):
