@@ -213,11 +213,6 @@ class Evidence:
     held_mu_c: float = np.inf
     """The mu_c that was not estimated [-]."""
 
-    @property
-    def torque(self) -> bool:
-        """True if any log has measured torques."""
-        return bool(self.measured[2])
-
     def value(self, name: str, otherwise: float) -> float:
         """Return the estimate of a parameter, or `otherwise` if it was not estimated."""
         return float(self.values[self.names.index(name)]) if name in self.names else otherwise
@@ -328,7 +323,7 @@ def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
         return Verdict(name, True, f"cannot be distinguished from 0, at most {most}")
     if (partner := _partner(evidence, i)) is not None:
         other, correlation = partner
-        if not evidence.torque and not {name, other}.isdisjoint(OF_TORQUE):
+        if not evidence.measured[2] and not {name, other}.isdisjoint(OF_TORQUE):
             text = f"cannot be separated from {other} (correlation {correlation:.2f}) without the torque"
             return Verdict(name, False, f"{text}, and tau is 0 throughout")
         if error > WELL * size:
@@ -345,7 +340,7 @@ def _why(evidence: Evidence, i: int, seen: float) -> str:
         return "no spin"
     if name in SOFT_FINGER and name != "c" and evidence.loads.max() < ONE_LOAD * evidence.loads.min():
         return "one load only"
-    if name in OF_TORQUE and not evidence.torque:
+    if name in OF_TORQUE and not evidence.measured[2]:
         return "only the torque depends on it, and tau is 0 throughout"
     if seen < UNSEEN:
         return f"changes no sample by more than {seen:.2g} times the noise"
