@@ -164,6 +164,17 @@ def test_units_of_slides_are_seen_before_they_are_fitted(change, words):
         identify_motion([remade(each, **change) for each in slides(6)], PATCH, BODY, start=LAW, model=ellipsoid)
 
 
+def test_one_slide_in_degrees_is_doubted():
+    """Few windows of one slide refuse nothing, but nothing is called identified either; in rad nothing is said."""
+    turning, straight = slides(2)[1], slides(2)[0]
+    misread = remade(turning, pose=(1.0, 1.0, 180.0 / np.pi)).first(24)
+    findings = check_slides([misread], PATCH, BODY)
+    assert "theta of the slides should be in rad" in str(findings[0]) and not findings[0].refuses
+    assert check_slides([turning.first(24)], PATCH, BODY) == check_slides([straight.first(24)], PATCH, BODY) == []
+    found = identify_motion(misread, PATCH, BODY, parameters=("mu_c",), start=LAW, model=ellipsoid)
+    assert not found.identifiable("mu_c") and "Theta of the slides should be in rad" in found.summary()
+
+
 @pytest.mark.parametrize("frozen", [(10, 17), (20, 24), (0, 7)])
 def test_a_tracker_that_froze_is_named(frozen):
     bad = slides(2)

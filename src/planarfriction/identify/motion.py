@@ -128,7 +128,9 @@ def identify_motion(
     if samples is not None:
         samples = validation.count("samples", samples, at_least=5)
     robust = validation.choice("loss", loss, ("robust", "squares")) == "robust"
-    check_slides(slides, patch, body)
+    findings = check_slides(slides, patch, body)
+    doubts = [Verdict("fit", False, str(finding)) for finding in findings]
+    doubts += [Verdict(name, False, "a unit is doubtful") for name in names if findings]
     strange = contradictions(slides, body) if robust else {}
     left_out = [Verdict("fit", True, f"{slides[i].name} is left out: {why}") for i, why in strange.items()]
     slides = tuple(slide for i, slide in enumerate(slides) if i not in strange)
@@ -137,7 +139,7 @@ def identify_motion(
     noise = np.array([FIRST_NOISE, FIRST_NOISE, FIRST_NOISE / float(patch.contact_radius())])
     with interruptible([problem]):
         fit = refine(multistart(problem, [problem.start_values()], noise=noise))
-        return _identification(fit, problem, left_out)
+        return _identification(fit, problem, [*doubts, *left_out])
 
 
 class SlideProblem(Problem):
