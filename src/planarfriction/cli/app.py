@@ -129,6 +129,7 @@ def limit_surface(patch: str | None, pressure: Path | None, size: dict[str, Any]
     "--name", default="friction", show_default=True, help="Name of the files, and what names in them begin with."
 )
 @click.option("--precision", default="double", show_default=True, help="double or float.")
+@click.option("--patches", default=1, show_default=True, help="Patches of this model below a body.")
 @click.option("--contact", metavar="NAME", help="Contact of the scene whose model it is, if they have different ones.")
 def export(file: Path, **options: Any) -> None:
     """Write the friction model of a file as C source for a controller: NAME.h and NAME.c, C99 and C++17.
