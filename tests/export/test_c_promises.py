@@ -131,7 +131,10 @@ def test_loops_and_calls_end(name):
     counts = r"(\w+) = [^;<>]+; (?:\1 < [^;]+; \+\+\1|\1 > [^;]+; --\1)"
     assert len(loops) > 5 and all(re.fullmatch(counts, each) for each in loops)
     ends = {end for each in loops for end in re.findall(r"\b[a-zA-Z]\w*", each.split(";")[1])[1:]}
-    assert all(re.fullmatch(r"FRICTION_\w+|[cknr]", each) for each in ends)  # counters of outer loops, and n
+    assert all(re.fullmatch(r"FRICTION_\w+|[cknr]|count", each) for each in ends)  # counters of outer loops, and n
+    counted = "|".join(re.findall(r"(\w+)\([^()]*, int count\)", code)) or "none"
+    for call in re.findall(rf"^ +(?:{counted})\((.*)\);", code, re.MULTILINE):
+        assert re.fullmatch(r"\d+|n", call.rpartition(", ")[2]), call
     assert set(re.findall(r"\bn = ([^;=]+);", code)) == {"3"}
     heads = list(re.finditer(r"^(?:static )?(?:inline )?(?:int|void|real|double) (\w+)\(", code, re.MULTILINE))
     ends = [*(each.start() for each in heads[1:]), len(code)]

@@ -56,11 +56,13 @@ class _Lines:
 
     def __enter__(self) -> _Lines:
         self._words, self._begin, self._done = "", time.monotonic(), threading.Event()
-        threading.Thread(target=self._write, daemon=True).start()
+        self._writer = threading.Thread(target=self._write, daemon=True)
+        self._writer.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._done.set()
+        self._writer.join()
 
     def _write(self) -> None:
         while not self._done.wait(EVERY):

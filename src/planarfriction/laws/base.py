@@ -88,6 +88,8 @@ class FrictionLaw(Checked):
         Raises InvalidValueError for shapes that do not broadcast, and where a load is missing.
         """
         z, v = _bristles(state, velocity, axis)
+        if normal_force is not None:
+            validation.non_negative_numbers("normal_force", normal_force)
         if self.reference_load is not None:
             if normal_force is None:
                 raise InvalidValueError("normal_force", "be given for a law with a reference_load", normal_force)
