@@ -3,7 +3,8 @@ Friction learnt with PyTorch
 ============================
 
 The models are PyTorch modules. Here friction coefficients are learnt from measured wrenches by gradient descent;
-the backward pass goes through every step of the rollout.
+the backward pass goes through every step of the rollout. For PyTorch on the processor alone, `pip install torch
+--index-url https://download.pytorch.org/whl/cpu`.
 """
 
 import matplotlib.pyplot as plt

@@ -47,6 +47,9 @@ def count_progress(label: str) -> Iterator[Callable[[int, int, str], None]]:
 
 @contextmanager
 def _bar() -> Iterator[Any]:
+    from planarfriction.compiler.notice import expect_compilation
+
+    expect_compilation()  # the bar says it
     console = Console(stderr=True)
     words = TextColumn("{task.description}", markup=False)
     columns = SpinnerColumn(), words, BarColumn(bar_width=30), TimeElapsedColumn()
