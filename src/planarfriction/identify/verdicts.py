@@ -234,7 +234,7 @@ def judge(
     verdicts = [Verdict("fit", not u.rejected, _on_fit(u, chosen))]
     if len(candidates) > 1:
         scores = sorted((each.score for each in candidates if each is not best), key=lambda each: each.held_out)
-        rest = ", ".join(f"{each.held_out:.3g} times with {each}" for each in scores)
+        rest = ", ".join(f"{each.held_out:.3g} times for {each}" for each in scores)
         text = f"on held-out parts of the logs, its errors are {chosen.held_out:.3g} times the noise ({rest})"
         verdicts.append(Verdict("fit", True, text))
     verdicts += _on_data(evidence, u) + [Verdict("fit", each.agrees, str(each)) for each in held]
@@ -270,8 +270,8 @@ def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
         text.append(f"it needs {u.strains[0][1]}, {u.strain:.1f} times the usual error of such a rig")
     if u.neighbours > CORRELATED:
         text.append(f"neighbouring residuals are correlated ({u.neighbours:.2f})")
-    cause = "the patch, the kind of bristles or the measurement is wrong"
-    return f"{chosen} is rejected: {', and '.join(text)}; {cause}, and the intervals are only a rough guide"
+    cause = "The patch, the kind of bristles or the measurement is wrong"
+    return f"{chosen} is rejected: {'; '.join(text)}. {cause}, and the intervals are only a rough guide"
 
 
 def _on_data(evidence: Evidence, u: Uncertainty) -> list[Verdict]:
