@@ -25,6 +25,7 @@ def pytest_configure(config) -> None:
         settings.load_profile("random" if slow else "repeatable")
     if settings.get_current_profile_name() == "repeatable" and hasattr(providers, "_get_local_constants"):
         # Hypothesis draws numbers that it reads in the project's modules: those that earlier tests happened to import.
+        # No setting of Hypothesis turns this off, nor does `derandomize`; a backend of our own would be as private.
         providers._get_local_constants = lambda: providers._local_constants
 
 

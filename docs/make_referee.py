@@ -45,13 +45,20 @@ SAID_ONCE = (
 """Parts of the settings that the text above the table of engines says for all rows."""
 
 SHOWN = (
-    *("MuJoCo", "MuJoCo, stiff", "MuJoCo, patches"),
+    *("MuJoCo", "MuJoCo, elliptic", "MuJoCo, stiff", "MuJoCo, patches"),
     *("Drake", "Drake, surfaces", "Drake, patches"),
 )
-"""Engines in the table of cases: as they come, at the settings that pass the most cases, and with patches."""
+"""Engines in the table of cases: as they come, as MuJoCo's documentation advises, at the settings that pass the most
+cases, and with patches."""
 
-IN_README = ("MuJoCo", "MuJoCo, stiff", "MuJoCo, patches")
-"""Engines of these rows: with default settings, with those that pass the most cases, and with patches."""
+IN_README = SHOWN[:4]
+"""Engines of the rows of README."""
+
+PACKAGES = {
+    "MuJoCo": "mujoco", "MJX": "mujoco-mjx", "MuJoCo Warp": "mujoco-warp", "Drake": "drake", "PyBullet": "pybullet",
+    "Newton": "newton",
+}  # fmt: skip
+"""Simulators and their packages, whose versions the table of engines names."""
 
 
 def tables(stored: dict[str, Any]) -> dict[str, str]:
@@ -60,13 +67,18 @@ def tables(stored: dict[str, Any]) -> dict[str, str]:
     (_, *engines), rows = table(verdicts)
     columns = {row[0]: dict(zip(engines, row[1:], strict=True)) for row in rows}
     passed = [
-        [engine, brief(settings), *(columns[row][engine] for row in COUNTS.values())]
+        [
+            engine,
+            stored["versions"][PACKAGES[engine.split(",")[0]]],
+            brief(settings),
+            *(columns[row][engine] for row in COUNTS.values()),
+        ]
         for engine, settings in stored["settings"].items()
     ]
     versions = ", ".join(f"{name} {version}" for name, version in stored["versions"].items())
     return {
         "run": f"Run on {stored['date']}: {stored['machine']}; {versions}.\n",
-        "engines": markdown(["engine", "settings", *COUNTS], passed),
+        "engines": markdown(["engine", "version", "settings", *COUNTS], passed),
         "cases": markdown(["case", *SHOWN], errors(verdicts)),
     }
 

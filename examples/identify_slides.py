@@ -21,12 +21,12 @@ from matplotlib.figure import Figure
 import planarfriction as pf
 from planarfriction.cli.console import print_table, work_progress
 from planarfriction.errors import FrictionError
-from planarfriction.identify import Slide, SlidingBody, identify_motion, predict_slide
+from planarfriction.identify import MassProperties, Slide, identify_motion, predict_slide
 from planarfriction_studies.measured import Case as Toss
 from planarfriction_studies.measured import slides as measured
 from planarfriction_studies.measured.scores import rms
 
-BODY = SlidingBody(measured.MASS, measured.INERTIA)
+BODY = MassProperties(measured.MASS, measured.INERTIA)
 SQUARE = measured.face()
 CORNERS = pf.ContactPatch.points(
     0.5 * measured.SIDE * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]), name="four corners"

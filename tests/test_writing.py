@@ -1,7 +1,6 @@
 """Files are written whole or not at all: by several processes at once, on a full disk, and under a kill."""
 
 import contextlib
-import io
 import os
 import signal
 import stat
@@ -15,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from planarfriction import FrictionError
-from planarfriction.writing import check_writable, make_folder, put, replacing, write_all, write_text
+from planarfriction.writing import check_writable, make_folder, replacing, write_text
 
 resource = pytest.importorskip("resource")  # not on Windows
 
@@ -228,49 +227,18 @@ def test_folders_are_made_or_refused_in_one_line(tmp_path):
             make_folder(path)
 
 
-def test_a_small_file_that_cannot_take_its_place_leaves_the_old_one(tmp_path, monkeypatch):
-    target = str(tmp_path / "run.npz")
-    put(target, OLD)
-
-    def full(*_):
-        assert len(names(tmp_path)) == 2  # the new one is beside the old one, and whole
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "replace", full)
-    with pytest.raises(FrictionError, match=r"run\.npz: cannot be written: No space left on device"):
-        put(target, b"new")
-    assert names(tmp_path) == ["run.npz"] and Path(target).read_bytes() == OLD
-
-
-class _Short(io.RawIOBase):
-    """A file that takes at most 7 bytes at once."""
-
-    def __init__(self) -> None:
-        self.taken = b""
-
-    def write(self, content) -> int:
-        self.taken += bytes(content[:7])
-        return min(7, len(content))
-
-
-def test_files_that_take_fewer_bytes_get_the_rest():
-    file = _Short()
-    write_all(file, OLD)
-    assert file.taken == OLD
-
-
 def test_a_limit_on_the_size_of_files_leaves_the_old_one(tmp_path):
     """The system takes the first bytes and says nothing; the next write fails."""
     path = tmp_path / "run.npz"
     path.write_bytes(OLD)
     code = """
     import resource, signal, sys
-    from planarfriction.writing import put
+    from planarfriction.writing import write_text
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))
     print("ready", flush=True)
     try:
-        put(sys.argv[1], 10_000 * b"x")
+        write_text(sys.argv[1], 10_000 * "x")
     except Exception as error:
         print(error)
     """

@@ -6,7 +6,7 @@
 
 #include <stdio.h>
 
-static const friction_body body = { 0.2, 1e-4, 0.0, 0.0 };
+static const friction_body body = { 0.2, 1e-4, { { 0.0, 0.0, 0.0 } } };
 static const double dt = 1e-3, load = 2.0;
 
 int main(void)
@@ -16,7 +16,7 @@ int main(void)
     friction_rest(state);
     for (i = 0; i < 1000; ++i) {
         const double applied[3] = { i < 700 ? 4e-3 * i : 0.0, 0.0, 0.0 };
-        if (friction_body_step(&friction_default, &body, state, twist, load, dt, applied, wrench) != FRICTION_OK) {
+        if (friction_body_step(&friction_default, &body, state, twist, &load, dt, applied, wrench) != FRICTION_OK) {
             return 1;
         }
         if (i % 100 == 99) {

@@ -25,8 +25,7 @@ from planarfriction.equality import ByValue, by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LARGEST
 from planarfriction.kernels import coupling as kernels
-from planarfriction.kernels.coupling_rows import Patches, layout
-from planarfriction.kernels.following import Followers
+from planarfriction.kernels.coupling_rows import Followers, Patches, layout
 from planarfriction.models import FrictionModel
 from planarfriction.models.base import lever_of
 
@@ -196,11 +195,7 @@ class CoupledPatches(ByValue):
             axes[name] = array.shape[:cut]
         batch = axes["state"]
         if any(each != batch for each in axes.values()):
-            try:
-                batch = np.broadcast_shapes(*axes.values())
-            except ValueError:
-                shapes = ", ".join(str(list(each)) for each in axes.values())
-                raise InvalidValueError("batch axes", "broadcast", f"shapes {shapes}") from None
+            batch = validation.common_shape("batch axes", axes.values())
         count, words = math.prod(batch), self._packed.words
         if count * words > validation.MOST_NUMBERS:
             rule = f"hold at most {validation.MOST_NUMBERS // words} environments of these patches"
@@ -344,7 +339,7 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
     patches = Patches(
         count=len(models),
         states=int(bounds[-1]),
-        solve=kernels.solve_address(),
+        solve=address_of(kernels.solve),
         steps=steps,
         slopes=slopes,
         firsts=firsts,

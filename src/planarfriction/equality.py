@@ -36,7 +36,12 @@ def _checks(kind: Any) -> list[tuple[str, bool, Any]]:
 
 
 class Checked:
-    """Base of frozen dataclasses whose fields are checked and converted when a record is made (see `checked`)."""
+    """Base of frozen dataclasses, `described`, whose fields are checked when a record is made (see `checked`)."""
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        if cls.__dict__.get("__doc__"):
+            described(cls)
 
     def __post_init__(self) -> None:
         for name, optional, (check, arguments) in _checks(type(self)):
@@ -55,8 +60,6 @@ class ByValue(Checked):
 
     def __init_subclass__(cls, **more: Any) -> None:
         super().__init_subclass__(**more)
-        if cls.__dict__.get("__doc__"):
-            described(cls)
         if "__repr__" not in cls.__dict__:  # else the decorator `dataclass` writes one of its own
             cls.__repr__ = super(cls, cls).__repr__  # pyright: ignore[reportAttributeAccessIssue]
 

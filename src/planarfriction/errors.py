@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import copyreg
 import pickle
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 WIDTH = 80
@@ -93,6 +94,17 @@ class MissingExtraError(FrictionError, ImportError):
         alone = "; for the processor alone, first pip install torch --index-url https://download.pytorch.org/whl/cpu"
         more = alone if extra == "torch" else ""
         super().__init__(f"{package} is not installed: run pip install 'planarfriction[{extra}]'{more}")
+
+
+@contextlib.contextmanager
+def needing(package: str, extra: str) -> Iterator[None]:
+    """Raise MissingExtraError where an import in the block lacks a package: `package` is what `extra` brings."""
+    try:
+        yield
+    except ImportError as error:
+        if (error.name or "").startswith("planarfriction"):
+            raise
+        raise MissingExtraError(package, extra) from None
 
 
 class SolverError(FrictionError, RuntimeError):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import difflib
 import io
 import itertools
 import math
@@ -180,9 +179,8 @@ class Table:
         """
         for name in names:
             if not (isinstance(name, str) and name in self.names):
-                near = difflib.get_close_matches(name[:200], self.names, n=1) if isinstance(name, str) else []
-                hint = f"did you mean {near[0]!r}?" if near else f"valid: {shown(', '.join(self.names))}"
-                raise FileError(f"{self._path}: no column {shown(validation.quoted(name))} ({hint})")
+                hint = validation.hint(name, self.names) or f" (valid: {shown(', '.join(self.names))})"
+                raise FileError(f"{self._path}: no column {shown(validation.quoted(name))}{hint}")
         columns = [(name, self.names.index(name)) for name in names]
         values = array("d")
         while block := list(itertools.islice(self._lines, AT_ONCE)):

@@ -13,7 +13,7 @@ import difflib
 import math
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -336,14 +336,19 @@ def path(name: str, value: Any) -> Path:
     return Path(value)  # pyright: ignore[reportArgumentType]
 
 
+def hint(value: Any, valid: Iterable[str]) -> str:
+    """Return " (did you mean 'x'?)" with the one of `valid` that is nearest to a text, or nothing."""
+    near = difflib.get_close_matches(value[:200], valid, n=1) if isinstance(value, str) else []
+    return f" (did you mean {near[0]!r}?)" if near else ""
+
+
 def choice(name: str, value: Any, valid: Iterable[str]) -> str:
     """Return `value` if it is one of `valid`, or raise an error that names the nearest valid one."""
     valid = list(valid)
     if isinstance(value, str) and value in valid:
         return value
-    near = difflib.get_close_matches(value[:200], valid, n=1) if isinstance(value, str) else []
-    given = f"{value!r} (did you mean {near[0]!r}?)" if near else quoted(value)
-    raise InvalidValueError(name, f"be one of {', '.join(valid)}", given)
+    near = hint(value, valid)
+    raise InvalidValueError(name, f"be one of {', '.join(valid)}", f"{value!r}{near}" if near else quoted(value))
 
 
 def choices(name: str, value: Any, valid: Iterable[str]) -> list[str]:
@@ -368,8 +373,12 @@ def keys(name: str, data: Any, required: Iterable[str], optional: Iterable[str] 
 
 def broadcast(**arrays: np.ndarray) -> tuple[int, ...]:
     """Return the common shape of `arrays`, or raise an error that names them and their shapes."""
+    return common_shape(" and ".join(arrays), [each.shape for each in arrays.values()])
+
+
+def common_shape(name: str, shapes: Collection[tuple[int, ...]], rule: str = "broadcast") -> tuple[int, ...]:
+    """Return the shape to which all `shapes` broadcast."""
     try:
-        return np.broadcast_shapes(*(each.shape for each in arrays.values()))
+        return np.broadcast_shapes(*shapes)
     except ValueError:
-        shapes = ", ".join(str(list(each.shape)) for each in arrays.values())
-        raise InvalidValueError(" and ".join(arrays), "broadcast", f"shapes {shapes}") from None
+        raise InvalidValueError(name, rule, f"shapes {', '.join(str(list(each)) for each in shapes)}") from None

@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction import coupling, derivatives, limit_surface, models
+from planarfriction import coupling, derivatives, joints, limit_surface, models
 from planarfriction.compiler import threads, together
 from planarfriction.compiler.notice import expect_compilation, watched
 from planarfriction.families import MODELS
 from planarfriction.laws import LuGre
-from planarfriction.patch import ContactPatch, friction_metric
+from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, friction_metric
 from planarfriction.scenes import SolverOptions, in_hand, simulate
 
 _INSTANT = 1e-3
@@ -80,12 +80,13 @@ def _parts() -> list[Part]:
     return [
         *_of(cells, "distributed", *_WORK),
         *_of(grooved, "anisotropic", "scenes", "rollouts"),
-        *_of(reduced, "reduced", "scenes", "steps", "derivatives of scenes"),
+        *_of(reduced, "reduced", *_WORK),
         Part("coupled patches", functools.partial(_couple, [cells, reduced, published, grooved])),
         *([Part("steps inside MuJoCo", _host)] if find_spec("mujoco") else []),
         Part("derivatives of scenes in reverse", functools.partial(_reverse, reduced)),
         *_of(published, "reduced-published", *_WORK),
         Part("limit surfaces", functools.partial(_surfaces, patch)),
+        Part("joints", _joints),
     ]
 
 
@@ -138,12 +139,20 @@ def _roll(model: Any) -> None:
     derivatives.rollout_jvp(model, *arguments)
 
 
+def _joints() -> None:
+    time, plant = np.linspace(0.0, 0.1, 20), joints.Plant(inertia=1.0)
+    for given in ({"torque": np.cos(time)}, {"voltage": np.cos(time)}):
+        joints.identify_joint([joints.JointLog(time, np.sin(20.0 * time), **given)] * 4, plant, terms=())
+
+
 def _surfaces(patch: ContactPatch) -> None:
     kinds = (limit_surface.LimitSurfaceExact, limit_surface.LimitSurfaceCells, limit_surface.LimitSurfaceTable)
     for kind in (*kinds, limit_surface.LimitSurfaceTablePublished, limit_surface.LimitSurfaceEllipsoid):
         surface = kind(patch)
         surface.jacobian((0.01, 0.0, 1.0))
         surface.twist(surface.wrench((0.01, 0.0, 1.0)))
+    for each in (ContactPatch.rectangle(0.01, cells=5), PUBLISHED_PATCHES["NonConvex1"]()):
+        each.grid_error()  # by the loops of polygons
 
 
 _WORK = {"scenes": _simulate, "steps": _step, "rollouts": _roll, "derivatives of scenes": _derive}

@@ -39,31 +39,6 @@ def replacing(path: str | Path) -> Iterator[io.BytesIO]:
         _replace(Path(os.path.realpath(path)), buffer.getbuffer())
 
 
-def put(path: str, content: bytes) -> None:
-    """Make `content` the file `path`, whole or not at all even if the process is killed.
-
-    Without waiting for the disk, as `replacing` does: after the computer itself has failed the file may be damaged. For
-    many small files that carry a checksum, and whose loss costs no more than the work of one.
-    """
-    with reporting(path):
-        part = os.path.join(os.path.dirname(path), _part_name())
-        try:
-            with open(part, "xb", buffering=0) as file:
-                write_all(file, content)
-            _take_place(part, path)
-        except BaseException:
-            with contextlib.suppress(OSError):
-                os.unlink(part)
-            raise
-
-
-def write_all(file: io.RawIOBase, content: bytes) -> None:
-    """Write all of `content`: a system may take fewer bytes than it is given, and say so without an error."""
-    left = memoryview(content)
-    while left:
-        left = left[file.write(left) or 0 :]
-
-
 def write_text(path: str | Path, text: str) -> None:
     """Make `text` the file `path` (UTF-8), as `replacing` does."""
     with replacing(path) as file:
@@ -124,7 +99,7 @@ def _replace(target: Path, content: memoryview) -> None:
         raise
 
 
-def _take_place(part: str | Path, target: str | Path) -> None:
+def _take_place(part: Path, target: Path) -> None:
     """Let the file `part` take the place of `target`."""
     for pause in _PATIENCE:
         try:
@@ -136,11 +111,7 @@ def _take_place(part: str | Path, target: str | Path) -> None:
 
 def _part(target: Path) -> Path:
     """Return a name beside `target` that no other process takes."""
-    return target.with_name(_part_name())
-
-
-def _part_name() -> str:
-    return f".planarfriction-{secrets.token_hex(8)}.part"
+    return target.with_name(f".planarfriction-{secrets.token_hex(8)}.part")
 
 
 @contextlib.contextmanager

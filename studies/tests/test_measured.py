@@ -24,6 +24,7 @@ from planarfriction_studies.measured import (
     push_series,
     pushes,
     slide_integrator,
+    slides,
 )
 from planarfriction_studies.measured.end_regions import EndRegions, shares
 from planarfriction_studies.measured.figures import draw, ellipse
@@ -242,6 +243,12 @@ def test_ends_of_measured_pushes(cases):
     answers.append([np.append(case.question.start, 1.0) for case in some])
     off = [np.median([onsets.errors(c, a)[0, :2] for c, a in zip(some, each, strict=True)], axis=0) for each in answers]
     assert (off[0] < off[1]).all() and (off[1] < 0.3 * off[2]).all()
+
+
+def test_errors_of_ends_are_in_millimetres_and_degrees(cases):
+    push, slide, off = cases["onsets"][0], cases["slides"][0], np.array([3e-3, -4e-3, np.radians(-7.0)])
+    assert onsets.errors(push, push.answer + np.append(off, -0.2)) == pytest.approx(np.array([[5.0, 7.0, 0.2]]))
+    assert slides.errors(slide, slide.answer + off) == pytest.approx(np.array([[5.0, 7.0, 5.0, 7.0]]))
 
 
 # ------------------------------------------------------------------------------------------------ scores

@@ -6,6 +6,7 @@ import pytest
 from planarfriction.joints import identify_joint
 from planarfriction.joints.verdicts import speed_lag
 from planarfriction_studies.measured.joints import PENDULUM, read_logs
+from planarfriction_studies.measured.synthetic_joints import ENCODER, synthetic_joint
 
 
 @pytest.fixture(scope="module")
@@ -28,3 +29,25 @@ def test_a_load_explains_the_logs(logs):
     assert plain.error == pytest.approx(0.0447, abs=1e-3) and loaded.error < 0.031
     assert loaded.trial.errors.mean() < 0.8 * plain.trial.errors.mean()
     assert np.isclose(loaded.values["load"], 0.19, atol=0.03)
+
+
+def test_synthetic_joints_move_as_the_recorded_one(logs):
+    joint, again = synthetic_joint(3, logs), synthetic_joint(3, logs)
+    assert [len(log.time) for log in joint.logs] == [len(log.time) for log in logs]
+    steps = joint.logs[0].q / ENCODER
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)
+    np.testing.assert_array_equal(joint.logs[0].q, again.logs[0].q)
+    rms = [float(np.sqrt(np.mean((one.q - real.q) ** 2))) for one, real in zip(joint.logs, logs, strict=True)]
+    assert 0.01 < np.mean(rms) < 0.5
+    assert {term for seed in range(20) for term in synthetic_joint(seed, logs[:1]).terms} == {
+        "load", "stribeck", "bristles", "directional"
+    }  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(200, 206))
+def test_no_term_is_claimed_that_a_joint_has_not(logs, seed):
+    joint = synthetic_joint(seed, logs)
+    fit = identify_joint(joint.logs, PENDULUM)
+    assert set(fit.terms) <= set(joint.terms)
+    assert ("load" in fit.terms) == ("load" in joint.terms)

@@ -546,7 +546,8 @@ def test_other_engines_stop(name):
     package = engines.MODULES[name]
     pytest.importorskip(package, reason=f"needs {package}: {SOURCES.get(name, f'the extra [{name}]')}")
     module = __import__(f"planarfriction_studies.referee.engines.{name}", fromlist=["ENGINES"])
-    assert [judge(CASES[case], module.ENGINES[0]).mark for case in ("stop", "stribeck")] == ["ok", "-"]
+    verdicts = [judge(CASES[case], module.ENGINES[0]) for case in ("stop", "stribeck")]
+    assert [each.mark for each in verdicts] == ["ok", "-"], verdicts[0].reason
 
 
 @pytest.mark.slow
@@ -570,5 +571,8 @@ def test_the_page_shows_the_stored_run():
         page = path.read_text(encoding="utf-8")
         assert maker["filled"](page, stored) == page
         assert all(words in page for words, *_ in maker["ROWS"].values()) or path.name != "README.md"
+    for page in ("README.md", "CHANGELOG.md", "docs/referee.md", "docs/my-object-slips.md"):
+        counts = re.findall(r"(\d+)\s+(?:small\s+|exact\s+)?cases", (docs.parent / page).read_text(encoding="utf-8"))
+        assert {*counts} == {str(len(CASES))}, page
     assert {row["case"] for row in stored["verdicts"]} == set(CASES)
     assert all(row["allowed"] in [truth.allowed for truth in CASES[row["case"]].truths] for row in stored["verdicts"])

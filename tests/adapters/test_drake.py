@@ -458,7 +458,9 @@ def test_a_name_that_means_two_geometries_is_refused_with_both():
 
 
 def test_without_drake_the_extra_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pydrake", None)
-    monkeypatch.delitem(sys.modules, "planarfriction.adapters.drake")
+    for name in [name for name in sys.modules if name.partition(".")[0] == "pydrake"]:
+        monkeypatch.setitem(sys.modules, name, None)
+    for name in [name for name in sys.modules if name.startswith("planarfriction.adapters.drake")]:
+        monkeypatch.delitem(sys.modules, name)
     with pytest.raises(MissingExtraError, match=r"pip install 'planarfriction\[drake\]'"):
         importlib.import_module("planarfriction.adapters.drake")

@@ -1,4 +1,7 @@
-"""Cases of public threads with closed forms: a ball that is hit, a pinch, a disc that spins, a ladder."""
+"""Cases of public threads with closed forms: throws, rolling, pinches, spins, ladders, wedges, skid steering, belts.
+
+Threads are named where they are known; where they give no numbers, the sizes here are chosen.
+"""
 
 from __future__ import annotations
 
@@ -107,3 +110,74 @@ def test_a_ladder_slips_below_its_angle(angle, holds):
     for _ in range(600):
         friction.step(d)
     assert (d.qpos[2] > z - 0.002) == holds
+
+
+def test_a_box_that_slides_diagonally_keeps_its_direction():
+    """-39.806 deg from (1.2, -1) m/s to the end (RandyGaul/qu3e #35), which is v^2 / (2 mu g) away."""
+    text = """<geom name="table" type="plane" size="5 5 1"/><body pos="0 0 0.00999"><freejoint/>
+    <geom name="box" type="box" size="0.05 0.05 0.01" mass="0.5"/><site name="box" pos="0 0 -0.01"/></body>"""
+    sole = pf.ReducedModel(pf.ContactPatch.rectangle(0.1), law(0.5))
+    _, d, friction = made(text, [PatchContact(sole, "box", ("box", "table"))])
+    d.qvel[:2] = 1.2, -1.0
+    while np.hypot(*d.qvel[:2]) > 1e-4:
+        friction.step(d)
+        assert math.degrees(math.atan2(d.qpos[1], d.qpos[0])) == pytest.approx(-39.806, abs=1e-3)
+    assert np.hypot(*d.qpos[:2]) == pytest.approx((1.2**2 + 1.0) / (2.0 * 0.5 * G), rel=5e-3)
+    assert abs(d.qpos[6]) < 1e-6
+
+
+def test_a_box_slides_down_a_wedge_that_gives_way():
+    """With N = m (g cos - A sin) the wedge backs off, M A = N (sin - mu cos); the box slides down it with the rest."""
+    mass, wedge, mu, s, c = 1.0, 2.0, 0.2, 0.5, math.sqrt(0.75)
+    backs_off = mass * G * c * (s - mu * c) / (wedge + mass * s * (s - mu * c))
+    slides = G * s + backs_off * c - mu * (G * c - backs_off * s)
+    text = f"""<body pos="0 0 1"><joint name="wedge" type="slide" axis="1 0 0"/>
+    <geom name="wedge" type="box" size="0.6 0.2 0.01" euler="0 30 0" mass="{wedge}"/></body>
+    <body name="box" pos="{0.03999 * s - 0.4 * c} 0 {1.0 + 0.03999 * c + 0.4 * s}" euler="0 30 0"><freejoint/>
+    <geom name="box" type="box" size="0.03 0.03 0.03" mass="{mass}"/><site name="sole" pos="0 0 -0.03"/></body>"""
+    sole = pf.ReducedModel(pf.ContactPatch.rectangle(0.06), law(mu))
+    _, d, friction = made(text, [PatchContact(sole, "sole", ("box", "wedge"))])
+    speeds = []
+    for _ in range(300):
+        friction.step(d)
+        speeds.append((-d.qvel[0], (d.qvel[1] - d.qvel[0]) * c - d.qvel[3] * s))
+    found = (np.array(speeds[299]) - speeds[99]) / (200 * DT)
+    assert found == pytest.approx((backs_off, slides), rel=5e-3)
+
+
+@pytest.mark.parametrize(("grip", "turns"), [(1.0, 2.3077), (2.0, 1.2), (4.0, 0.4110)])
+def test_skid_steering_turns_by_its_closed_form(grip, turns):
+    """Wheels run at -v and v, with `grip` times the friction along their axles: b v / (b^2 + grip^2 a^2).
+
+    They are at (+-a, +-b) = (+-0.2, +-0.3) m and turn without being slowed, at v = 1 m/s.
+    """
+    assert turns == pytest.approx(0.3 / (0.3**2 + (grip * 0.2) ** 2), abs=5e-5)
+    wheels, names = "", []
+    for x, y in ((0.2, 0.3), (0.2, -0.3), (-0.2, 0.3), (-0.2, -0.3)):
+        names.append(f"wheel {x} {y}")
+        wheels += f"""<body pos="{x} {y} 0"><joint axis="0 1 0" armature="1e4"/><geom name="{names[-1]}" size="0.1"
+        mass="0.1" contype="0" conaffinity="1"/><site name="{names[-1]}" xyaxes="0 1 0 -1 0 0"/></body>"""
+    text = f"""<geom name="ground" type="plane" size="5 5 1"/><body pos="0 0 0.0999"><freejoint/>
+    <inertial pos="0 0 0" mass="10" diaginertia="0.3 0.3 0.3"/>{wheels}</body>"""
+    tread = pf.ContactPatch.disc(radius=1e-4, cells=5).with_friction_metric(pf.friction_metric(0.0, grip, 1.0))
+    model = pf.ReducedModel(tread, law(0.4))
+    _, d, friction = made(text, [PatchContact(model, name, (name, "ground")) for name in names])
+    d.qvel[6:] = -10.0, 10.0, -10.0, 10.0
+    for _ in range(600):
+        friction.step(d)
+    assert d.qvel[5] == pytest.approx(turns, rel=3e-3)
+    assert np.abs(d.qpos[:2]).max() < 1e-3
+
+
+@pytest.mark.parametrize("thrown", [0.0, -1.5])
+def test_a_belt_takes_along_what_lies_on_it(thrown):
+    """After the time |v - v_0| / (mu g) it has the speed of the belt (google-deepmind/mujoco #1323)."""
+    mu, speed, time = 0.4, 0.5, 1.0
+    slips = (speed - thrown) / (mu * G)
+    end = 0.5 * (speed + thrown) * slips + speed * (time - slips)
+    body = pf.Body(0.1, 1e-4, velocity=(thrown, 0.0, 0.0), gravity=(0.0, 0.0))
+    dry = pf.LuGre(mu_c=mu, sigma_0=1e6, sigma_1=10.0, sigma_2=0.0)  # damping takes sigma_1 mu g / sigma_0 off at once
+    sole = pf.ReducedModel(pf.ContactPatch.rectangle(0.1), dry)
+    belt = pf.Contact(sole, 0.1 * G, mounted_on="body", support_velocity=(speed, 0.0, 0.0))
+    run = pf.simulate(pf.Scene(body, [belt], time))
+    assert float(run.data.x[-1]) == pytest.approx(end, abs=2e-5)

@@ -54,6 +54,21 @@ def test_in_drake_a_box_slides_as_a_plate():
     assert near(pose() - begin)
 
 
+@pytest.mark.drake
+@pytest.mark.parametrize("shape, follows", [(lambda d: d.Box(0.1, 0.1, 0.1), True), (lambda d: d.Sphere(0.02), False)])
+def test_in_drake_auto_follows_on_faces_and_not_on_spheres(shape, follows):
+    drake = pytest.importorskip("pydrake.all", reason="Drake is not installed")
+    from planarfriction.adapters.drake import PatchContact, patches
+
+    plant, graph = drake.AddMultibodyPlantSceneGraph(drake.DiagramBuilder(), time_step=DT)
+    body, at = plant.AddRigidBody("body", drake.SpatialInertia.SolidSphereWithMass(0.1, 0.02)), drake.RigidTransform()
+    for owner, of, name in ((plant.world_body(), lambda d: d.HalfSpace(), "floor"), (body, shape, "own")):
+        plant.RegisterCollisionGeometry(owner, at, of(drake), name, drake.CoulombFriction(0.0, 0.0))
+    plant.Finalize()
+    (placed,) = patches.found(plant, graph, [PatchContact(PLATE.model(), frame="body", geometries=("floor", "own"))])
+    assert placed.follows == follows
+
+
 @pytest.mark.slow
 @pytest.mark.mjx
 def test_in_mjx_a_box_slides_as_a_plate_with_derivatives():

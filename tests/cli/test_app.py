@@ -383,6 +383,7 @@ def test_limit_surface_writes_samples_that_are_on_it(capsys, tmp_path):
     assert rows["contact radius r [mm]"] == "4.04"
     assert rows["centre of pressure [mm]"] == "0, 3.175"
     patch = PUBLISHED_PATCHES["LineGrad"]()
+    assert rows["second moment <rho^2> [mm^2]"] == "23.18"
     assert rows["errors of these cells"] == str(patch.grid_error())
     assert rows["errors of refined(3)"] == str(patch.grid_error(refined=3))
     columns = read_csv(path)

@@ -11,13 +11,11 @@ PACKAGE = Path(__file__).parents[2] / "src/planarfriction"
 FOLDERS = "kernels", "compiled", "compiler", "derivatives"
 MOST = 9
 """Arguments of a function at most, constants by keyword apart: more of them are a record."""
-LATER = {"coupling.py", "coupling_rows.py"}
 LONG = {("settle.py", "stepped")}
 
 
 def functions(folder: str) -> list[tuple[str, ast.FunctionDef]]:
-    files = (each for each in sorted((PACKAGE / folder).glob("*.py")) if each.name not in LATER)
-    trees = ((each.name, ast.parse(each.read_text())) for each in files)
+    trees = ((each.name, ast.parse(each.read_text())) for each in sorted((PACKAGE / folder).glob("*.py")))
     return [(name, node) for name, tree in trees for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
 
 

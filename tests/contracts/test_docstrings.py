@@ -27,7 +27,6 @@ OF_PYTHON = {"NotImplementedError", "AttributeError", "TypeError", "StopIteratio
 
 CHECKED_BEFORE = re.compile(
     r"identify\.Identification\.to_dict|patch\.(PerCell|PressureMaps)\.(only|repeated|ever_loaded)"
-    r"|joints\.(JointFriction\.law|JointLog\.(speed|acceleration))"
     r"|torch\.(ReducedModel\.law|ReducedPlanarLuGre\.(mu_.|v_s|gamma|sigma_.|radius))"
 )
 """Functions whose checks cannot fail, since their numbers were checked when the record was made."""

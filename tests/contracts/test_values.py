@@ -105,7 +105,7 @@ MAKERS = {
     "rollout": lambda: pf.rollout(MODELS["DistributedModel of a square"](), None, np.ones((5, 3)), 1.0, 1e-3),
     "log": lambda: identify.Log(TIMES, np.ones((30, 3)), np.ones((30, 3)), 1.0),
     "slide": lambda: identify.Slide(TIMES, np.ones((30, 3))),
-    "sliding body": lambda: identify.SlidingBody(1.0, 1.0),
+    "mass properties": lambda: identify.MassProperties(1.0, 1.0),
     "identification": an_identification,
     "laws": lambda: pf.families.LAWS,
 }

@@ -30,7 +30,12 @@ SPEEDS = {"stick": 1e-6, "around": 3e-3, "slip": 1e-1}
 PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 METRIC = pf.friction_metric(0.6, along=0.5, across=1.0)
 EACH = [pf.friction_metric(0.3 * i, 0.6, 1.1) for i in range(PATCH.cells)]
-DIRECTED = {"metric": PATCH.with_friction_metric(METRIC), "metrics": PATCH.with_friction_metric(EACH)}
+DIRECTED = {
+    "metric": PATCH.with_friction_metric(METRIC),
+    "metrics": PATCH.with_friction_metric(EACH),
+    "leaning": PATCH.with_friction_metric(EACH, (0.3, -0.2)),
+    "leaning discs": dataclasses.replace(PATCH, asymmetry=(0.3, -0.2), radii=np.full(PATCH.cells, 0.002)),
+}
 
 X, Y = np.meshgrid(np.arange(-3, 4) * 1e-3, np.arange(3, -4, -1) * 1e-3)
 LIGHT = np.maximum(1.0 - ((X - 1e-3) ** 2 + Y**2) / 0.003**2, 0.0)
@@ -73,7 +78,7 @@ MANY = pf.ContactPatch.disc(0.01, cells=9)
 FIXED = {
     **{f"published {surface}, {law}": published(surface, law) for surface in SURFACES for law in LAWS},
     **{f"cells, {law}, {speed}": distributed(PATCH, law, speed) for law in LAWS for speed in SPEEDS},
-    **{f"cells, {name}": distributed(DIRECTED[name], "wide") for name in ("metric", "metrics")},
+    **{f"cells, {name}": distributed(DIRECTED[name], "wide") for name in DIRECTED},
     "cells, many": distributed(MANY, "elasto-plastic"),
     "cells, few": Case(lambda: pf.ReducedModel(MANY, LAWS["wide"], cells=20)),
     "published table, metric": Case(
@@ -89,7 +94,10 @@ SOFT = {
 REFERENCED = {name: dataclasses.replace(law, reference_load=LOAD) for name, law in LAWS.items()}
 STIFF = {
     **{f"fixed stiffness, {law}": Case(lambda law=law: pf.DistributedModel(PATCH, REFERENCED[law])) for law in LAWS},
-    "fixed stiffness, metric": Case(lambda: pf.DistributedModel(DIRECTED["metric"], REFERENCED["wide"])),
+    **{
+        f"fixed stiffness, {name}": Case(lambda name=name: pf.DistributedModel(DIRECTED[name], REFERENCED["wide"]))
+        for name in ("metric", "leaning", "leaning discs")
+    },
     "fixed stiffness, many": Case(lambda: pf.DistributedModel(MANY, REFERENCED["elasto-plastic"])),
     "fixed stiffness, few": Case(lambda: pf.ReducedModel(MANY, REFERENCED["wide"], cells=20)),
 }

@@ -155,18 +155,19 @@ def test_the_reverse_takes_contacts_that_move():
     agree(scene, numbers | {"parameters": ("mu", "mass", "r")}, 2e-6, 2e-5)
 
 
-@pytest.mark.parametrize("kind", ["cells", "both", "root"])
+@pytest.mark.parametrize("kind", ["cells", "fixed cells", "both", "root"])
 def test_derivatives_through_friction_that_depends_on_the_direction(kind):
     """Cells with metrics and asymmetries of their own, one for all, and the root of a metric around a limit surface."""
 
     def scene(mu: float = 1.0, r: float = 1.0, load: float = 1.0, vy: float = 0.03) -> pf.Scene:
         law = dataclasses.replace(LAW, mu_c=mu * LAW.mu_c, mu_s=mu * LAW.mu_s)
+        law = dataclasses.replace(law, reference_load=2.0) if "fixed" in kind else law
         patch = pf.ContactPatch.points(
             r * np.array([[0.01, 0.0], [-0.008, 0.009], [-0.006, -0.01], [0.002, 0.004]]), [1.0, 2.0, 1.5, 0.5]
         )
         metrics = np.array([pf.friction_metric(0.3 * i, along=1.0, across=0.6) for i in range(4)])
         lean = np.array([[0.2, 0.1]])
-        if kind == "cells":
+        if "cells" in kind:
             patch = patch.with_friction_metric(metrics, np.tile(lean, (4, 1)))
         else:
             patch = patch.with_friction_metric(metrics[1], lean[0] if kind == "both" else None)

@@ -10,7 +10,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify import Slide, SlidingBody, fit_start
+from planarfriction.identify import MassProperties, Slide, fit_start
 from planarfriction_studies.measured.tables import TABLES
 from tests.support.repository import script
 
@@ -89,7 +89,7 @@ def test_a_missing_file_is_one_line(example, capsys):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"body": 0.2}, "body must be a SlidingBody, got 0.2"),
+        ({"body": 0.2}, "body must be MassProperties, got 0.2"),
         ({"slide": [1.0]}, "slide must be a Slide"),
         ({"noise": 0.1}, r"noise must have shape \[3\]"),
         ({"noise": (1e-3, 1e-3, 0.0)}, "noise must be > 0"),
@@ -98,6 +98,6 @@ def test_a_missing_file_is_one_line(example, capsys):
 )
 def test_what_cannot_be_fitted_is_named_in_one_line(changes, message):
     time = np.linspace(0.0, 0.1, 11)
-    legal = {"body": SlidingBody(0.2, 1e-4), "slide": Slide(time, np.outer(0.1 * time, [1.0, 0.0, 0.0]))}
+    legal = {"body": MassProperties(0.2, 1e-4), "slide": Slide(time, np.outer(0.1 * time, [1.0, 0.0, 0.0]))}
     with pytest.raises(InvalidValueError, match=message):
         fit_start(None, **{**legal, **changes})

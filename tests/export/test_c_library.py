@@ -168,6 +168,8 @@ def test_bad_numbers(place, value, slopes, options):
         ({"name": "math"}, "name must not be that of a header of C, got math"),
         ({"name": "stdDef"}, "name must not be that of a header of C"),
         ({"precision": "half"}, "precision must be one of double, float"),
+        ({"patches": 0}, "patches must be"),
+        ({"patches": 65}, "patches must be"),
     ],
 )
 def test_bad_options(options, words, tmp_path):

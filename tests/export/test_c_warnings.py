@@ -51,7 +51,7 @@ def checked(folder, *files):
 def test_every_export_compiles_without_a_warning(model, precision, tmp_path):
     names = [law for law in LAWS if (model, law) not in UNKNOWN]
     files = [
-        pf.export_c(MODELS[model](LAWS[law]), tmp_path, name=f"law_{i}", precision=precision)
+        pf.export_c(MODELS[model](LAWS[law]), tmp_path, name=f"law_{i}", precision=precision, patches=1 + i % 3)
         for i, law in enumerate(names)
     ]
     assert len(names) >= 4
@@ -61,7 +61,7 @@ def test_every_export_compiles_without_a_warning(model, precision, tmp_path):
 def test_controllers_and_casadi_compile_without_a_warning(tmp_path):
     for surface in (ELLIPSOID, pf.LimitSurfaceTable(FEW)):
         model = pf.ReducedModelPublished(FEW, LAWS["elasto-plastic"], surface=surface)
-        files = pf.export_c(model, tmp_path, casadi=True, controller=Hold(FrictionObserver(model)))
+        files = pf.export_c(model, tmp_path, casadi=True, controller=Hold(FrictionObserver(model)), patches=3)
         checked(tmp_path, *(file.name for file in files if file.suffix == ".c"))
 
 

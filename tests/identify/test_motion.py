@@ -7,11 +7,11 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify import Slide, SlidingBody, fit_start, identify_motion, predict_slide
+from planarfriction.identify import MassProperties, Slide, fit_start, identify_motion, predict_slide
 from planarfriction.identify.checks import check_slides
 from planarfriction.identify.slides import slide_poses
 
-BODY = SlidingBody(0.37, 8.1e-4)
+BODY = MassProperties(0.37, 8.1e-4)
 PATCH = pf.ContactPatch.disc(0.05, cells=9)
 MU = 0.3
 LAW = pf.LuGre(mu_c=MU, mu_s=MU, v_s=1e-3, sigma_0=1e6, sigma_1=20.0, sigma_2=0.0, elasto_plastic=pf.ElastoPlastic(0.9))
@@ -92,12 +92,12 @@ def test_bad_input_is_named():
         identify_motion([], PATCH, BODY)
     with pytest.raises(InvalidValueError, match="parameters must be one of mu_c"):
         identify_motion(good, PATCH, BODY, parameters=("sigma_0",))
-    with pytest.raises(InvalidValueError, match="body must be a SlidingBody"):
+    with pytest.raises(InvalidValueError, match="body must be MassProperties"):
         identify_motion(good, PATCH, 0.37)
     with pytest.raises(InvalidValueError, match="samples must be an integer >= 5"):
         identify_motion(good, PATCH, BODY, samples=2)
     with pytest.raises(InvalidValueError, match="mass must be > 0"):
-        SlidingBody(0.0, 1.0)
+        MassProperties(0.0, 1.0)
     with pytest.raises(InvalidValueError, match="increase"):
         Slide(good.time[::-1], good.pose)
     with pytest.raises(InvalidValueError, match="pose must have shape"):
@@ -162,6 +162,17 @@ def test_units_of_slides_are_seen_before_they_are_fitted(change, words):
     """Degrees made mu 3.26 for 0.3, and milliseconds a simulation of five minutes."""
     with pytest.raises(InvalidValueError, match=words):
         identify_motion([remade(each, **change) for each in slides(6)], PATCH, BODY, start=LAW, model=ellipsoid)
+
+
+def test_one_slide_in_degrees_is_doubted():
+    """Few windows of one slide refuse nothing, but nothing is called identified either; in rad nothing is said."""
+    turning, straight = slides(2)[1], slides(2)[0]
+    misread = remade(turning, pose=(1.0, 1.0, 180.0 / np.pi)).first(24)
+    findings = check_slides([misread], PATCH, BODY)
+    assert "theta of the slides should be in rad" in str(findings[0]) and not findings[0].refuses
+    assert check_slides([turning.first(24)], PATCH, BODY) == check_slides([straight.first(24)], PATCH, BODY) == []
+    found = identify_motion(misread, PATCH, BODY, parameters=("mu_c",), start=LAW, model=ellipsoid)
+    assert not found.identifiable("mu_c") and "Theta of the slides should be in rad" in found.summary()
 
 
 @pytest.mark.parametrize("frozen", [(10, 17), (20, 24), (0, 7)])

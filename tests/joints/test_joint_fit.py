@@ -89,6 +89,13 @@ def test_a_log_that_stands_at_full_duty_is_named():
     assert "stuck: saturated and standing for" in words(fit) and "contradicts the others" in words(fit)
 
 
+@pytest.mark.parametrize("seconds, stands", [(0.05, False), (0.3, True)])
+def test_a_joint_stands_from_a_tenth_of_a_second_on(seconds, stands):
+    t = 0.005 * np.arange(400)
+    q = np.clip(t, 0.0, 1.0) + np.clip(t - 1.0 - seconds, 0.0, None)
+    assert standing(JointLog(t, q, goal=np.full(400, 99.0), drive=Drive(800.0, 7.3, 0.0029))).any() == stands
+
+
 def test_a_late_speed_is_measured():
     log = servo_logs(SERVO)[1]
     late = np.interp(log.time - 0.019, log.time, log.speed)
@@ -102,7 +109,20 @@ def test_a_term_must_gain_more_than_its_scatter():
     base = trial([1.0, 2.0, 1.0, 3.0])
     assert improves(trial([0.8, 1.7, 0.8, 2.4]), base)
     assert not improves(trial([0.5, 2.4, 0.6, 3.3]), base)  # two better, two worse
-    assert not improves(trial([0.999, 1.998, 0.999, 2.997]), base)  # evenly, but hardly
+    assert not improves(trial([0.9, 1.8, 0.9, 2.7]), base)  # evenly, but as little as a wrong term may
+
+
+def test_steps_are_told_and_may_end_a_fit():
+    told = []
+
+    def progress(words):
+        told.append(words)
+        if len(told) == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        identify_joint(servo_logs(SERVO), PENDULUM, progress=progress)
+    assert told[-1] == "Coulomb and viscous friction; left out: log 2"
 
 
 def test_logs_are_read_and_refused(tmp_path):

@@ -78,6 +78,17 @@ def test_levels_follow_the_load(friction, motor):
     assert taken == pytest.approx(friction.mu_c + 0.2 * torque, rel=2e-3)
 
 
+def test_gravity_counts_against_the_torque_of_the_motor():
+    """1 kg at 0.1 m, held out: MuJoCo counts gravity as bias, with the other sign."""
+    text = MODEL.replace("0 0 0", "0 -9.81 0", 1).replace('pos="0 0 0"', 'pos="0.1 0 0"').format(joint=JOINT, motor="")
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    data.ctrl[0] = 2.0
+    mujoco.mj_forward(model, data)
+    set_level(RIGID, model, data, 0)
+    assert model.dof_frictionloss[0] == pytest.approx(0.5 + 0.2 * 2.0 + 0.1 * 9.81 * 0.1)
+
+
 def test_what_a_model_lacks_is_named():
     spec = mujoco.MjSpec.from_string(MODEL.format(joint=JOINT, motor=""))
     with pytest.raises(InvalidValueError, match="joint must be the name of a joint"):

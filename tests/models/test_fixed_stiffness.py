@@ -14,24 +14,35 @@ from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPu
 from planarfriction.patch import ContactPatch
 
 REFERENCE = 2.0
+LEAN = (0.3, -0.2)
 METRIC = np.array([[1.3, 0.2], [0.2, 0.8]])
 _DISC = ContactPatch.disc(0.02, cells=5)
 
 
-def _patch(radius: float, metric: np.ndarray | None) -> ContactPatch:
-    radii = np.full(_DISC.cells, radius)
-    return ContactPatch(_DISC.positions, _DISC.areas, _DISC.weights(), metric=metric, radii=radii)
+def _patch(radius: float, metric: np.ndarray | None, asymmetry: tuple[float, float] | None = None) -> ContactPatch:
+    directions = {"metric": metric, "asymmetry": asymmetry, "radii": np.full(_DISC.cells, radius)}
+    return ContactPatch(_DISC.positions, _DISC.areas, _DISC.weights(), **directions)
 
 
 PATCHES = {
     "points": _patch(0.0, None), "turned points": _patch(0.0, METRIC),
     "discs": _patch(0.004, None), "turned discs": _patch(0.004, METRIC),
+    "leaning points": _patch(0.0, METRIC, LEAN), "leaning discs": _patch(0.004, None, LEAN),
 }  # fmt: skip
 LAWS = {
     "lugre": (LuGre, {"mu_s": 1.3}),
     "elasto-plastic": (LuGre, {"mu_s": 1.3, "elasto_plastic": 0.9}),
     "dahl": (Dahl, {}),
 }  # fmt: skip
+
+
+def _within_limits(patch: ContactPatch, given: dict) -> dict:
+    """Return numbers of a law whose published steps never leave the limit at rest.
+
+    Elasto-plastic bristles that lean do, by up to 0.12 |a| of it when they stop and turn back, where mu_s > mu_c.
+    """
+    return {**given, "mu_s": 1.0} if patch.asymmetric and "elasto_plastic" in given else given
+
 
 every_patch = pytest.mark.parametrize("patch", PATCHES.values(), ids=PATCHES)
 every_law = pytest.mark.parametrize(("kind", "given"), LAWS.values(), ids=LAWS)
@@ -47,6 +58,7 @@ def _twists(seed: int, count: int = 40):
 @pytest.mark.parametrize("load", [REFERENCE, 3.0, 0.4])
 def test_at_a_held_load_it_is_a_law_of_another_sigma_0(patch, kind, given, load):
     """With the reference load the published law itself, to rounding."""
+    given = _within_limits(patch, given)
     fixed = DistributedModel(patch, kind(**given, reference_load=REFERENCE))
     published = DistributedModel(patch, kind(**given, sigma_0=1e6 * REFERENCE / load))
     scale = published.law.largest_deflection
@@ -69,9 +81,10 @@ def test_a_held_contact_keeps_its_force_when_it_is_pressed_harder(patch):
     fixed, published = (DistributedModel(patch, LuGre(elasto_plastic=0.9, reference_load=f)) for f in (REFERENCE, None))
     state, _ = fixed.step(fixed.rest(), [1e-4, 5e-5, 2e-3], REFERENCE, 1e-3)
     still, first = fixed.step(state, np.zeros(3), REFERENCE, 1e-3)
-    np.testing.assert_array_equal(still, state)
+    tiny = 1e-15 * np.abs(state).max() if patch.asymmetric else 0.0  # rounding of the middle of the limit
+    np.testing.assert_allclose(still, state, rtol=0.0, atol=tiny)
     harder, pull = fixed.step(state, np.zeros(3), 2.0 * REFERENCE, 1e-3)
-    np.testing.assert_allclose(harder, state, rtol=1e-15)
+    np.testing.assert_allclose(harder, state, rtol=1e-15, atol=tiny)
     np.testing.assert_allclose(pull, first, rtol=1e-13)
     np.testing.assert_allclose(fixed.wrench(state, np.zeros(3), 2.0 * REFERENCE), first, rtol=1e-13)
     np.testing.assert_allclose(published.step(state, np.zeros(3), 2.0 * REFERENCE, 1e-3)[1], 2.0 * first, rtol=1e-13)
@@ -86,8 +99,14 @@ def test_a_bristle_beyond_its_limit_returns_when_the_load_falls(patch):
     for load in (REFERENCE, 1.0, 0.1):
         limit = law.mu_s * load / (law.sigma_0 * REFERENCE)
         state, pull = model.step(bent, np.zeros(3), load, 1e-3)
-        np.testing.assert_allclose(state[0], np.minimum(bent[0], limit), rtol=1e-12)
-        assert not state[1:].any()
+        middle = np.zeros_like(bent)
+        middle[:2] = limit * patch.asymmetries().T
+        out = bent - middle
+        size = np.linalg.norm(out, axis=0)
+        np.testing.assert_allclose(state, middle + out * np.minimum(limit / size, 1.0), rtol=1e-11, atol=1e-21)
+        rate = model.rate(bent, np.zeros(3), load)
+        np.testing.assert_allclose(rate[:, size <= limit], 0.0, atol=1e-15)
+        assert ((rate * out).sum(0)[size > limit] < 0.0).all()
         stiffness = law.sigma_0 * REFERENCE * patch.weights()
         wanted = -np.einsum("n,nij,in->j", stiffness, patch.levers(), state)
         np.testing.assert_allclose(pull, wanted, rtol=1e-11, atol=1e-15)
@@ -210,18 +229,19 @@ def test_a_single_bristle_follows_the_same_equations():
 @every_patch
 @every_law
 def test_at_the_reference_load_derivatives_of_rollouts_are_the_published(patch, kind, given):
+    given, rounding = _within_limits(patch, given), 1e-12 if patch.asymmetric else 0.0
     fixed, published = (DistributedModel(patch, kind(**given, reference_load=f)) for f in (REFERENCE, None))
     rng, twists = np.random.default_rng(6), _twists(5)
     state, bars = 1e-7 * rng.normal(size=fixed.state_shape), rng.normal(size=(40, 3))
     found, wanted = (rollout_vjp(model, state, twists, REFERENCE, 1e-3, bars) for model in (fixed, published))
     assert found.normal_force != wanted.normal_force
     for got, want in ((getattr(each, name) for each in (found, wanted)) for name in ("state", "twist", "parameters")):
-        np.testing.assert_array_equal(got, want)
+        np.testing.assert_allclose(got, want, rtol=rounding, atol=rounding * np.abs(want).max())
     slopes = (rollout_jacobian(model, state, twists, REFERENCE, 1e-3).d_wrenches for model in (fixed, published))
-    np.testing.assert_array_equal(*slopes)
+    np.testing.assert_allclose(*slopes, rtol=rounding, atol=rounding)
     turned = RolloutTangent(state, twists, parameters=parameters_of(fixed))
     changes = (rollout_jvp(model, state, twists, REFERENCE, 1e-3, turned).wrenches_dot for model in (fixed, published))
-    np.testing.assert_array_equal(*changes)
+    np.testing.assert_allclose(*changes, rtol=rounding, atol=rounding)
 
 
 def test_what_does_not_know_a_fixed_stiffness_says_so():
@@ -230,9 +250,6 @@ def test_what_does_not_know_a_fixed_stiffness_says_so():
         LuGre(reference_load=0.0)
     with pytest.raises(InvalidValueError, match="law must have no reference_load for ReducedModelPublished"):
         ReducedModelPublished(_DISC, law)
-    leaning = ContactPatch(_DISC.positions, _DISC.areas, _DISC.weights(), asymmetry=(0.1, 0.0))
-    with pytest.raises(InvalidValueError, match="law must have no reference_load for patches with an asymmetry"):
-        DistributedModel(leaning, law)
     model = DistributedModel(_DISC, law)
     with pytest.raises(InvalidValueError, match="moments must be None for a law with a reference_load"):
         model.step(model.rest(), np.zeros(3), 1.0, 1e-3, moments=[0.0, 0.0])

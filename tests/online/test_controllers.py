@@ -32,10 +32,12 @@ def test_parts_are_held_with_less_grip_than_by_the_rule():
     assert (ours["late"] <= 0.02).all()
 
 
-def test_parts_slide_as_far_as_they_shall():
-    parts = few(centre=((0.0, -0.01),) * COUNT, tap=(0.0, 0.0, 0.0), tilt=0.0)
+@pytest.mark.parametrize("changes", [{"mu_ratio": 1.15, "delay": 0.035}, {"mass": (0.105,) * COUNT, "delay": 0.03}])
+def test_parts_slide_as_far_as_they_shall(changes):
+    """Parts that jump 4 mm and more when they break loose, and light ones, whose load seems to fall with the grip."""
+    parts = few(centre=((0.0, -0.01),) * COUNT, tap=(0.0, 0.0, 0.0), tilt=0.0, **changes)
     slip = trial("slide", parts, -0.02, 1.0, ours=True, seed=0)["slip"]
-    assert slip[:, 1] == pytest.approx(-0.02, abs=1.5e-3)
+    assert slip[:, 1] == pytest.approx(-0.02, abs=1e-3)
 
 
 def test_a_part_turns_as_far_as_it_shall():
@@ -206,14 +208,14 @@ def test_the_grip_of_a_slip_is_what_balances_less_what_accelerates(observer, spe
 
 
 @pytest.mark.parametrize(
-    "kind, goal, near, caught",
-    [(SlideBy, 0.02, 5e-4, True), (SlideBy, 0.02, 2e-3, False), (TurnBy, 0.8, 0.02, True), (TurnBy, 0.8, 0.05, False)],
+    "kind, goal, near, dips",
+    [(SlideBy, 0.02, 5e-4, False), (SlideBy, 0.02, 2e-3, True), (TurnBy, 0.8, 0.015, False), (TurnBy, 0.8, 0.05, True)],
 )
-def test_a_part_that_sticks_near_its_goal_is_left_there(observer, kind, goal, near, caught):
+def test_a_part_that_sticks_near_its_goal_is_left_or_dips(observer, kind, goal, near, dips):
     slips, slid = kind(observer, -goal), np.zeros(3)
     slid[kind.axis] = near - goal
-    gripped(slips, {"slip": 0.0}, balance=4.0, began=0.5, since=0.2, slid=tuple(slid))
-    assert slips.state["caught"].tolist() == [caught]
+    gripped(slips, {"slip": 0.0}, balance=4.0, began=0.5, since=0.2, caught=1.0, slid=tuple(slid))
+    assert (slips.state["dipped"] == 0.0).tolist() == [dips]
 
 
 @pytest.mark.parametrize("torque, falls", [(0.02, True), (2e-4, False)])

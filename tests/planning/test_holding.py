@@ -56,6 +56,13 @@ def test_a_central_force_without_stribeck_needs_what_statics_says():
     assert dynamic_holding_load(np.zeros(3), model) == 0.0
 
 
+def test_a_torque_alone_slips_by_its_turn():
+    """The middle of the disc stays where it is: the angle alone shows the slip."""
+    model, torque = pf.DistributedModel(DISC, dataclasses.replace(LAW, mu_s=1.0)), (0.0, 0.0, 0.01)
+    least = dynamic_holding_load(torque, model, ramp=0.01, fall=2.0)
+    assert least == pytest.approx(holding_load(torque, DISC, 1.0), rel=3e-2)
+
+
 def test_a_plan_ends_above_what_holds_the_cells_of_the_model():
     """The radius of areas of 5 x 5 cells is 2.7 % short, which shows if mu_s = mu_c; bounds that no plan meets are
     refused."""

@@ -9,6 +9,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.planning import Pusher, Slider, motion_cone, plan_push, push
+from planarfriction.planning.contact_modes import TouchPoint, motion_at
 
 HALF = 0.045
 SQUARE = np.array([[-HALF, -HALF], [HALF, -HALF], [HALF, HALF], [-HALF, HALF]])
@@ -159,6 +160,14 @@ def test_a_face_beside_the_centre_turns_about_its_end():
     assert found.end[2] < -0.2  # a narrow face at the corner cannot keep the slider straight
     wide = push(slider("exact"), Pusher(1.0, 0.09), straight((-0.06, 0.0, 0.0), (0.0, 0.0, 0.0)))
     np.testing.assert_allclose(wide.end, [HALF, 0.0, 0.0], rtol=0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize("mu, slack", [(1.0, 0.5), (0.1, np.arctan(0.1))])
+def test_a_flush_face_stays_until_its_pressure_or_its_friction_ends(mu, slack):
+    """A straight push by a face 10 mm beside the centre presses at half of its half width."""
+    place = TouchPoint(np.array([-HALF, 0.01]), np.array([1.0, 0.0]), half_width=0.02)
+    found = motion_at(SURFACES["ellipsoid"], place, mu, np.array([0.1, 0.0, 0.0]))
+    assert found.mode == "stick" and found.slack == pytest.approx(slack, abs=1e-9)
 
 
 # ---------------------------------------------------------------------- plans

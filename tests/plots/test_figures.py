@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 
+import matplotlib.style
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -75,6 +76,13 @@ def test_pressure_map_is_heavy_at_the_top_and_in_kilopascal():
     assert np.argmax(cells.get_array()) == top
     assert figure.axes[1].get_ylabel() == "pressure [kPa]"
     assert labels(patch_axes(figure)) == {"x [mm]", "y [mm]"}
+
+
+def test_ticks_of_lengths_are_in_the_unit_of_their_label():
+    axes = style.new_figure(2.0, 2.0).add_subplot()
+    for largest, drawn, label, tick in ((0.01, 10.0, "y [mm]", "10"), (3.0, -2000.0, "y [m]", "\N{MINUS SIGN}2")):
+        style.show_lengths(axes, largest)  # drawn in mm
+        assert (axes.get_ylabel(), axes.yaxis.get_major_formatter()(drawn)) == (label, tick)
 
 
 def test_centre_of_pressure_is_marked():
@@ -592,3 +600,59 @@ def test_the_turn_of_a_round_body_shows():
     lines = motion.body_lines(synthetic.solution(scene))
     assert len(lines) == 2 and lines[1] == pytest.approx(np.array([[0.0, 0.0], [0.05, 0.0]]))
     assert len(motion.body_lines(synthetic.solution())) == 1
+
+
+def test_figures_have_the_size_and_the_panels_that_are_asked_for():
+    run = synthetic.solution()
+    figure = plots.plot_histories({"a": run, "b": run}, panels=("y", "theta"), size=(3.5, 3.0))
+    assert tuple(figure.get_size_inches()) == (3.5, 3.0)
+    assert [axes.get_ylabel().partition(" [")[0] for axes in figure.axes] == ["y", "θ"]
+    assert overhang(figure) <= CUT
+    patch = pf.ContactPatch.disc(0.01)
+    for small in (plots.plot_motion(run, size=(3.5, 3.0)), plots.plot_patch(patch, size=(3.5, 3.0))):
+        assert tuple(small.get_size_inches()) == (3.5, 3.0)
+        assert overhang(small) <= CUT
+
+
+def test_figures_draw_into_axes_of_a_users_own():
+    run, figure = synthetic.solution(), style.new_figure(9.0, 3.0)
+    left, middle, right = figure.subplots(1, 3)
+    assert plots.plot_histories(run, panels=["fx"], axes=right) is figure
+    assert plots.plot_motion(run, ax=middle) is figure
+    assert plots.plot_patch(pf.ContactPatch.disc(0.01), ax=left) is figure
+    assert right.get_lines()
+    assert middle.get_lines()
+    assert left.collections
+    space = style.new_figure(3.0, 3.0).add_subplot(projection="3d")
+    assert plots.plot_limit_surface(pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01)), ax=space) is space.figure
+    assert len(space.collections) == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"size": (0.0, 3.0)}, "size must be > 0"),
+        ({"size": 3.0}, "size must have shape"),
+        ({"axes": 3}, "axes must be axes of matplotlib"),
+        ({"panels": ["z"]}, "panels"),
+    ],
+)
+def test_wrong_sizes_axes_and_panels_are_refused(options, message):
+    with pytest.raises(pf.FrictionError, match=message):
+        plots.plot_histories(synthetic.solution(), **options)
+
+
+def test_axes_are_as_many_as_panels():
+    axes = style.new_figure(3.0, 3.0).subplots(2)
+    with pytest.raises(pf.FrictionError, match="axes must be one for each of 1 panels, got 2"):
+        plots.plot_histories(synthetic.solution(), panels=["x"], axes=axes)
+    with pytest.raises(pf.FrictionError, match="size must be left out with axes"):
+        plots.plot_histories(synthetic.solution(), panels=["x"], axes=axes[:1], size=(3.0, 3.0))
+
+
+@pytest.mark.parametrize(("sheet", "points"), [("print", 8.0), ("talk", 16.0)])
+def test_style_sheets_come_with_the_library(sheet, points):
+    with matplotlib.style.context(f"planarfriction.plots.{sheet}"):
+        figure = plots.plot_histories({"a model of some name": synthetic.solution(), "b": synthetic.solution()})
+        assert figure.axes[0].yaxis.label.get_size() == pytest.approx(points)
+        assert overhang(figure) <= CUT

@@ -1,5 +1,7 @@
 """Scenes with a stiffness that does not grow with the load, in the solver."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -8,10 +10,12 @@ from planarfriction.laws import LuGre
 from planarfriction.models import DistributedModel, ReducedModel
 from planarfriction.patch import ContactPatch
 from planarfriction.scenes import Body, Contact, Scene, Signal, simulate
+from planarfriction.scenes.start import first_slopes, first_states
 
 ONE = ContactPatch.points([[-0.01, 0.0], [0.01, 0.0]])
 _GRID = ContactPatch.disc(0.02, cells=4)
 DISCS = ContactPatch(_GRID.positions, _GRID.areas, _GRID.weights(), radii=np.full(_GRID.cells, 0.005))
+LEANING = dataclasses.replace(DISCS, asymmetry=(0.3, -0.2))
 
 
 def _body(mass: float = 0.1, inertia: float = 1e-4) -> Body:
@@ -65,7 +69,7 @@ def _explicit(model, body, load, pull, t_end, steps):
     return y[size:]
 
 
-@pytest.mark.parametrize("patch", [ONE, DISCS], ids=["points", "discs"])
+@pytest.mark.parametrize("patch", [ONE, DISCS, LEANING], ids=["points", "discs", "leaning discs"])
 @pytest.mark.parametrize("ratio", [None, 0.8])
 def test_the_solver_agrees_with_a_fine_explicit_integration(patch, ratio):
     """The load falls below what the bristles hold, again and again."""
@@ -106,6 +110,22 @@ def test_the_force_of_a_held_contact_never_grows_with_the_load(ratio):
     force = np.abs(data["fx"].values[:, 0])
     assert 0.5 < force[1] <= 0.8 + 1e-6
     assert (np.diff(force[1:]) <= 1e-6).all() and force[-1] < 0.3
+
+
+@pytest.mark.parametrize(("patch", "load"), [(DISCS, 1.3), (LEANING, 1.0)], ids=["discs", "leaning discs"])
+def test_an_equilibrium_follows_the_load(patch, load):
+    """Near the limit, where some bristles are bent as far as they can be."""
+    body = Body(0.1, 1e-4, (0.008, 0.0), gravity=(0.0, 0.0))
+
+    def scene(load: float) -> Scene:
+        model = DistributedModel(patch, LuGre(mu_s=1.2, elasto_plastic=0.9, reference_load=1.0))
+        return Scene(body, Contact(model, load), 0.01, force=(1.3, 0.4, 0.0), start="equilibrium")
+
+    slope = first_slopes(scene(load), np.array([load]), np.ones((1, 1)), np.zeros((1, 3)))[0][0]
+    more, less = (first_states(scene(at), np.array([at]))[0] for at in (load + 1e-4, load - 1e-4))
+    wanted = (more - less) / 2e-4
+    assert np.abs(wanted).max() > 1e-7
+    np.testing.assert_allclose(slope, wanted, rtol=0.0, atol=1e-6 * np.abs(wanted).max())
 
 
 @pytest.mark.parametrize("start", ["equilibrium", "sliding"])

@@ -92,11 +92,11 @@ def _folder() -> tempfile.TemporaryDirectory:
 
 
 @functools.cache
-def library(name: str, precision: str = "double", *options: str) -> Library:
+def library(name: str, precision: str = "double", *options: str, patches: int = 1) -> Library:
     """Compile the model called `name` once, without a warning, and load it."""
     model = (MODELS | FOLLOWING | FIXED)[name]()
-    folder = Path(_folder().name) / "-".join([name, precision, *options])
-    pf.export_c(model, folder, precision=precision)
+    folder = Path(_folder().name) / "-".join([name, precision, str(patches), *options])
+    pf.export_c(model, folder, precision=precision, patches=patches)
     (folder / "driver.c").write_text(DRIVER)
     compiled = "gcc", *STRICT, *(options or ("-O1",)), "-fPIC", "-c", "friction.c", "driver.c"
     for command in (compiled, ("gcc", "-shared", "-o", "friction.so", "friction.o", "driver.o", "-lm")):

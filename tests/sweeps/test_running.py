@@ -269,7 +269,7 @@ def test_a_folder_in_place_of_a_file_changes_nothing(tmp_path):
     (file,) = tmp_path.glob("*.npz")
     file.unlink()
     file.mkdir()
-    with pytest.raises(FileError, match="cannot be written: Is a directory"):
+    with pytest.raises(FileError, match="cannot be written: it is a folder"):
         pf.sweep(grip, {"grip": GRIPS}, out=tmp_path)
     refused = pf.sweep(crossed, {"grip": GRIPS, "mass": MASSES})
     (tmp_path / f"{refused.run.values[2, 0]}.failed.json").mkdir()

@@ -168,7 +168,7 @@ def test_a_patch_that_is_turned_turns_its_friction(front):
     assert_close(front.plain(there[1]), front.plain(wrench) @ whole.T, 1e-10)
 
 
-@pytest.mark.parametrize("kind", ["discs", "turned discs"])
+@pytest.mark.parametrize("kind", ["discs", "turned discs", "leaning points", "leaning discs"])
 def test_compiled_and_recorded_rollouts_agree(front, kind):
     law = LAWS["elasto-plastic"]
     ours = front.model(patch(kind), law)
@@ -177,19 +177,6 @@ def test_compiled_and_recorded_rollouts_agree(front, kind):
     compiled, recorded = (front.models.rollout(ours, None, twists, loads, DT, method=m) for m in ("adjoint", "eager"))
     for got, want in zip(compiled, recorded, strict=True):
         assert_close(front.plain(got), front.plain(want), 1e-9)
-
-
-def test_asymmetric_friction_is_rolled_out_step_by_step(front):
-    law = LAWS["elasto-plastic"]
-    model, ours = pf.DistributedModel(patch("leaning discs"), law), front.model(patch("leaning discs"), law)
-    _, v, f = samples((3, 7), 3)
-    run, z = front.models.rollout(ours, None, *front.arrays(v[20:], f[20:]), DT), model.rest()
-    for twist, load in zip(v[20:], f[20:], strict=True):
-        z, wrench = model.step(z, twist, load, DT)
-    assert_close(front.plain(run.state), z, 1e-9)
-    assert_close(front.plain(run.wrenches[-1]), wrench, 1e-9)
-    with pytest.raises(pf.FrictionError, match="method must be 'eager' for friction that is not the same forwards"):
-        front.models.rollout(ours, None, *front.arrays(v, f), DT, method="adjoint")
 
 
 def test_a_patch_that_depends_on_its_load_keeps_the_discs_of_one(front):

@@ -230,3 +230,19 @@ def test_parameters_are_as_many_as_their_names(front):
     with pytest.raises(InvalidValueError, match=r"parameters must have shape \[..., 8\] \(sigma_0, .*got shape \[3\]"):
         model.rate(**{name: value for name, value in arguments(front, model).items() if name != "dt"},
                    parameters=front.array([1.0, 2.0, 3.0]))  # fmt: skip
+
+
+OUT_OF_RANGE = {"sigma_0": (0.0, "> 0"), "sigma_2": (-0.1, ">= 0"), "breakaway_ratio": (1.0, r"in \[0, 1\)")}
+
+
+@every_kind
+@pytest.mark.parametrize("name", OUT_OF_RANGE)
+def test_parameters_have_the_ranges_of_compiled_rollouts(front, kind, name):
+    model, (value, rule) = front.model(kind), OUT_OF_RANGE[name]
+    numbers = LAW.numbers._asdict() | {"contact_radius": 0.01, "second_moment": 1e-4, "centre_x": 0.0, "centre_y": 0.0}
+    whole = front.array([(numbers | {name: value})[each] for each in model.names])
+    refuses(lambda: model.step(**arguments(front, model), parameters=whole), name, f"be {rule}")
+    if isinstance(front, Jax):
+        record = type(model.parameters)(*whole)
+        refuses(lambda: model.replace(parameters=record), name, f"be {rule}")
+        model.replace(parameters=type(record)(*[0] * len(record)))  # axes

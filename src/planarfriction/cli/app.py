@@ -129,6 +129,7 @@ def limit_surface(patch: str | None, pressure: Path | None, size: dict[str, Any]
     "--name", default="friction", show_default=True, help="Name of the files, and prefix of the names in them."
 )
 @click.option("--precision", default="double", show_default=True, help="double or float.")
+@click.option("--patches", default=1, show_default=True, help="Patches of this model below a body.")
 @click.option("--contact", metavar="NAME", help="Contact whose model is exported, if a scene has different ones.")
 def export(file: Path, **options: Any) -> None:
     """Write the friction model of a file as C source for a controller: NAME.h and NAME.c, C99 and C++17.

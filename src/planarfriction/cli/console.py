@@ -30,19 +30,15 @@ def simulation_progress(label: str, t_end: float) -> Iterator[Callable[[float], 
 
 
 @contextmanager
-def work_progress(label: str) -> Iterator[Callable[[str], None]]:
-    """Show a spinner that names the current work."""
+def work_progress(label: str) -> Iterator[Callable[..., None]]:
+    """Show the current work, `report(words)`, with a bar over finished things of all: `report(words, done, of)`."""
     with _bar() as bar:
         task = bar.add_task(label, total=None)
-        yield lambda name: bar.update(task, description=f"{label}: {name}")
 
+        def report(words: str, done: float | None = None, of: float | None = None) -> None:
+            bar.update(task, completed=done, total=of, description=f"{label}: {words}")
 
-@contextmanager
-def count_progress(label: str) -> Iterator[Callable[[int, int, str], None]]:
-    """Show a progress bar over finished things of all, with a description."""
-    with _bar() as bar:
-        task = bar.add_task(label, total=None)
-        yield lambda done, of, words: bar.update(task, completed=done, total=of, description=f"{label}: {words}")
+        yield report
 
 
 @contextmanager
@@ -78,7 +74,7 @@ class _Lines:
         self._words = description
         return 0
 
-    def update(self, task: int, *, description: str, **_: float) -> None:
+    def update(self, task: int, *, description: str, **_: Any) -> None:
         """Take new words."""
         self._words = description
 

@@ -33,7 +33,7 @@ def read_model(file: Path, contact: str | None) -> Any:
     return models[validation.choice("--contact", contact, models)]
 
 
-def export(file: Path, *, contact: str | None, out: Path, name: str, precision: str) -> None:
+def export(file: Path, *, contact: str | None, out: Path, name: str, precision: str, patches: int) -> None:
     """Write the model of a file as C source, and print which files hold it."""
-    for each in pf.export_c(read_model(file, contact), out, name=name, precision=precision):
+    for each in pf.export_c(read_model(file, contact), out, name=name, precision=precision, patches=patches):
         print(each)

@@ -61,7 +61,7 @@ def sweep(
     """
     from planarfriction import sweeps, validation
     from planarfriction.cli import INTERRUPTED
-    from planarfriction.cli.console import count_progress, note
+    from planarfriction.cli.console import note, work_progress
     from planarfriction.cli.run import scene_makers
     from planarfriction.errors import FrictionError, SweepInterrupted
     from planarfriction.families import MODELS
@@ -79,11 +79,11 @@ def sweep(
     function = None if measure is None else load_function("--measure", measure)[1]
     last: list[sweeps.Progress] = []
     try:
-        with count_progress("sweep") as report:
+        with work_progress("sweep") as report:
 
             def tell(progress: sweeps.Progress) -> None:
                 last[:] = [progress]
-                report(progress.done, progress.runs, str(progress))
+                report(str(progress), progress.done, progress.runs)
 
             data = sweeps.sweep(make, values, out=out, measure=function, progress=tell)
     except SweepInterrupted:

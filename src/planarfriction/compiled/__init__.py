@@ -9,7 +9,4 @@ from planarfriction.compiled.base import CompiledModel, StepJacobians
 from planarfriction.compiled.packed import PackedModel
 
 __all__ = ["CompiledModel", "PackedModel", "StepJacobians"]
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__dir__ = __all__.copy

@@ -75,6 +75,9 @@ class CompiledModel:
     inputs that are not plain and in order; then the checks of the model decide.
     """
 
+    depends_on_load: bool
+    """True if the load changes the shape of the patch."""
+
     def __init__(self, functions: StepFunctions, state_shape: tuple[int, ...], square_shape: tuple[int, ...]) -> None:
         self.functions, self.state_shape = functions, state_shape
         self._size, self._square, self._flat = math.prod(state_shape), math.prod(square_shape), len(state_shape) == 1
@@ -94,7 +97,7 @@ class CompiledModel:
     @functools.cached_property
     def fixed(self) -> PackedModel | None:
         """The model at any load; None if that changes its shape."""
-        raise NotImplementedError
+        return None if self.depends_on_load else self.with_all_states([None])
 
     def at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, PackedModel]]:
         """Yield rows of the flat batch, and the model at the load of each row or at the one load of all.

@@ -30,7 +30,7 @@ class CompiledDistributed(CompiledModel):
     """Machine form of a `DistributedModel` with a law on a patch."""
 
     def __init__(self, law: Any, patch: Any) -> None:
-        self.law, self.patch = law, patch
+        self.law, self.patch, self.depends_on_load = law, patch, patch.depends_on_load
         self.size = patch.bristles
         """Number of bristles of a cell: two of a point, three of a disc."""
         self.reference = 0.0 if law.reference_load is None else law.reference_load
@@ -39,7 +39,7 @@ class CompiledDistributed(CompiledModel):
         if self.reference > 0.0:
             from planarfriction.kernels import fixed_stiffness
 
-            self._contact = fixed_stiffness.RATES_OF[self.size, patch.anisotropic]
+            self._contact = fixed_stiffness.rates_of(self.size, patch.anisotropic, patch.asymmetric)
         cells = len(patch.positions)
         super().__init__(functions, (self.size, cells), (self.size, self.size, cells))
 
@@ -49,14 +49,10 @@ class CompiledDistributed(CompiledModel):
     def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         """Return the record of a contact, and how many numbers of a linearisation each cell has."""
         matrices = MATRICES if self.reference > 0.0 else LINEAR
-        return CellsContact(self.law.numbers, numbers.shape[1], numbers, weights), matrices * self.size**2
+        lean = numbers[-2 if self.patch.asymmetric else len(numbers) :]
+        return CellsContact(self.law.numbers, numbers.shape[1], numbers, lean, weights), matrices * self.size**2
 
     # ------------------------------------------------------------------ at given loads
-
-    @functools.cached_property
-    def fixed(self) -> PackedModel | None:
-        """See `CompiledModel`."""
-        return None if self.patch.depends_on_load else self.with_all_states([None])
 
     def at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, PackedModel]]:
         """See `CompiledModel`; all rows at once, each with its own weights."""

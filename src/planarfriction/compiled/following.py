@@ -26,56 +26,23 @@ def following(
     (weights, numbers), positions = packed.keepalive, compiled.patch.positions[packed.cells]
     count, (x, y) = weights.shape[1], np.ascontiguousarray(positions.T)
     middle, slopes, radius = _statics_of(weights, positions)
-    pressed, trial, scratch, zero, rows = (
-        np.zeros(size) for size in (count, count, *(packed.states + STATES,) * 2, 12)
-    )
-    cells, trial_cells = (row_of(compiled.record(numbers, each)[0]) for each in (pressed, trial))
-    calls = calls_of(packed.functions, change=True)
+    size = packed.states + STATES
+    blanks = dict.fromkeys(("pressed", "trial"), count) | dict.fromkeys(("scratch", "zero"), size) | {"rows": 12}
+    scratch = {name: np.zeros(length) for name, length in blanks.items()}
+    by_load = {"weights": weights, "middle": middle, "slope_x": slopes[0], "slope_y": slopes[1]}
+    arrays = {"x": x, "y": y, "calls": calls_of(packed.functions, change=True)} | scratch | by_load
+    cells, trial_cells = (row_of(compiled.record(numbers, scratch[name])[0]) for name in ("pressed", "trial"))
     record = FollowingContact(
-        count=count,
-        states=packed.states,
-        x=x,
-        y=y,
-        weights=weights,
-        middle=middle,
-        slope_x=slopes[0],
-        slope_y=slopes[1],
-        calls=calls,
-        cells=place_of(cells),
-        trial_cells=place_of(trial_cells),
-        pressed=pressed,
-        trial=trial,
-        scratch=scratch,
-        zero=zero,
-        rows=rows,
-        radius=radius,
-        centre_x=centre[0],
-        centre_y=centre[1],
-        height=height,
-        lag=LAG,
-    )
-    columns = {"weights": weights, "middle": middle, "slope_x": slopes[0], "slope_y": slopes[1]}
+        **arrays, count=count, states=packed.states, cells=place_of(cells), trial_cells=place_of(trial_cells),
+        radius=radius, centre_x=centre[0], centre_y=centre[1], height=height, lag=LAG,
+    )  # fmt: skip
     return packed._replace(
         functions=FUNCTIONS,
-        records=rows_of(record, len(weights), **{name: places_of(each) for name, each in columns.items()}),
-        states=packed.states + STATES,
+        records=rows_of(record, len(weights), **{name: places_of(each) for name, each in by_load.items()}),
+        states=size,
         workspace=OWN + packed.workspace,
         state_scale=np.append(packed.state_scale, np.full(STATES, radius / np.sqrt(count + 1))),
-        keepalive=(
-            *packed.keepalive,
-            x,
-            y,
-            middle,
-            slopes,
-            calls,
-            cells,
-            trial_cells,
-            pressed,
-            trial,
-            scratch,
-            zero,
-            rows,
-        ),
+        keepalive=(*packed.keepalive, *arrays.values(), cells, trial_cells),
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import time
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -30,22 +29,17 @@ class CompiledPublished(CompiledModel):
     """Machine form of a `ReducedModelPublished` with a law, and `PublishedShapes` of the patch at any load."""
 
     def __init__(self, law: Any, shapes: Any) -> None:
-        self._law, self.shapes = law, shapes
+        self._law, self.shapes, self.depends_on_load = law, shapes, shapes.depends_on_load
         super().__init__(STEPS, (3,), (3, 3))
 
     # ------------------------------------------------------------------ at given loads
-
-    @functools.cached_property
-    def fixed(self) -> PackedModel | None:
-        """See `CompiledModel`."""
-        return None if self.shapes.depends_on_load else self.with_all_states([None])
 
     def shape_at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, Any]]:
         """Yield the shape at each of the different loads > 0 of a batch, and the rows of the flat batch that have it.
 
         A contact whose shape does not depend on the load has all rows.
         """
-        if not self.shapes.depends_on_load:
+        if not self.depends_on_load:
             yield slice(None), self.shapes.shape_at(None)
             return
         flat = load.reshape(-1)
@@ -59,7 +53,7 @@ class CompiledPublished(CompiledModel):
 
     def points(self) -> tuple[np.ndarray, int]:
         """See `CompiledModel`."""
-        return np.empty((0, 2)) if self.shapes.depends_on_load else self.shapes.shape_at(None).place[None], 0
+        return np.empty((0, 2)) if self.depends_on_load else self.shapes.shape_at(None).place[None], 0
 
     def _following(self, load: np.ndarray, centre: np.ndarray) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
         """Move the patch as a whole to the centre of pressure."""

@@ -45,7 +45,4 @@ __all__ = [
     "scene_gradient",
     "scene_sensitivities",
 ]
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__dir__ = __all__.copy

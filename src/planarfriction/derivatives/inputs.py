@@ -49,6 +49,9 @@ class RolloutInputs(NamedTuple):
     def compiled(self, slopes: bool = False) -> Inputs:
         """Return the inputs as compiled loops take them, with the `slopes` of the weights of cells by the load."""
         shapes, which = self.model.shapes, np.zeros((1, len(self.dt)), dtype=int)
+        if own := self.model.batch:
+            each = np.broadcast_to(np.arange(math.prod(own)).reshape(own), self.batch).reshape(-1, 1)
+            which = np.repeat(each, len(self.dt), axis=1)
         if not isinstance(shapes, ShapesByLoad):
             loads, which = np.unique(self.normal_force, return_inverse=True)
             which = which.reshape(self.normal_force.shape)
@@ -93,7 +96,7 @@ def checked(
     for name, value in {"normal_force": load, "dt": dt}.items():
         if value.min(initial=0.0) < 0.0:
             raise InvalidValueError(name, "be >= 0", float(value.min()))
-    axes = state.shape[: -len(inner)], twist.shape[:-2], load.shape[:-1], packed.rows.shape[:-1], *more
+    axes = state.shape[: -len(inner)], twist.shape[:-2], load.shape[:-1], packed.rows.shape[:-1], packed.batch, *more
     try:
         batch = np.broadcast_shapes(*axes)
     except ValueError:

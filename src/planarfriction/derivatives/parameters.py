@@ -37,8 +37,9 @@ PARAMETERS = (
 )
 """Parameters of `ReducedModelPublished`, in the order of their vector; units as in `LuGre`, [m], [m^2], [m], [m]."""
 
-_POSITIVE = ("sigma_0", "mu_c", "mu_s", "v_s", "gamma", "contact_radius")
-_NON_NEGATIVE = ("sigma_1", "sigma_2", "second_moment")
+POSITIVE = ("sigma_0", "mu_c", "mu_s", "v_s", "gamma", "contact_radius")
+NON_NEGATIVE = ("sigma_1", "sigma_2", "second_moment")
+"""Parameters by their ranges; the breakaway ratio is in [0, 1), the centre of pressure anywhere."""
 
 
 class Family(NamedTuple):
@@ -53,6 +54,8 @@ class Family(NamedTuple):
     sensitivities: Callable[..., None]
     tangent: Callable[..., None]
     """Compiled loops (see `kernels.rollouts`), which add to their outputs but write the state."""
+    shares: Callable[..., None] | None = None
+    """Derivatives by the weights of cells (see `kernels.cells_rollout`)."""
 
 
 PUBLISHED = Family(
@@ -67,11 +70,11 @@ PUBLISHED = Family(
 
 
 @functools.cache
-def _cells(size: int, turned: bool) -> Family:
-    """Return the rollouts of `DistributedModel` of points, size 2, or of discs, 3; `turned` with a metric."""
-    loops, sensitivities = rollouts_of_cells(size, turned)
+def _cells(size: int, turned: bool, leans: bool) -> Family:
+    """Return the rollouts of `DistributedModel` of points, size 2, or of discs, 3 (see `cell_passes.KINDS`)."""
+    loops, sensitivities = rollouts_of_cells(size, turned, leans)
     names, columns = cells_rollout.PARAMETERS, np.array(cells_rollout.COLUMNS)
-    return Family(names, columns, loops.rollout, loops.gradient, sensitivities, loops.tangent)
+    return Family(names, columns, loops.rollout, loops.gradient, sensitivities, loops.tangent, loops.shares)
 
 
 class Packed(NamedTuple):
@@ -88,6 +91,8 @@ class Packed(NamedTuple):
     """Shape of the state of one contact."""
     reference: float = 0.0
     """Reference load [N] of a law whose stiffness does not grow with the load; 0 of others."""
+    batch: tuple[int, ...] = ()
+    """Batch axes of the weights of cells, if contacts differ in them: `shapes` has one row for each."""
 
     def turned(self, vectors: np.ndarray) -> np.ndarray:
         """Turn twists into the axes of the compiled loops, or wrenches back, `[..., 3]`."""
@@ -132,9 +137,9 @@ def _family(model: Any) -> Family:
     model = getattr(model, "reduction", model)
     if isinstance(model, ReducedModelPublished):
         return PUBLISHED
-    if isinstance(model, DistributedModel) and not (is_rate_law(model.law) or model.patch.asymmetric):
-        return _cells(model.patch.bristles, model.patch.anisotropic)
-    kind = "cells with a RateLaw or an asymmetry" if isinstance(model, DistributedModel) else type(model).__name__
+    if isinstance(model, DistributedModel) and not is_rate_law(model.law):
+        return _cells(model.patch.bristles, model.patch.anisotropic, model.patch.asymmetric)
+    kind = "cells with a RateLaw" if isinstance(model, DistributedModel) else type(model).__name__
     raise InvalidValueError("model", "be one that has compiled rollouts", kind)
 
 
@@ -193,17 +198,20 @@ def pack_surface(
     return _on_surface(row, kind, size, np.ascontiguousarray(data, dtype=float), axes)
 
 
-def pack_cells(elasto_plastic: bool, positions: np.ndarray, weights: np.ndarray) -> Packed:
-    """Return a `DistributedModel` by its cells and their weights `[N]`, for rollouts at given parameters.
+def pack_cells(elasto_plastic: bool, weights: np.ndarray, positions: np.ndarray, reference: Any = 0.0) -> Packed:
+    """Return a `DistributedModel` by its cells and their weights `[..., N]`, for rollouts at given parameters.
 
-    `positions` are `[2, N]`, or levers `[5, N]`; of discs `[3, N]` or `[6, N]`, with `kappa a` behind them.
+    `positions` are `[2, N]`, levers `[5, N]`, or these with an asymmetry behind them `[7, N]`; of discs `[3, N]`,
+    `[6, N]` or `[8, N]`, with `kappa a` before the asymmetry. `reference` is a `LuGre.reference_load` [N], or 0.
     """
-    levers, shares = np.asarray(positions, dtype=float), np.asarray(weights, dtype=float)[None]
-    inner, turned = (3 if len(levers) in (3, 6) else 2, len(weights)), len(levers) > 3
-    if turned:
+    levers, weights, count = np.asarray(positions, dtype=float), np.asarray(weights, dtype=float), len(positions)
+    rows, inner = weights.reshape(-1, weights.shape[-1]), (3 if count in (3, 6, 8) else 2, weights.shape[-1])
+    same = len(rows) > 0 and (rows == rows[0]).all()
+    if 3 < count < 7:
         levers = np.vstack([levers, np.zeros((2, levers.shape[1]))])  # no asymmetry
-    shapes = cells_by_load(levers, shares, None)
-    return Packed(_cells(inner[0], turned), np.array(_any_law(elasto_plastic)), shapes, inner=inner)
+    family, shapes = _cells(inner[0], count > 3, count > 6), cells_by_load(levers, rows[:1] if same else rows, None)
+    law, batch = np.array(_any_law(elasto_plastic)), () if same else weights.shape[:-1]
+    return Packed(family, law, shapes, inner=inner, reference=float(reference), batch=batch)
 
 
 def _any_law(elasto_plastic: bool) -> LawNumbers:
@@ -218,10 +226,15 @@ def _checked(parameters: Any, names: tuple[str, ...]) -> np.ndarray:
         low, high = float(column.min(initial=np.inf)), float(column.max(initial=-np.inf))
         if not np.isfinite(column).all():
             raise InvalidValueError(name, "be finite", "NaN or infinity")
-        if name in _POSITIVE and not low > 0.0:
-            raise InvalidValueError(name, "be > 0", low)
-        if name in _NON_NEGATIVE and not low >= 0.0:
-            raise InvalidValueError(name, "be >= 0", low)
-        if name == "breakaway_ratio" and not (low >= 0.0 and high < 1.0):
-            raise InvalidValueError(name, "be in [0, 1)", low if low < 0.0 else high)
+        check_range(name, low, high)
     return values
+
+
+def check_range(name: str, low: float, high: float) -> None:
+    """Raise InvalidValueError unless a parameter may have values from `low` to `high`."""
+    if name in POSITIVE and not low > 0.0:
+        raise InvalidValueError(name, "be > 0", low)
+    if name in NON_NEGATIVE and not low >= 0.0:
+        raise InvalidValueError(name, "be >= 0", low)
+    if name == "breakaway_ratio" and not (low >= 0.0 and high < 1.0):
+        raise InvalidValueError(name, "be in [0, 1)", low if low < 0.0 else high)

@@ -68,6 +68,9 @@ class MotionPath:
         options = SolverOptions() if options is None else options
         plan = validation.instance("options", options, SolverOptions, "SolverOptions").plan(scene, RTOL)
         self.scene, self.inputs = scene, inputs
+        for contact in scene.contacts:
+            if contact.edge:
+                raise InvalidValueError(f"edge of contact {contact.name!r}", "be False for derivatives of scenes", True)
         self.batches = SegmentBatches(scene, plan.end, times=plan.times, sensitivities=True, marks=inputs.marks)
         for contact, model in zip(scene.contacts, self.batches.models, strict=True):
             if None in model.functions:

@@ -105,7 +105,7 @@ def rollout(
     Each step is a `model.step`. `normal_force` broadcasts with `[..., T]`: one number, one for each step, or
     one for each contact `[..., 1]`; `dt` is one number or `[T]`; leading axes broadcast. `parameters` `[..., P]` (see
     `parameter_names`) replace the model's own; the limit surface stays as it is, in scaled coordinates.
-    Models run in compiled code, batches on all processors; cells with a `RateLaw` or an asymmetry step in Python, as
+    Models run in compiled code, batches on all processors; cells with a `RateLaw` step in Python, as
     does `ReducedModelPublished` where its shape follows the load.
 
     Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for `parameters` if the model cannot take
@@ -178,6 +178,26 @@ def rollout_vjp(
         sum_to(np.shape(normal_force), inputs.of_all(bars.load)),
         sum_to(np.shape(vector), inputs.of_all(rows_bar[:, family.columns])),
     )
+
+
+def weights_vjp(
+    model: Packed, state: Any, twist: Any, normal_force: Any, dt: Any, wrenches_bar: Any, weights: np.ndarray, *,
+    parameters: Any = None, states: Any = None,
+) -> np.ndarray:  # fmt: skip
+    """Compute the gradient of `sum(wrenches_bar wrenches)` of a `rollout` by the `weights` `[..., N]` of its cells.
+
+    Other arguments are as in `rollout_vjp`. Raises InvalidValueError as `rollout_vjp` does.
+    """
+    inputs = checked(model, state, twist, normal_force, dt, parameters, [weights.shape[:-1]])
+    (count, size), steps, shares = inputs.state.shape, len(inputs.dt), inputs.model.family.shares
+    cotangents = rows_of("wrenches_bar", wrenches_bar, (steps, 3), inputs.batch)
+    if states is None:
+        on_the_way = _roll(inputs, steps)[2]
+    else:
+        on_the_way = rows_of("states", states, (steps, *inputs.model.inner), inputs.batch).reshape(-1, steps, size)
+    found, compiled = np.zeros((count, weights.shape[-1])), inputs.compiled()
+    share(compiled, count, lambda *span: shares(compiled, on_the_way, cotangents, span, found))  # pyright: ignore
+    return sum_to(weights.shape, inputs.of_all(found))
 
 
 def rollout_jacobian(
@@ -290,13 +310,9 @@ def _stepped(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any) -> 
     state = model.rest() if state is None else validation.numbers("state", state)
     twist, load, dt = sequences(twist, normal_force, dt)
     inner = model.state_shape
-    try:
-        batch = np.broadcast_shapes(state.shape[: -len(inner)], twist.shape[:-2], load.shape[:-1])
-        state = np.broadcast_to(state, (*batch, *inner))
-    except ValueError:
-        shapes = ", ".join(str(list(a.shape)) for a in (state, twist, load))
-        raise InvalidValueError("state, twist and normal_force", "broadcast", f"shapes {shapes}") from None
-    wrenches = np.empty((*batch, len(dt), 3))
+    axes = state.shape, (*twist.shape[:-2], *inner), (*load.shape[:-1], *inner)
+    state = np.broadcast_to(state, validation.common_shape("state, twist and normal_force", axes))
+    wrenches = np.empty((*state.shape[: -len(inner)], len(dt), 3))
     for t, step in enumerate(dt):
         state, wrenches[..., t, :] = model.step(state, twist[..., t, :], load[..., t], step)
     return Rollout(np.array(state), wrenches)

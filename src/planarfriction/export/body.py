@@ -1,4 +1,4 @@
-"""The search of `kernels.coupling` in C, for a body on one patch."""
+"""The search of `kernels.coupling` in C, for a body on patches of one model."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ ROUNDING = {"double": coupling.ROUNDING, "float": 1e-5}
 """Error of a twist, in the largest speed that goes into it, below which no step gets, by precision."""
 
 
-def body_of(model: Any, precision: str) -> dict[str, Any]:
+def body_of(model: Any, precision: str, patches: int) -> dict[str, Any]:
     """Return fields and functions of the search, always in double precision, and its constants."""
-    row = layout(1, 0, 0, 0)
+    row = layout(patches, 0, 0, 0)
     counts = {name: part.stop - part.start for name, part in row.slices.items()}
     record = np.dtype([(name, "f8", (count,)) for name, count in counts.items() if count])
     own = Patches(**dict.fromkeys(Patches._fields, Fixed(0)))._replace(  # pyright: ignore
-        count=Fixed(1), steps=_STEP, slopes=_SLOPES, radius=Array("lever_arm", (1,), fixed=True)
+        count=Fixed(patches), steps=_STEP, slopes=_SLOPES, radius=Array("lever_arm", (patches,), fixed=True)
     )
     writer, p = Writer(), Record("p", record)
     loops = Loops(writer, {record: "search_t"})
@@ -39,13 +39,14 @@ def body_of(model: Any, precision: str) -> dict[str, Any]:
     loops.add(coupling.prepare, (own, p))
     loops.add(coupling.search, (own, p, Scalar("tolerance"), Fixed(ITERATIONS)))
     functions = re.sub(r"\breal\b", "double", "\n\n".join(loops.functions))
+    functions = re.sub(r"\b(\w+_of_vectors)\b", r"\1_in_double", functions)  # others are in the other precision
     return {
         "fields": [f"{name}[{count}]" for name, count in counts.items() if f"p->{name}" in functions],
         "functions": functions,
         "stages": coupling.STAGES,
         "ratio": Writer(precision).constant(coupling.SHORTER),
         "shortest": writer.constant(coupling.SHORTER**-coupling.STAGES),
-        "lever": writer.constant(lever_of(model) or 1.0),
+        "levers": ", ".join([writer.constant(lever_of(model) or 1.0)] * patches),
         "tolerance": writer.constant(TOLERANCE),
         "rounding": writer.constant(ROUNDING[precision]),
     }

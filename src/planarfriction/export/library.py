@@ -80,40 +80,14 @@ def _fresh(state: Any, writer: Writer) -> list[str]:
 PRECISIONS = {"double": LARGEST, "float": 1e9}
 """Largest number that a step takes, by precision."""
 
+MOST_PATCHES = 64
+"""Patches of a body at most."""
+
 LONGEST_NAME = 40
 """Characters of the name of a library: compilers of C99 tell apart names of 63, and files have such names too."""
 
-HEADERS = [
-    "assert",
-    "complex",
-    "ctype",
-    "errno",
-    "fenv",
-    "float",
-    "inttypes",
-    "iso646",
-    "limits",
-    "locale",
-    "math",
-    "setjmp",
-    "signal",
-    "stdalign",
-    "stdarg",
-    "stdatomic",
-    "stdbool",
-    "stddef",
-    "stdint",
-    "stdio",
-    "stdlib",
-    "stdnoreturn",
-    "string",
-    "tgmath",
-    "threads",
-    "time",
-    "uchar",
-    "wchar",
-    "wctype",
-]
+HEADERS = """assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg
+stdatomic stdbool stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar wchar wctype"""
 """Headers of C, which a library of that name would hide."""
 
 PARAMETERS = {
@@ -145,7 +119,7 @@ def checked_name(name: Any) -> None:
     """Check the name of a library; raises InvalidValueError for one that is no name of C, or that of a header."""
     if not (isinstance(name, str) and re.fullmatch(r"[a-zA-Z]\w*", name, re.ASCII) and len(name) <= LONGEST_NAME):
         raise InvalidValueError("name", f"be a letter, then letters, digits and _, {LONGEST_NAME} in all", name)
-    if name.lower() in HEADERS:
+    if name.lower() in HEADERS.split():
         raise InvalidValueError("name", "not be that of a header of C", name)
 
 
@@ -157,6 +131,7 @@ def export_c(
     precision: str = "double",
     casadi: bool = False,
     controller: Any = None,
+    patches: int = 1,
 ) -> tuple[Path, ...]:
     """Write a model as C source into a folder; return the files `<name>.h`, `.c`, `_test.c` and `.cmake`.
 
@@ -164,19 +139,25 @@ def export_c(
     own. Its step is the model's own (see `FrictionModel.step`), traced from the same formulas. The test is a program
     that compares the library with numbers of the model; the CMake file has a target for each.
     With `casadi`, `<name>_casadi.c` holds the step and its Jacobian as functions that `casadi.external` loads.
+    `patches` is the number of patches of this model that `<name>_body_step` puts a body on.
     With `controller`, a `planarfriction.online.Hold`, `<name>_grip.h` and `.c` hold that with its observer.
 
-    Raises InvalidValueError for a name that is no name of C, an unknown precision, and models without source and
-    controllers without source (see `pieces_of`, `grip_of`); FileError if the folder cannot be written.
+    Raises InvalidValueError for a name that is no name of C, an unknown precision, fewer than 1 or more than 64
+    patches, and models and controllers without source (see `pieces_of`, `grip_of`); FileError if the folder cannot be
+    written.
     """
     checked_name(name)
     validation.choice("precision", precision, PRECISIONS)
+    validation.count("patches", patches, 1, MOST_PATCHES)
     validation.instance("casadi", casadi, bool, "True or False")
     if (casadi or controller is not None) and precision != "double":
         raise InvalidValueError("precision", "be double for CasADi and controllers", precision)
-    grip = {} if controller is None else {"grip": grip_of(controller, name)}
-    folder, ends = validation.path("folder", folder), FILES | (CASADI if casadi else {}) | (GRIP if grip else {})
-    texts = _texts(model, pieces_of(model, precision, fixed=False), name, precision, grip, tuple(ends))
+    given = {"patches": patches} | ({} if controller is None else {"grip": grip_of(controller, name)})
+    folder, ends = (
+        validation.path("folder", folder),
+        FILES | (CASADI if casadi else {}) | (GRIP if "grip" in given else {}),
+    )
+    texts = _texts(model, pieces_of(model, precision, fixed=False), name, precision, given, tuple(ends))
     writing.make_folder(folder)
     files = tuple(folder / f"{name}{end}" for end in ends.values())
     with contextlib.ExitStack() as stack:  # all can be written, or none is
@@ -185,7 +166,7 @@ def export_c(
     return files
 
 
-def _texts(model: Any, pieces: Pieces, name: str, precision: str, grip: dict, kinds: tuple[str, ...]) -> list[str]:
+def _texts(model: Any, pieces: Pieces, name: str, precision: str, given: dict, kinds: tuple[str, ...]) -> list[str]:
     """Return the text of each kind of file."""
     import jinja2
 
@@ -206,7 +187,7 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, grip: dict, ki
     own = {each: "\n".join(lines) for each, lines in bodies.items() if f"{each}_of(" in stepping}
     values = (
         functions
-        | grip
+        | given
         | {
             "name": name,
             "version": planarfriction.__version__,
@@ -229,7 +210,7 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, grip: dict, ki
             "slip": None if slip is None else _search(writer, slip),
             "passes": passes,
             "moves": moves,
-            "body": body_of(model, precision),
+            "body": body_of(model, precision, given["patches"]),
             "share": share,
             "own": own,
             "samples": samples_of(model, slip, writer, pieces.tables.get("rungs")),

@@ -55,14 +55,14 @@ class Loops:
     def __init__(self, writer: Writer, structs: dict[np.dtype, str] | None = None) -> None:
         self.writer, self.structs = writer, structs or {}
         self.replaced: dict[Any, Callable[[Any], str]] = {}
-        """Names of C functions, from their arguments, that take the record among these in place of a kernel."""
+        """Names of C functions, from their arguments, in place of a kernel: they take records and numbers of these."""
         self.functions: list[str] = []
         self._made: dict[Any, tuple[str, list[bool], Any]] = {}
 
     def add(self, kernel: Any, arguments: tuple[Any, ...]) -> tuple[str, list[bool], Any]:
         """Write a kernel for arguments like these; return its name, which of their numbers it takes, and its result."""
         if kernel in self.replaced:
-            return self.replaced[kernel](arguments), [isinstance(each, Record) for each in leaves(arguments)], None
+            return self.replaced[kernel](arguments), [isinstance(x, (Record, Scalar)) for x in leaves(arguments)], None
         straight = kernel.py_func.__module__ == surfaces.__name__
         if straight:
             arguments = tuple(Fixed(each) if isinstance(each, (int, float)) else each for each in arguments)

@@ -196,7 +196,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     if size == 3:
         kind, sliding = disc_cells, discs.sliding if precision == "double" else _sliding_of_disc
         cell = _with(discs.step, sliding=sliding)
-    reference, by = model.compiled.reference, cells_rollout.BY
+    reference, by = model.compiled.reference, cells_rollout.by_of("law")
     fixed = reference > 0.0
     moved, by = (_settled(cell, reference, LIGHTEST[precision] * reference), (*by, "load")) if fixed else (cell, by)
     given = ("dt", "normal_force") if fixed else ("dt",)

@@ -9,7 +9,7 @@ from planarfriction.identify.logs import Log, differentiated
 from planarfriction.identify.motion import identify_motion
 from planarfriction.identify.options import FitOptions
 from planarfriction.identify.result import Identification
-from planarfriction.identify.slides import Slide, SlidingBody, fit_start, predict_slide
+from planarfriction.identify.slides import MassProperties, Slide, fit_start, predict_slide
 from planarfriction.identify.verdicts import Verdict
 from planarfriction.identify.wrenches import identify_lugre
 
@@ -17,9 +17,9 @@ __all__ = [
     "FitOptions",
     "Identification",
     "Log",
+    "MassProperties",
     "MotionPlan",
     "Slide",
-    "SlidingBody",
     "Verdict",
     "candidate_motions",
     "current_estimate",
@@ -30,7 +30,4 @@ __all__ = [
     "identify_motion",
     "predict_slide",
 ]
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__dir__ = __all__.copy

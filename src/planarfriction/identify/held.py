@@ -6,15 +6,12 @@ For each, one Gauss-Newton step of it together with all that was fitted, from wh
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from planarfriction.identify.fit import Fit
 from planarfriction.identify.parameters import ALL, LAW, fitted_law
-
-if TYPE_CHECKING:
-    from planarfriction.identify.search import Fit
-    from planarfriction.identify.uncertainty import Uncertainty
+from planarfriction.identify.uncertainty import Uncertainty
 
 DENIED = 4.0
 """Standard errors by which the residuals must move a held value to deny it."""

@@ -276,7 +276,12 @@ def differentiated(time: ArrayLike, motion: ArrayLike, *, window: int = 7) -> np
     window = validation.count("window", window, at_least=3)
     if len(time) < window:
         raise InvalidValueError("motion", f"hold at least window={window} samples", f"{len(time)}")
-    slopes = np.empty_like(motion)
+    return rotate(slopes(time, motion, window), -motion[:, 2])
+
+
+def slopes(time: np.ndarray, values: np.ndarray, window: int = 7) -> np.ndarray:
+    """Compute the slopes of parabolas through `window` samples of `values` `[T, C]` at each of the times `[T]`."""
+    found = np.empty_like(values)
     for begin in range(0, len(time), AT_ONCE):
         rows = np.arange(begin, min(begin + AT_ONCE, len(time)))
         around = np.clip(rows - window // 2, 0, len(time) - window)[:, None] + np.arange(window)
@@ -284,9 +289,9 @@ def differentiated(time: ArrayLike, motion: ArrayLike, *, window: int = 7) -> np
         scale = np.abs(since).max(axis=1, keepdims=True)
         powers = np.stack([(since / scale) ** n for n in range(3)], -1)
         across = powers.swapaxes(1, 2)
-        parabolas = np.linalg.pinv(across @ powers, hermitian=True) @ across @ (motion[around] - motion[rows, None])
-        slopes[rows] = parabolas[:, 1] / scale
-    return rotate(slopes, -motion[:, 2])
+        parabolas = np.linalg.pinv(across @ powers, hermitian=True) @ across @ (values[around] - values[rows, None])
+        found[rows] = parabolas[:, 1] / scale
+    return found
 
 
 def increasing(time: ArrayLike, name: str = "time", at_least: int = 0) -> np.ndarray:

@@ -10,13 +10,14 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.checks import check_slides
+from planarfriction.identify.fit import Fit
 from planarfriction.identify.parameters import check_names, fitted_law, scaled_patch
 from planarfriction.identify.problem import Problem
 from planarfriction.identify.result import Identification
-from planarfriction.identify.search import Fit, interruptible, multistart, refine
+from planarfriction.identify.search import interruptible, multistart, refine
 from planarfriction.identify.slides import (
+    MassProperties,
     Slide,
-    SlidingBody,
     as_slides,
     contradictions,
     improve_start,
@@ -65,7 +66,7 @@ Build = Callable[..., Any]
 def identify_motion(
     slides: Slide | Sequence[Slide],
     patch: ContactPatch,
-    body: SlidingBody,
+    body: MassProperties,
     *,
     parameters: Sequence[str] = ("mu_c", "contact_radius"),
     start: LuGre = DRY,
@@ -119,7 +120,7 @@ def identify_motion(
     """
     slides = as_slides(slides)
     names = check_names(parameters, MOTION_PARAMETERS)
-    validation.instance("body", body, SlidingBody, "a SlidingBody")
+    validation.instance("body", body, MassProperties, "MassProperties")
     if type(start) is not LuGre:  # a subclass may compute something else from the parameters that are fitted
         raise InvalidValueError("start", "be a LuGre law", start)
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
@@ -127,7 +128,9 @@ def identify_motion(
     if samples is not None:
         samples = validation.count("samples", samples, at_least=5)
     robust = validation.choice("loss", loss, ("robust", "squares")) == "robust"
-    check_slides(slides, patch, body)
+    findings = check_slides(slides, patch, body)
+    doubts = [Verdict("fit", False, str(finding)) for finding in findings]
+    doubts += [Verdict(name, False, "a unit is doubtful") for name in names if findings]
     strange = contradictions(slides, body) if robust else {}
     left_out = [Verdict("fit", True, f"{slides[i].name} is left out: {why}") for i, why in strange.items()]
     slides = tuple(slide for i, slide in enumerate(slides) if i not in strange)
@@ -136,7 +139,7 @@ def identify_motion(
     noise = np.array([FIRST_NOISE, FIRST_NOISE, FIRST_NOISE / float(patch.contact_radius())])
     with interruptible([problem]):
         fit = refine(multistart(problem, [problem.start_values()], noise=noise))
-        return _identification(fit, problem, left_out)
+        return _identification(fit, problem, [*doubts, *left_out])
 
 
 class SlideProblem(Problem):
@@ -151,7 +154,7 @@ class SlideProblem(Problem):
         self,
         slides: Sequence[Slide],
         patch: ContactPatch,
-        body: SlidingBody,
+        body: MassProperties,
         names: tuple[str, ...],
         law: LuGre,
         build: Build,

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.described import described
 from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.rig import GROUPS, check_groups
@@ -39,7 +38,6 @@ def _bristles(_: str, value: Any) -> ElastoPlastic | float | str | None:
     return value if value == "auto" else LuGre(elasto_plastic=value).elasto_plastic
 
 
-@described
 @dataclass(frozen=True)
 class FitOptions(Checked):
     """Options of `identify_lugre` that few fits change.
@@ -65,8 +63,8 @@ class FitOptions(Checked):
     the result says so."""
     elasto_plastic: ElastoPlastic | float | str | None = checked(_bristles, default="auto")
     """Kind of bristles, None for plain ones, unless a whole law is given as start. "auto" takes what fits better: plain
-    ones or a breakaway ratio of 0.9; and for logs at clearly different loads, a stiffness that grows with the load or
-    one that does not (`LuGre.reference_load`)."""
+    ones or a breakaway ratio of 0.9; and for loads that clearly differ, a stiffness that grows with the load or one
+    that does not (`LuGre.reference_load`)."""
     loss: str = checked(validation.choice, ("linear", "soft_l1"), default="linear")
     """Loss of a residual: its square, or "soft_l1" as SciPy has it. A fit with the latter ends without samples off by
     more than six times the noise, if these are fewer than a tenth."""

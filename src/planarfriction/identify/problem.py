@@ -134,7 +134,7 @@ class LogProblem(Problem):
         self.logs, self.patch, self.names, self.law = logs, patch, names, law
         self.options, self.model, self.progress = options, model, progress
         loads = [mean_load(log) for log in logs]
-        check_loads(logs, loads, patch, law, [name for name in names if name in known.SOFT_FINGER])
+        check_loads(logs, loads, patch, [name for name in names if name in known.SOFT_FINGER])
         self.reference_load = float(np.median(loads))
         self.fixed_patch = patch
         if patch.depends_on_load:
@@ -145,7 +145,8 @@ class LogProblem(Problem):
         self.twists = [smoothed(log) if "twist" in options.nuisance else as_measured(log) for log in logs]
         # A log at rest has no sample before its first step; its first wrench shows bristles that nobody knows.
         self.used = [log.inner[1 if options.begins == "rest" else 0 :] for log in logs]
-        self.simulator = SIMULATORS[model](self.fixed_patch, self._per_load, options.surface)
+        kind = SIMULATORS[model]
+        self.simulator = kind(self.fixed_patch, self._per_load if kind.own_radius else self.law, options.surface)
         self.steps = options.refine or 1
         self.predictions = self._predictions(self.steps)
         self._shown: tuple[np.ndarray, list[np.ndarray]] | None = None
@@ -153,7 +154,7 @@ class LogProblem(Problem):
 
     @property
     def _per_load(self) -> LuGre:
-        """The law with a stiffness per load; at the constant load of a log it is one, whatever it does else."""
+        """The law with a stiffness per load, as the published model takes it: that of the mean load of a log."""
         return dataclasses.replace(self.law, reference_load=None)
 
     def _maps(self, loads: Sequence[float]) -> list[VectorMap]:
@@ -162,7 +163,8 @@ class LogProblem(Problem):
         surface = self.options.surface
         base = parameters_of(SIMULATORS["reduced-published"].model(self.fixed_patch, self._per_load, surface))
         self.base = dict(zip(PARAMETERS, base.tolist(), strict=True))
-        maps = [VectorMap(self.names, base, patch, load, self.law.reference_load) for load in loads]
+        reference = self.law.reference_load if SIMULATORS[self.model].own_radius else None
+        maps = [VectorMap(self.names, base, patch, load, reference) for load in loads]
         for each, load in zip(maps, loads, strict=True):
             if patch.depends_on_load and not any(name in known.SOFT_FINGER for name in self.names):
                 x, y = patch.centre_of_pressure(load)

@@ -6,12 +6,12 @@ import contextlib
 import dataclasses
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from planarfriction.errors import IdentificationInterrupted
+from planarfriction.identify.fit import Fit
 from planarfriction.identify.parameters import ALL, Coordinates
 from planarfriction.identify.problem import LogProblem, Problem
 from planarfriction.laws import LuGre
@@ -22,9 +22,6 @@ change of an estimate by 0.04 standard errors."""
 
 ROUNDS, STEADY = 6, 0.02
 """Most rounds of noise and finer steps, and largest change of the noise, as a share, for which it is settled."""
-
-NEAR = 4.0
-"""Mean square of the residuals over that of the noise up to which a rough fit is near the data: steps are coarse."""
 
 MOST_EVALUATIONS, SAME_COST = 100, 1e-3
 """Most evaluations of one start, and largest difference of costs, as a share, of starts that found one minimum."""
@@ -40,34 +37,6 @@ SPEEDS, STIFFNESSES = 6, 7
 
 SCATTER = 0.7
 """Standard deviation of the logarithms of starts around a given one."""
-
-
-@dataclass(frozen=True)
-class Fit:
-    """Problem with its best values."""
-
-    problem: Any
-    """`Problem` that was solved."""
-    coordinates: Coordinates
-    x: np.ndarray
-    """Coordinates `[F + K]`."""
-    values: np.ndarray
-    """Values `[F + K]`."""
-    at_bound: np.ndarray
-    """Mask of the coordinates that lie on a bound, `[F + K]`."""
-    noise: np.ndarray
-    """Noise of each channel, `[3]`, or of the channels of each slide, `[S, 3]`."""
-    sigma: list[np.ndarray]
-    """Standard deviation of each residual, `[T, 3]` of each log or slide."""
-    starts: tuple[int, int]
-    """Number of starting points that led to this minimum, and number of all."""
-    cost: float
-    """Half the sum of the squared residuals."""
-
-    @property
-    def near(self) -> bool:
-        """True if hardly more than noise is left."""
-        return 2.0 * self.cost <= NEAR * self.problem.numbers
 
 
 def multistart(problem: Problem, starts: Sequence[np.ndarray], *, noise: np.ndarray) -> Fit:

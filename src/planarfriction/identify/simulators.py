@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from planarfriction.compiler import threads
 from planarfriction.derivatives import PARAMETERS, rollout, rollout_jacobian
+from planarfriction.identify.decimation import DecimatedLog
 from planarfriction.identify.logs import EVEN, Log
 from planarfriction.identify.parameters import RADIUS, SHAPE
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
-
-if TYPE_CHECKING:
-    from planarfriction.identify.decimation import DecimatedLog
 
 CHANGE = 1e-6
 """Step of difference quotients as a share of the parameter: rounding and curvature both stay below 1e-5."""

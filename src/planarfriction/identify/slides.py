@@ -13,7 +13,6 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.derivatives.scene_inputs import STATES
-from planarfriction.described import described
 from planarfriction.equality import ByValue, Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.logs import increasing, unwrapped
@@ -81,10 +80,9 @@ class Slide(ByValue):
         return Slide(self.time[:samples], self.pose[:samples], self.twist, self.name)
 
 
-@described
 @dataclass(frozen=True)
-class SlidingBody(Checked):
-    """Body that slides: its mass and inertia, and gravity.
+class MassProperties(Checked):
+    """Mass and inertia of a body that slides, and gravity.
 
     Raises InvalidValueError for a mass, an inertia or a load that is not > 0.
     """
@@ -103,7 +101,7 @@ def parabola(time: np.ndarray, pose: np.ndarray, samples: int = 8) -> np.ndarray
     return np.polynomial.polynomial.polyfit(time[:count] - time[0], pose[:count], 2)[1]
 
 
-def slide_poses(model: Any, body: SlidingBody, time: np.ndarray, pose: Any, twist: Any) -> np.ndarray:
+def slide_poses(model: Any, body: MassProperties, time: np.ndarray, pose: Any, twist: Any) -> np.ndarray:
     """Simulate poses x, y, theta `[T, 3]` at `time` `[T]` of a body on `model`, from a start pose and twist `[3]` each.
 
     A body that stopped stays where it is.
@@ -121,7 +119,7 @@ def slide_poses(model: Any, body: SlidingBody, time: np.ndarray, pose: Any, twis
     return CubicHermiteSpline(saved, poses, twists)(np.minimum(time - time[0], saved[-1]))
 
 
-def start_slopes(model: Any, body: SlidingBody, slide: Slide, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def start_slopes(model: Any, body: MassProperties, slide: Slide, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Simulate poses `[T, 3]` from a start (pose, then twist, `[6]`), with derivatives `[T, 3, 6]` by differences.
 
     The start pose shifts the motion as a whole; the start angle of a contact that is not round changes more than that,
@@ -137,7 +135,7 @@ def start_slopes(model: Any, body: SlidingBody, slide: Slide, start: np.ndarray)
 
 
 def fit_start(
-    model: Any, body: SlidingBody, slide: Slide, *, samples: int | None = None, noise: Any = (1e-3, 1e-3, 2e-2)
+    model: Any, body: MassProperties, slide: Slide, *, samples: int | None = None, noise: Any = (1e-3, 1e-3, 2e-2)
 ) -> np.ndarray:
     """Estimate the initial pose and twist `[6]` of a slide from its first `samples` poses (None: all).
 
@@ -151,7 +149,7 @@ def fit_start(
 
 
 def _check(body: Any, slide: Any) -> None:
-    validation.instance("body", body, SlidingBody, "a SlidingBody")
+    validation.instance("body", body, MassProperties, "MassProperties")
     validation.instance("slide", slide, Slide, "a Slide")
 
 
@@ -160,7 +158,7 @@ def start_of(slide: Slide) -> np.ndarray:
     return np.concatenate([slide.pose[0], np.asarray(slide.twist)])
 
 
-def improve_start(model: Any, body: SlidingBody, slide: Slide, start: np.ndarray, noise: np.ndarray, turns: int):
+def improve_start(model: Any, body: MassProperties, slide: Slide, start: np.ndarray, noise: np.ndarray, turns: int):
     """Improve a start `[6]` by some Gauss-Newton steps."""
     for _ in range(turns):
         poses, slopes = start_slopes(model, body, slide, start)
@@ -169,7 +167,7 @@ def improve_start(model: Any, body: SlidingBody, slide: Slide, start: np.ndarray
     return start
 
 
-def predict_slide(model: Any, body: SlidingBody, slide: Slide, *, samples: int | None = None) -> np.ndarray:
+def predict_slide(model: Any, body: MassProperties, slide: Slide, *, samples: int | None = None) -> np.ndarray:
     """Predict the poses `[T, 3]` of a slide by the model from its initial state.
 
     The initial state is the measured one or, with `samples`, the one that `fit_start` finds from that many poses.
@@ -194,7 +192,7 @@ def as_slides(slides: Slide | Sequence[Slide]) -> tuple[Slide, ...]:
 # ---------------------------------------------------------------------- slides that friction cannot explain
 
 
-def speeds(slide: Slide, body: SlidingBody) -> tuple[np.ndarray, np.ndarray, float]:
+def speeds(slide: Slide, body: MassProperties) -> tuple[np.ndarray, np.ndarray, float]:
     """Compute middle times of windows, speeds `sqrt(v^2 + I omega^2/m)` in them, and the sigma of their noise."""
     scale = np.array([1.0, 1.0, np.sqrt(body.inertia / body.mass)])
     times, twists, left = window_twists(slide)
@@ -218,7 +216,7 @@ def window_twists(slide: Slide) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.array(times), np.array(twists), np.concatenate(left)
 
 
-def contradictions(slides: Sequence[Slide], body: SlidingBody) -> dict[int, str]:
+def contradictions(slides: Sequence[Slide], body: MassProperties) -> dict[int, str]:
     """Find the slides that friction alone cannot have made; returns their indices with the reason.
 
     If half of the slides or more are strange, none is named: then it is the fit that will be poor.

@@ -9,14 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from planarfriction.identify.fit import Fit
 from planarfriction.identify.parameters import ALL, PRIOR
-
-if TYPE_CHECKING:
-    from planarfriction.identify.search import Fit
 
 EXCESS = 1.25
 """Largest reduced chi-square that is still put down to the estimate of the noise."""

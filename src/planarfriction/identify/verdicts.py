@@ -13,12 +13,13 @@ import numpy as np
 
 from planarfriction.described import described
 from planarfriction.identify.decimation import samples_of
+from planarfriction.identify.fit import Fit
 from planarfriction.identify.held import Pull
+from planarfriction.identify.loads import TWO_LOADS
 from planarfriction.identify.logs import Log
 from planarfriction.identify.loss import SPOILED
 from planarfriction.identify.parameters import ALL, SOFT_FINGER, bristles_of
 from planarfriction.identify.rig import CHANNELS
-from planarfriction.identify.search import Fit
 from planarfriction.identify.uncertainty import HELD_OUT, STRAIN, Uncertainty
 
 TWO_SIDED = 1.96
@@ -197,6 +198,8 @@ class Evidence:
     """Part of the sliding speeds that comes from spin, `r |omega|` [m/s]."""
     loads: np.ndarray
     """Normal force of each log [N]."""
+    load_ratio: float = 1.0
+    """Largest load over the least, also within logs [-]."""
     measured: np.ndarray = field(default_factory=lambda: np.full(3, True))
     """Mask of the measured ones of fx, fy, tau, `[3]`."""
     spoiled: int = 0
@@ -209,11 +212,6 @@ class Evidence:
     """Largest friction over load that was fitted [-]."""
     held_mu_c: float = np.inf
     """The mu_c that was not estimated [-]."""
-
-    @property
-    def torque(self) -> bool:
-        """True if any log has measured torques."""
-        return bool(self.measured[2])
 
     def value(self, name: str, otherwise: float) -> float:
         """Return the estimate of a parameter, or `otherwise` if it was not estimated."""
@@ -289,7 +287,7 @@ def _on_data(evidence: Evidence, u: Uncertainty) -> list[Verdict]:
         text = f"{evidence.spoiled} values are off by more than {SPOILED:g} times the noise"
         end = "they were left out" if evidence.robust else 'the loss "soft_l1" would leave them out'
         found.append(Verdict("fit", True, f"{text}: {end}"))
-    if "sigma_0" in evidence.names and evidence.loads.max() < ONE_LOAD * evidence.loads.min():
+    if "sigma_0" in evidence.names and evidence.load_ratio < TWO_LOADS:
         stiffness = evidence.value("sigma_0", 0.0) * float(np.median(evidence.loads))
         text = f"one load only: sigma_0 f_N = {stiffness:.3g} N/m is known, not if the stiffness grows with the load"
         found.append(Verdict("fit", True, text))
@@ -325,7 +323,7 @@ def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
         return Verdict(name, True, f"cannot be distinguished from 0, at most {most}")
     if (partner := _partner(evidence, i)) is not None:
         other, correlation = partner
-        if not evidence.torque and not {name, other}.isdisjoint(OF_TORQUE):
+        if not evidence.measured[2] and not {name, other}.isdisjoint(OF_TORQUE):
             text = f"cannot be separated from {other} (correlation {correlation:.2f}) without the torque"
             return Verdict(name, False, f"{text}, and tau is 0 throughout")
         if error > WELL * size:
@@ -342,7 +340,7 @@ def _why(evidence: Evidence, i: int, seen: float) -> str:
         return "no spin"
     if name in SOFT_FINGER and name != "c" and evidence.loads.max() < ONE_LOAD * evidence.loads.min():
         return "one load only"
-    if name in OF_TORQUE and not evidence.torque:
+    if name in OF_TORQUE and not evidence.measured[2]:
         return "only the torque depends on it, and tau is 0 throughout"
     if seen < UNSEEN:
         return f"changes no sample by more than {seen:.2g} times the noise"

@@ -15,7 +15,7 @@ from planarfriction.identify import parameters as known
 from planarfriction.identify.checks import check_logs, size_of, with_findings
 from planarfriction.identify.decimation import decimated, samples_of
 from planarfriction.identify.held import pulls_of_held
-from planarfriction.identify.loads import mean_load, steady_loads
+from planarfriction.identify.loads import TWO_LOADS, load_ratio, mean_load
 from planarfriction.identify.logs import Log, as_logs, one_coordinate
 from planarfriction.identify.loss import SPOILED
 from planarfriction.identify.options import FitOptions
@@ -42,9 +42,8 @@ that was chosen takes windows of its logs."""
 LEAD = next(iter(SIMULATORS))
 """Name of the quickest model, which finds where the others begin."""
 
-TWO_LOADS, WORSE = 1.2, 2.0
-"""Ratio of the loads of logs above which they show if the stiffness grows with the load, and ratio of the costs of two
-kinds of bristles above which other models do without the worse one."""
+WORSE = 2.0
+"""Ratio of the costs of two kinds of bristles above which other models do without the worse one."""
 
 USUAL_BRISTLES = ElastoPlastic(0.9)
 """Bristles that "auto" compares with plain ones."""
@@ -106,7 +105,9 @@ def identify_lugre(
     models = _models_to_fit(validation.choice("model", model, ("auto", *SIMULATORS)), patch, names)
     validation.instance("options", options, FitOptions, "a FitOptions record")
     kinds, given = _start_laws(start, options.elasto_plastic, names)
-    findings = check_logs(logs, patch, names)
+    if models == (LEAD,) and kinds[0].reference_load is not None:
+        raise InvalidValueError("model", "be 'reduced' or 'distributed' for a law with a reference_load", model)
+    findings = check_logs(logs, patch)
     whole, logs = logs, decimated(logs, size_of(logs[0], patch), options.samples)
     noise = first_noise(logs) if options.noise is None else np.array(options.noise)
     if given is not None and not patch.depends_on_load and models != (LEAD,):
@@ -145,11 +146,11 @@ def identify_lugre(
 
 
 def _of_fixed_stiffness(laws: Sequence[LuGre], logs: Sequence[Log]) -> list[LuGre]:
-    """Return the laws with a stiffness that does not grow with the load, if logs at clearly different loads tell it."""
-    loads = [mean_load(log) for log in logs]
-    if not steady_loads(logs) or max(loads) < TWO_LOADS * min(loads):
+    """Return the laws with a stiffness that does not grow with the load, if loads differ enough to tell it."""
+    if load_ratio(logs) < TWO_LOADS:
         return []
-    return [dataclasses.replace(law, reference_load=float(np.median(loads))) for law in laws]
+    usual = float(np.median([mean_load(log) for log in logs]))
+    return [dataclasses.replace(law, reference_load=usual) for law in laws]
 
 
 def _models_to_fit(model: str, patch: ContactPatch, names: Sequence[str]) -> tuple[str, ...]:
@@ -254,6 +255,7 @@ def _evidence(best: Candidate, errors: np.ndarray, histories: Sequence[Mapping[s
         spins=np.concatenate([each[1] for each in sliding]),
         held_mu_c=float(problem.law.numbers.mu_c),
         loads=np.array([mean_load(log) for log in problem.logs]),
+        load_ratio=load_ratio(problem.logs),
         measured=np.any([log.channels for log in problem.logs], axis=0),
         spoiled=int((np.abs(problem.distances(fit.values, fit.sigma)) > SPOILED).sum()) + left_out,
         robust=problem.options.loss != "linear",

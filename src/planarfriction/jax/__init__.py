@@ -3,26 +3,20 @@
 Needs the extra `[jax]`. For float64 set `jax.config.update("jax_enable_x64", True)`, as always in JAX.
 """
 
-from __future__ import annotations
+from planarfriction.errors import needing
 
-from planarfriction.errors import MissingExtraError
-
-try:
-    import jax as _jax  # noqa: F401
-except ImportError as error:
-    raise MissingExtraError("jax", "jax") from error
-
-from planarfriction.derivatives import Rollout
-from planarfriction.jax.models import (
-    DistributedModel,
-    LawParameters,
-    PublishedParameters,
-    ReducedModel,
-    ReducedModelPublished,
-    Surface,
-)
-from planarfriction.jax.rollouts import rate, rest, rollout, simulate_scene, step, wrench
-from planarfriction.tensors.operations import SceneMotion
+with needing("jax", "jax"):
+    from planarfriction.derivatives import Rollout
+    from planarfriction.jax.models import (
+        DistributedModel,
+        LawParameters,
+        PublishedParameters,
+        ReducedModel,
+        ReducedModelPublished,
+        Surface,
+    )
+    from planarfriction.jax.rollouts import rate, rest, rollout, simulate_scene, step, wrench
+    from planarfriction.tensors.operations import SceneMotion
 
 __all__ = [
     "DistributedModel",

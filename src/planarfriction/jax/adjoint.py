@@ -27,7 +27,7 @@ from planarfriction.formulas import LARGEST
 from planarfriction.tensors.operations import Arrays, RolloutOperation, SceneOperation
 
 _PARAMETERS = 3
-"""Index of the parameters among the inputs of a rollout: state, twist, load, parameters."""
+"""Index of the parameters among the inputs of a rollout: state, twist, load, parameters, and any weights of cells."""
 
 
 class Numbers(NamedTuple):
@@ -72,7 +72,7 @@ class HostScene(NamedTuple):
 class HostRollout(NamedTuple):
     """Last state and wrenches of a rollout; fixed when a function is compiled, as all else are arrays.
 
-    Inputs are state, twist, load and parameters; `dt` and the model's other leaves are held.
+    Inputs are state, twist, load, parameters and any weights; `dt` and the model's other leaves are held.
     """
 
     structure: Any
@@ -85,10 +85,14 @@ class HostRollout(NamedTuple):
     """Name of the leaf with the numbers of the patch."""
     strict: bool
     """True if a derivative that the adjoint does not have is an error, and not left to operations of JAX."""
+    cells: bool
+    """True for a model of cells, whose last leaf are weights."""
+    weighs: bool = False
+    """True if the cotangent of the weights is wanted."""
     like, keeps = 1, True
     inner, outer = RolloutOperation.inner, RolloutOperation.outer
 
-    def shapes(self, state: Any, twist: Any, load: Any, parameters: Any) -> list[tuple[int, ...]]:
+    def shapes(self, state: Any, twist: Any, *inputs: Any) -> list[tuple[int, ...]]:
         """Return the shapes of last state, wrenches and the states before each step."""
         return [state.shape, twist.shape, (*twist.shape[:-1], *state.shape[state.ndim - self.axes :])]
 
@@ -96,8 +100,8 @@ class HostRollout(NamedTuple):
         """Raise FrictionError, if strict, for a derivative that the adjoint does not have."""
         if self.strict and name == "run":
             rule = (
-                "be held fixed with method='adjoint': differentiate with respect to the parameters, state, twist and "
-                "normal_force, or leave method out"
+                "be held fixed with method='adjoint': differentiate with respect to the parameters, weights, state, "
+                "twist and normal_force, or leave method out"
             )
             raise InvalidValueError("dt" if by_dt else self.leaf, rule, "a derivative of it")
         if self.strict:
@@ -107,8 +111,9 @@ class HostRollout(NamedTuple):
 
     def by_operations(self, dt: Any, *arrays: Any) -> Any:
         """Return last state and wrenches by operations of JAX."""
-        *held, state, twist, load, parameters = arrays
-        return self._model(tuple(parameters), held).rollout(state, twist, load, dt)
+        first = len(arrays) - len(self.inner)
+        state, twist, load, parameters, *weights = arrays[first:]
+        return self._model(tuple(parameters), (*arrays[:first], *weights)).rollout(state, twist, load, dt)
 
     def on_host(self, name: str, outer: int, held: Arrays, numbers: Numbers, kept: bool) -> Arrays:
         """Return the results of a method of `RolloutOperation`, one call for each contact if what is held differs."""
@@ -125,7 +130,7 @@ class HostRollout(NamedTuple):
 
     def _results(self, name: str, held: Arrays, numbers: Numbers, kept: bool) -> Arrays:
         """Return the results of a method, NaN for contacts that are not given numbers."""
-        operation = RolloutOperation(lambda *leaves: self._model([1.0] * self.parameters, leaves).compiled(), self.axes)
+        operation = RolloutOperation(self._packed, self.axes, self.cells, self.weighs)
         numbers = numbers if name == "pull" else numbers._replace(memory=())
         inner = self.inner, (1 + self.axes,) * len(numbers.memory), self.inner if name == "push" else self.outer
         good, usable = _usable(self.axes, numbers, inner)
@@ -133,10 +138,17 @@ class HostRollout(NamedTuple):
         found = _called(operation, name, [dt, *held[1:]], usable, kept)
         if name != "pull":
             return [_spoilt(good, value) for value in found]
-        *found, slopes = found
-        shared = tuple(i for i, length in enumerate(slopes.shape[:-1]) if length == 1)
-        slopes = _spoilt(np.asarray(good.all(axis=shared, keepdims=True)), slopes)
-        return [*(_spoilt(good, value) for value in found), slopes.reshape(numbers.inputs[_PARAMETERS].shape)]
+        results = [_spoilt(good, value) for value in found[:_PARAMETERS]]
+        for slopes, like in zip(found[_PARAMETERS:], numbers.inputs[_PARAMETERS:], strict=True):
+            shared = tuple(i for i, length in enumerate(slopes.shape[:-1]) if length == 1)
+            slopes = _spoilt(np.asarray(good.all(axis=shared, keepdims=True)), slopes)
+            results.append(slopes.reshape(like.shape))
+        return results
+
+    def _packed(self, *leaves: Any) -> Any:
+        """Return the model of its leaves but the parameters, weights of cells first, as compiled rollouts take it."""
+        first = int(self.cells)
+        return self._model([1.0] * self.parameters, (*leaves[first:], *leaves[:first])).compiled()
 
     def _model(self, parameters: Sequence[Any], held: Sequence[Any]) -> Any:
         return jax.tree.unflatten(self.structure, [*parameters, *held])
@@ -145,18 +157,18 @@ class HostRollout(NamedTuple):
 def _usable(axes: int, numbers: Numbers, inner: Sequence[Sequence[int]]) -> tuple[np.ndarray, Numbers]:
     """Return True for contacts that are given numbers, `[...]`, and all arrays, with harmless numbers for the others.
 
-    Parameters, and changes of them, get axes of length 1 for the batch axes that only contacts have.
+    Parameters, weights, and changes of them, get axes of length 1 for the batch axes that only contacts have.
     """
-    (state, *_, parameters), found, fit = numbers.inputs, [], []
+    state, parameters, found, fit = numbers.inputs[0], numbers.inputs[_PARAMETERS], [], []
     own = (1,) * (state.ndim - axes - (parameters.ndim - 1))
     for each, of_each in zip(numbers, inner, strict=True):
         found.append([])
         for i, (value, count) in enumerate(zip(each, of_each, strict=len(each) > 0)):
-            if i == _PARAMETERS:
+            if i >= _PARAMETERS:
                 value = value.reshape(*value.shape[:-1], *own, value.shape[-1])
             fit.append((np.abs(value) <= LARGEST).all(axis=tuple(range(-count, 0))))
             if not fit[-1].all():
-                harmless = 0.5 if i == _PARAMETERS and each is numbers.inputs else 0.0
+                harmless = 0.5 if i >= _PARAMETERS and each is numbers.inputs else 0.0
                 value = np.where(fit[-1].reshape(fit[-1].shape + (1,) * count), value, harmless)
             found[-1].append(value)
     return functools.reduce(np.logical_and, fit), Numbers(*found)
@@ -177,9 +189,10 @@ def rollout(model: Any, state, twist, normal_force, dt, *, strict: bool) -> list
     """Return the last state and the wrenches `[..., T, 3]`; state, twist and normal_force have the same batch axes."""
     leaves, structure = jax.tree.flatten(model)
     count = len(model.parameters)
-    operation = HostRollout(structure, count, len(model.state_shape), model.leaves[1], strict)
-    held = jnp.asarray(dt), *map(jnp.asarray, leaves[count:])
-    return call(operation, held, state, twist, normal_force, jnp.stack(leaves[:count]))
+    cells = "weights" in model.leaves
+    operation = HostRollout(structure, count, len(model.state_shape), model.leaves[1], strict, cells)
+    held, last = (jnp.asarray(dt), *map(jnp.asarray, leaves[count:])), -1 if cells else len(leaves)
+    return call(operation, held[:last], state, twist, normal_force, jnp.stack(leaves[:count]), *held[last:])
 
 
 def call(operation: Any, held: Sequence[jax.Array], *inputs: jax.Array) -> list[jax.Array]:
@@ -293,6 +306,8 @@ def _jvp_by_operations(primals, tangents, dots, *, operation, name: str, outer: 
 def _transpose(bars, *operands, operation, name: str, **options):
     count, other = _linear(operation, name), {"push": "pull", "pull": "push"}[name]
     known, linear = operands[:-count], operands[-count:]
+    if other == "pull" and isinstance(operation, HostRollout):
+        operation = operation._replace(weighs=operation.cells and ad.is_undefined_primal(linear[-1]))
     slopes = _host.bind(*known, *map(ad.instantiate_zeros, bars), operation=operation, name=other, **options)
     found = [
         _sum_to(slope, each.aval.shape) if ad.is_undefined_primal(each) else None

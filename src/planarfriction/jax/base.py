@@ -44,6 +44,9 @@ class FrictionPytree(TensorModel):
         for name in leaves:
             if name not in self.leaves:
                 raise InvalidValueError("leaf", f"be one of {', '.join(self.leaves)}", repr(name))
+        if isinstance(leaves.get("parameters"), tuple):  # of arrays: `vmap` takes models of axes too
+            own = zip(self.names, leaves["parameters"], strict=True)
+            self._in_range({name: value for name, value in own if isinstance(value, jax.Array)})
         return self._unflatten(self._flatten()[1], [leaves.get(name, getattr(self, name)) for name in self.leaves])
 
     def _flatten(self):
@@ -89,7 +92,9 @@ class FrictionPytree(TensorModel):
         """Return parameters as a record, the model's own if they are None."""
         if parameters is None:
             return self.parameters
-        return type(self.parameters)(*self._counted(parameters, len(parameters), (len(parameters),)))
+        record = type(self.parameters)(*self._counted(parameters, len(parameters), (len(parameters),)))
+        self._in_range({name: xp.real(name, value) for name, value in record._asdict().items()})
+        return record
 
 
 def record_of(kind: Any, values: dict[str, float]) -> Any:

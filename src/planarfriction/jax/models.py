@@ -47,7 +47,8 @@ class DistributedModel(FrictionPytree, CellsModel):
 
     def compiled(self) -> Packed:
         """Return the model as compiled rollouts take it."""
-        return pack_cells(self.elasto_plastic, self.positions, self.weights)  # pyright: ignore[reportArgumentType]
+        reference = self.reference_load or 0.0
+        return pack_cells(self.elasto_plastic, self.weights, self.positions, reference)  # pyright: ignore
 
 
 @by_parts

@@ -9,7 +9,6 @@ import jax
 import jax.numpy as jnp
 
 from planarfriction.derivatives import Rollout
-from planarfriction.errors import InvalidValueError
 from planarfriction.jax import adjoint
 from planarfriction.jax.adjoint import HostScene
 from planarfriction.jax.base import FrictionPytree
@@ -55,9 +54,9 @@ def rollout(
 
     `method` is `"eager"`, JAX operations step by step (any model and device, all kinds and orders of derivatives), or
     `"adjoint"`, the much faster compiled rollout with forward and reverse derivatives (on the CPU, float64 inside,
-    first derivatives with respect to the parameters, `state`, `twist` and `normal_force`). None uses the adjoint if
-    JAX's default device is the CPU, and JAX operations for whatever the adjoint cannot do: higher derivatives, and
-    those with respect to `dt` and the numbers of the patch.
+    first derivatives with respect to the parameters, weights of cells, `state`, `twist` and `normal_force`). None uses
+    the adjoint if JAX's default device is the CPU, and JAX operations for whatever the adjoint cannot do: higher
+    derivatives, and those with respect to `dt` and other numbers of the patch.
 
     Inside `jit`, a contact whose input is NaN or exceeds 1e50 gets NaN in its wrenches, its state and its gradients.
 
@@ -72,9 +71,7 @@ def rollout(
     shape = jnp.broadcast_shapes(twist.shape[:-1], load.shape, (*state.shape[: state.ndim - len(inner)], 1))
     state = jnp.broadcast_to(state, (*shape[:-1], *inner))
     twist, load = jnp.broadcast_to(twist, (*shape, 3)), jnp.broadcast_to(load.astype(twist.dtype), shape)
-    if method == "adjoint" and model.obstacle:
-        raise InvalidValueError("method", f"be 'eager' {model.obstacle}", repr(method))
-    if method == "adjoint" or (method is None and not model.obstacle and jax.default_backend() == "cpu"):
+    if method == "adjoint" or (method is None and jax.default_backend() == "cpu"):
         return Rollout(*adjoint.rollout(model, state, twist, load, dt, strict=method == "adjoint"))
     return Rollout(*model.rollout(state, twist, load, dt))
 

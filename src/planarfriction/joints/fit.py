@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.joints.log import JointLog, Plant, as_joint_logs
-from planarfriction.joints.problem import PARAMETERS, TERMS, Problem
+from planarfriction.joints.problem import NEEDS, PARAMETERS, TERMS, Problem
 from planarfriction.joints.result import SHORT, JointFit, Trial
 from planarfriction.joints.verdicts import judge
 
@@ -22,11 +21,15 @@ the whole log."""
 GROUPS = 4
 """Least number of groups that are left out in turn; fewer logs are cut into parts."""
 
-DIFFERENCE = 1e-3
-"""Step of differences, over the size of a parameter: a joint that sticks or not is smooth above it."""
+LEAST = 0.15
+"""Least fall of the logarithm of left-out errors that a term must make: on synthetic joints whose friction and voltage
+differ between logs, terms that are not there take up some of that and gain less than this in 95 % of them."""
 
-GAIN = 0.01
-"""Least improvement of left-out errors that a term must make, over the errors."""
+FINE = 1e-5
+"""Share of the squared errors that a step of the search must gain: far below what one log more or less changes."""
+
+MOST = 40
+"""Most steps of a search."""
 
 BEST = 2
 """Number of starts of a term that are followed to the end."""
@@ -52,32 +55,54 @@ class Coordinates:
         with np.errstate(over="ignore"):
             return dict(zip(self.names, np.where(self._log, np.exp(x), x * self._scale).tolist(), strict=True))
 
+    def slopes(self, x: np.ndarray) -> np.ndarray:
+        """Compute the slopes of the parameters by their scaled values, `[P]`."""
+        return np.where(self._log, np.exp(np.where(self._log, x, 0.0)), self._scale)
+
 
 def minimise(problem: Problem, start: Mapping[str, float], spans: Sequence[float] = SPANS, without: int = -1) -> dict:
-    """Return the values of least squared errors, then of least softened ones, which large errors sway less."""
-    from scipy.optimize import least_squares
+    """Return the values of least squared errors, then of least softened ones, which large errors sway less.
 
+    Runs begin again after each of the `spans` in turn; softened errors are those of whole runs.
+    """
     values = dict(start)
-    for stage, span in enumerate([*spans, spans[-1]]):
-        at = Coordinates(problem.names, values)
+    for span in spans:
+        values = _descended(problem, values, span, without, np.inf)
+    width = float(np.median(np.abs(np.concatenate(problem.errors(values, np.inf, without)))))
+    return _descended(problem, values, np.inf, without, max(width, 1e-12))
 
-        def errors(x: np.ndarray, at: Coordinates = at, span: float = span) -> np.ndarray:
-            return np.concatenate(problem.errors(at.values(x), span, without))
 
-        def slopes(x: np.ndarray, errors: Callable = errors, at: Coordinates = at) -> np.ndarray:
-            columns, here = [], errors(x)
-            for i in range(len(x)):
-                step = DIFFERENCE if x[i] + DIFFERENCE <= at.bounds[1][i] else -DIFFERENCE
-                columns.append((errors(x + step * (np.arange(len(x)) == i)) - here) / step)
-            return np.column_stack(columns)
+def _descended(problem: Problem, values: Mapping[str, float], span: float, without: int, width: float) -> dict:
+    """Minimise `sum 2 w^2 (sqrt(1 + (e/w)^2) - 1)`, squares for an infinite width w, by damped steps within bounds."""
+    at = Coordinates(problem.names, values)
+    x, damping = at.start, 1e-3
 
-        soft: dict[str, Any] = {}
-        if stage == len(spans):
-            soft = {"loss": "soft_l1", "f_scale": max(float(np.median(np.abs(errors(at.start)))), 1e-12)}
-        inside = np.clip(at.start, at.bounds[0] + 1e-6, at.bounds[1] - 1e-6)
-        found = least_squares(errors, inside, slopes, at.bounds, xtol=1e-6, ftol=1e-6, gtol=1e-9, max_nfev=40, **soft)
-        values = at.values(found.x)
-    return values
+    def errors(x: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        found = np.concatenate(problem.errors(at.values(x), span, without))
+        if not np.isfinite(width):
+            return found, np.ones(1), float(found @ found)
+        root = np.sqrt(1.0 + (found / width) ** 2)
+        return found, 1.0 / root, float(2.0 * width**2 * np.sum(root - 1.0))
+
+    here, weights, cost = errors(x)
+    for _ in range(MOST):
+        slopes = problem.slopes(at.values(x), span, without) * at.slopes(x)
+        down, matrix = -slopes.T @ (weights * here), slopes.T @ (slopes * np.broadcast_to(weights, here.shape)[:, None])
+        free = ((x > at.bounds[0]) | (down > 0.0)) & ((x < at.bounds[1]) | (down < 0.0))
+        down, matrix = down[free], matrix[np.ix_(free, free)]
+        scale, before = np.diag(matrix) + 1e-12 * np.trace(matrix) + 1e-300, cost
+        while cost == before and damping < 1e9:
+            tried = x.copy()
+            tried[free] += np.linalg.solve(matrix + damping * np.diag(scale), down)
+            tried = np.clip(tried, *at.bounds)
+            found = errors(tried)
+            if found[2] < cost:
+                x, (here, weights, cost) = tried, found
+            damping *= 0.1 if cost < before else 8.0
+        if not before - cost > FINE * before:
+            break
+        damping = max(damping, 1e-9)
+    return at.values(x)
 
 
 def cost(problem: Problem, values: Mapping[str, float], span: float = np.inf) -> float:
@@ -94,11 +119,13 @@ def fit_term(problem: Problem, term: str, values: Mapping[str, float]) -> dict[s
     return min((minimise(problem, each, spans) for each in ranked), key=lambda each: cost(problem, each))
 
 
-def attempt(problem: Problem, values: dict[str, float]) -> Trial:
+def attempt(problem: Problem, values: dict[str, float], progress: Callable[[str], None] = lambda words: None) -> Trial:
     """Fit a problem with each group left out, and measure the error of that group."""
     folds, errors, short = [], [], []
-    for i in range(len(problem.groups)):
-        fold = minimise(problem, values, SPANS[-1:], without=i)
+    words = " and ".join(problem.terms) or "Coulomb and viscous friction"
+    for i, name in enumerate(problem.groups):
+        progress(f"{words}; left out: {name}")
+        fold = minimise(problem, values, (), without=i)
         folds.append(fold)
         errors.append(float(np.abs(problem.errors(fold)[i]).mean()))
         short.append(float(np.abs(problem.errors(fold, SHORT)[i]).mean()))
@@ -106,9 +133,9 @@ def attempt(problem: Problem, values: dict[str, float]) -> Trial:
 
 
 def improves(more: Trial, less: Trial) -> bool:
-    """Return True if errors of left-out groups fall by more than their scatter, and by `GAIN` at least."""
+    """Return True if errors of left-out groups fall by more than their scatter, and by `LEAST`."""
     gain, scatter = more.gain(less)
-    return gain > max(scatter, GAIN)
+    return gain > max(scatter, LEAST)
 
 
 def identify_joint(
@@ -123,56 +150,54 @@ def identify_joint(
 
     Logs with a torque are fitted to the torque that the measured motion takes; others to the position that a run from
     goal or voltage gives. `torque_gain` is a known kt/R [N m/V]. `terms` are some of "load", "stribeck", "bristles" and
-    "directional", beside Coulomb and viscous friction; "auto" keeps a term only if logs that were left out improve by
-    more than their scatter. Fewer than four logs are cut into parts that are left out in turn.
+    "directional", beside Coulomb and viscous friction; "auto" keeps a term only if the errors of logs that were left
+    out fall by more than their scatter (t-test of their logarithms, 95 %, one-sided) and by 14 % at least (`LEAST`).
+    Fewer than four logs are cut into parts that are left out in turn. `progress` is told each step; what it raises, and
+    Ctrl-C, end the fit.
 
     Raises InvalidValueError for unknown terms, logs of both kinds, and a plant and drive that leave the scale of the
     torques open.
     """
+    if progress is not None and not callable(progress):
+        raise InvalidValueError("progress", "be a function of words, or None", progress)
     logs, progress = as_joint_logs(logs), progress or (lambda words: None)
     plant = validation.instance("plant", plant, Plant, "a Plant")
     gain = None if torque_gain is None else validation.positive("torque_gain", torque_gain)
-    chosen = tuple(TERMS) if terms == "auto" else tuple(validation.choices("terms", terms, TERMS))
-    if "directional" in chosen and "load" not in chosen:
-        raise InvalidValueError("terms", "have load with directional", chosen)
+    auto = isinstance(terms, str) and terms == "auto"
+    chosen = () if auto else tuple(validation.choices("terms", terms, TERMS))
+    for term, other in NEEDS.items():
+        if term in chosen and other not in chosen:
+            raise InvalidValueError("terms", f"have {other} with {term}", chosen)
     if logs[0].torque is None and gain is None and not plant.mass and not plant.inertia:
         raise InvalidValueError("plant", "have a mass or an inertia, or torque_gain be given", plant)
     parts = -(-GROUPS // len(logs)) if len(logs) < GROUPS else 1
     if logs[0].torque is None and parts > 1:
         logs, parts = tuple(each for log in logs for each in log.cut(parts)), 1
     base = Problem(logs, plant, gain, (), parts)
-    progress("Coulomb and viscous friction")
     spans = SPANS if not base.by_torque else SPANS[-1:]
-    kept = first = attempt(base, minimise(base, base.start(), spans))
-    trials, tried = {"": first}, functools.partial(_with, progress=progress)
-    again = ("stribeck",) if terms == "auto" else ()  # bristles may hide a fall of friction
-    for term in (*chosen, *again):
-        if term in kept.problem.terms or (term == "directional" and "load" not in kept.problem.terms):
+    kept = first = attempt(base, minimise(base, base.start(), spans), progress)
+    pairs: dict[str, tuple[Trial, Trial]] = {}
+    if not auto:
+        problem, values = base, dict(first.values)
+        for term in chosen:
+            problem, values = _with(problem, values, term)
+        kept = attempt(problem, values, progress) if chosen else first
+        return JointFit(kept, first, pairs, judge(kept, pairs))
+    for term in (*TERMS, "stribeck"):  # again, since bristles may hide a fall of friction
+        has = kept.problem.terms
+        if term in has or NEEDS.get(term, term) not in (*has, term) or (term in pairs and "bristles" not in has):
             continue
-        if term in trials and "bristles" not in kept.problem.terms:
-            continue
-        if terms != "auto":
-            kept = Trial(*_more(kept, term), (), np.empty(0), np.empty(0))
-            continue
-        more = tried(kept, term)
-        trials.pop(term, None)  # a second look stands behind what it is compared with
-        trials[term] = more
+        more = attempt(*_with(kept.problem, kept.values, term), progress)
+        pairs[term] = more, kept
         kept = more if improves(more, kept) else kept
-    if terms != "auto":
-        progress("left-out logs")
-        kept = attempt(kept.problem, kept.values)
-    elif "load" in kept.problem.terms[:-1] and "directional" not in kept.problem.terms:
-        rest = base.with_terms([each for each in kept.problem.terms if each != "load"])
-        less = attempt(rest, minimise(rest, {each: kept.values[each] for each in rest.names}, spans))
+    for term in kept.problem.terms[:-1]:  # what came later may explain what came before
+        rest = base.with_terms([each for each in kept.problem.terms if each != term and NEEDS.get(each) != term])
+        less = attempt(rest, minimise(rest, {name: kept.values[name] for name in rest.names}, spans), progress)
+        pairs[term] = kept, less
         kept = kept if improves(kept, less) else less
-    return JointFit(kept, first, trials, judge(kept, trials))
+    return JointFit(kept, first, pairs, judge(kept, pairs))
 
 
-def _more(trial: Trial, term: str) -> tuple[Problem, dict[str, float]]:
-    problem = trial.problem.with_terms([*trial.problem.terms, term])
-    return problem, fit_term(problem, term, trial.values)
-
-
-def _with(trial: Trial, term: str, progress: Callable[[str], None]) -> Trial:
-    progress(f"with {term}")
-    return attempt(*_more(trial, term))
+def _with(problem: Problem, values: Mapping[str, float], term: str) -> tuple[Problem, dict[str, float]]:
+    problem = problem.with_terms([*problem.terms, term])
+    return problem, fit_term(problem, term, values)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from planarfriction import validation
-from planarfriction.described import described
 from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
@@ -16,7 +15,6 @@ RIGID = 1e-3
 """Angle [rad] that a rigid joint bends before it slips, where a step needs bristles: the resolution of encoders."""
 
 
-@described
 @dataclass(frozen=True)
 class JointFriction(Checked):
     """Friction torque of a joint: `g(v) + |b_m tau_m - b_e tau_e|` in steady sliding, and `sigma_2 v`.
@@ -52,12 +50,19 @@ class JointFriction(Checked):
 
     @property
     def law(self) -> LuGre:
-        """The law as LuGre under the load 1, in N m and rad; a rigid joint bends by `RIGID`."""
+        """The law as LuGre under the load 1, in N m and rad; a rigid joint bends by `RIGID`.
+
+        Raises InvalidValueError for a rigid joint above 1e47 N m, whose stiffness no law takes.
+        """
         return LuGre(self.mu_c, self.mu_s, self.v_s, self.sigma_0 or self.mu_s / RIGID, self.sigma_1, self.sigma_2)
 
     def load(self, tau_motor: float, tau_external: float) -> float:
-        """Compute the growth of the level [N m] at torques of the motor and of all else [N m]."""
-        return abs(self.load_motor * tau_motor - self.load_external * tau_external)
+        """Compute the growth of the level [N m] at torques of the motor and of all else [N m].
+
+        Raises InvalidValueError for torques that are not finite.
+        """
+        motor, outside = validation.number("tau_motor", tau_motor), validation.number("tau_external", tau_external)
+        return abs(self.load_motor * motor - self.load_external * outside)
 
     @property
     def numbers(self) -> JointNumbers:

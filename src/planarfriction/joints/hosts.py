@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from typing import Any
+from xml.sax.saxutils import escape
 
 import numpy as np
 
+from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.joints.friction import JointFriction
 
@@ -31,7 +33,13 @@ def to_mjcf(
 
     `torque_gain` is kt/R [N m/V], `back_emf` kt^2/R [N m s/rad]. Friction with bristles is the motor's `lugre`, rigid
     friction the joint's `frictionloss`. A motor whose wires are open has no back-EMF: set its gain and bias to 0 then.
+
+    Raises InvalidValueError for a name that is no text, and numbers below zero.
     """
+    friction = validation.instance("friction", friction, JointFriction, "a JointFriction")
+    joint = escape(validation.text("joint", joint), {'"': "&quot;"})
+    armature, back_emf = validation.non_negative("armature", armature), validation.non_negative("back_emf", back_emf)
+    torque_gain = None if torque_gain is None else validation.positive("torque_gain", torque_gain)
     loss = 0.0 if friction.sigma_0 else friction.mu_c
     values = {"damping": friction.sigma_2, "frictionloss": loss, "armature": armature}
     words = " ".join(f'{name}="{value:.6g}"' for name, value in values.items())

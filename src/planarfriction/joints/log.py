@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.described import described
 from planarfriction.equality import ByValue, Checked, checked
 from planarfriction.errors import FileError, InvalidValueError
-from planarfriction.identify.logs import LEAST_SAMPLES, differentiated, increasing
+from planarfriction.identify.logs import LEAST_SAMPLES, increasing, slopes
 from planarfriction.reading import Table
 
 GRAVITY = 9.81
@@ -32,7 +31,6 @@ COLUMNS = ("torque", "dq", "enabled", "goal", "duty", "voltage", "supply", "exte
 """Columns beside t and q."""
 
 
-@described
 @dataclass(frozen=True)
 class Drive(Checked):
     """Position servo: `V = duty (supply - sag |duty|)`, `duty = kp gain (goal - q)` within -1 and 1.
@@ -54,16 +52,22 @@ class Drive(Checked):
         if self.sag >= self.supply:
             raise InvalidValueError("sag", "be below supply", self.sag)
 
-    def voltage(self, duty: np.ndarray) -> np.ndarray:
-        """Compute the voltage [V] at a duty."""
+    def voltage(self, duty: ArrayLike) -> np.ndarray:
+        """Compute the voltage [V] at a duty within -1 and 1.
+
+        Raises InvalidValueError for numbers that are not finite.
+        """
+        duty = validation.finite_numbers("duty", duty)
         return duty * (self.supply - self.sag * np.abs(duty))
 
-    def duty(self, error: np.ndarray) -> np.ndarray:
-        """Compute the duty at an error `goal - q` [rad]."""
-        return np.clip(self.kp * self.gain * error, -1.0, 1.0)
+    def duty(self, error: ArrayLike) -> np.ndarray:
+        """Compute the duty at an error `goal - q` [rad].
+
+        Raises InvalidValueError for numbers that are not finite.
+        """
+        return np.clip(self.kp * self.gain * validation.finite_numbers("error", error), -1.0, 1.0)
 
 
-@described
 @dataclass(frozen=True)
 class Plant(Checked):
     """Inertia on a joint, or a pendulum; numbers that are None are estimated.
@@ -152,12 +156,12 @@ class JointLog(ByValue):
     @cached_property
     def speed(self) -> np.ndarray:
         """Slope of a parabola through seven samples of q [rad/s], `[T]`."""
-        return derivative(self.time, self.q)
+        return slopes(self.time, self.q[:, None])[:, 0]
 
     @cached_property
     def acceleration(self) -> np.ndarray:
         """Slope of the speed [rad/s^2], `[T]`."""
-        return derivative(self.time, self.speed)
+        return slopes(self.time, self.speed[:, None])[:, 0]
 
     @cached_property
     def on(self) -> np.ndarray:
@@ -191,6 +195,7 @@ class JointLog(ByValue):
 
         Raises InvalidValueError for parts of fewer than ten samples.
         """
+        parts = validation.count("parts", parts, at_most=len(self.time) // LEAST_SAMPLES)
         values = {each: getattr(self, each, None) for each in ("time", "q", *COLUMNS)}
         fields = {each: value for each, value in values.items() if value is not None}
         bounds = np.linspace(0, len(self.time), parts + 1).astype(int)
@@ -229,11 +234,6 @@ class JointLog(ByValue):
             return cls(read.pop("t"), read.pop("q"), **read, drive=drive, name=path.stem)
         except InvalidValueError as error:
             raise FileError(f"{path}: {error}") from None
-
-
-def derivative(time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Compute the slope of a parabola through seven samples, `[T]`."""
-    return differentiated(time, np.column_stack([values, *np.zeros((2, len(values)))]))[:, 0]
 
 
 def as_joint_logs(logs: JointLog | Sequence[JointLog]) -> tuple[JointLog, ...]:

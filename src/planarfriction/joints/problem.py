@@ -10,7 +10,8 @@ import numpy as np
 
 from planarfriction.joints.friction import JointFriction
 from planarfriction.joints.log import GRAVITY, JointLog, Plant
-from planarfriction.joints.loops.runs import PlantNumbers, run_measured, run_plant
+from planarfriction.joints.loops.plant import VARIED, PlantNumbers, run_plant
+from planarfriction.joints.loops.runs import run_measured
 
 
 class Parameter(NamedTuple):
@@ -49,8 +50,14 @@ TERMS: dict[str, tuple[str, ...]] = {
 }
 """Terms beside Coulomb and viscous friction, in the order in which they are tried, with their parameters."""
 
-STEP = 1e-3
-"""Longest step of a simulated run [s]: half of it moves no error of the position by more than 1e-4 rad."""
+NEEDS = {"directional": "load"}
+"""Terms that stand beside another alone."""
+
+STEP = 2e-3
+"""Longest step of a simulated run [s]: a tenth of it moves positions by 4e-5 rad on average, with bristles by 5e-4."""
+
+DIFFERENCE = 1e-3
+"""Step of differences of torques, over the size of a parameter."""
 
 MOVING = 0.05
 """Share of the largest speed above which the torque balance counts a joint as moving."""
@@ -127,12 +134,26 @@ class Problem:
 
     def simulated(self, values: Mapping[str, float], log: JointLog, span: float = np.inf) -> np.ndarray:
         """Simulate q and dq `[T, 2]` from goal or voltage; the run begins at the measured motion every `span` [s]."""
-        motion = np.empty((len(log.time), 2))
+        return self._run(values, log, span, np.empty((len(VARIED), 0)))[0]
+
+    def _run(
+        self, values: Mapping[str, float], log: JointLog, span: float, seeds: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return q and dq `[T, 2]`, and the slopes of q by P parameters `[T, P]`, of whose numbers `seeds` are."""
+        motion, slopes = np.empty((len(log.time), 2)), np.empty((len(log.time), seeds.shape[1]))
         again = int(min(max(2.0, span * len(log.time) / (log.time[-1] - log.time[0])), 1e9))
         joint, plant = self.friction(values).rigid_numbers, self.plant_numbers(values, log)
-        given = log.goal if log.voltage is None else log.voltage
-        run_plant(joint, plant, log.time, given, log.on, log.outside, log.motion, again, STEP, motion)
-        return motion
+        given, lanes = log.goal if log.voltage is None else log.voltage, np.empty((9, seeds.shape[1]))
+        run_plant(
+            joint, plant, log.time, given, log.on, log.outside, log.motion, again, STEP, seeds, lanes, motion, slopes
+        )
+        return motion, slopes
+
+    def _numbers(self, values: Mapping[str, float]) -> np.ndarray:
+        """Return `VARIED` at parameters by name: linear in each of them."""
+        joint, plant = self.friction(values).rigid_numbers, self.plant_numbers(values, self.logs[0])
+        named = {**joint.law._asdict(), **joint._asdict(), **plant._asdict()}
+        return np.array([named[each] for each in VARIED])
 
     def torque(self, values: Mapping[str, float], log: JointLog) -> np.ndarray:
         """Compute the torque [N m] that the measured motion of a log takes, `[T]`."""
@@ -151,6 +172,20 @@ class Problem:
             np.empty(0) if i == without else self.simulated(values, log, span)[:, 0] - log.q
             for i, log in enumerate(self.logs)
         ]
+
+    def slopes(self, values: Mapping[str, float], span: float = np.inf, without: int = -1) -> np.ndarray:
+        """Compute the slopes of all errors by the parameters, `[T, P]`: of runs exactly, of torques by differences."""
+        if self.by_torque:
+            here, columns = np.concatenate(self.errors(values, span, without)), []
+            for name in self.names:
+                step = DIFFERENCE * max(abs(values[name]), PARAMETERS[name].scale)
+                more = self.errors({**values, name: values[name] + step}, span, without)
+                columns.append((np.concatenate(more) - here) / step)
+            return np.column_stack(columns)
+        here = self._numbers(values)
+        seeds = np.column_stack([self._numbers({**values, name: values[name] + 1.0}) - here for name in self.names])
+        logs = (log for i, log in enumerate(self.logs) if i != without)
+        return np.concatenate([self._run(values, log, span, seeds)[1] for log in logs])
 
     @property
     def groups(self) -> list[str]:

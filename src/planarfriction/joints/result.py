@@ -72,8 +72,8 @@ class JointFit:
     """Fit of the terms that were kept."""
     baseline: Trial
     """Fit of Coulomb and viscous friction alone."""
-    trials: Mapping[str, Trial]
-    """Trials by the term that was added last; "" for the baseline."""
+    trials: Mapping[str, tuple[Trial, Trial]]
+    """Trials with and without a term, by the term."""
     verdicts: tuple[Verdict, ...]
     """Findings in words, each with its number."""
 

@@ -36,25 +36,20 @@ NOT = {
 """Meaning of a term that was not kept."""
 
 
-def judge(kept: Trial, trials: Mapping[str, Trial]) -> tuple[Verdict, ...]:
+def judge(kept: Trial, trials: Mapping[str, tuple[Trial, Trial]]) -> tuple[Verdict, ...]:
     """Return all verdicts on a fit."""
     return (*_on_terms(kept, trials), *_on_drive(kept), *_on_logs(kept))
 
 
-def _on_terms(kept: Trial, trials: Mapping[str, Trial]) -> Iterator[Verdict]:
-    best = trials[""]
-    for term, trial in trials.items():
-        if not term:
-            continue
-        gain, scatter = trial.gain(best)
+def _on_terms(kept: Trial, trials: Mapping[str, tuple[Trial, Trial]]) -> Iterator[Verdict]:
+    for term, (trial, without) in trials.items():
+        gain, scatter = trial.gain(without)
         ratio, low, high = np.exp([-gain, -gain - scatter, -gain + scatter])
         numbers = f"errors of left-out logs are {ratio:.2f} ({low:.2f} to {high:.2f}) of those without it"
         good = term in kept.problem.terms
         if term == "load":
             numbers += f", b = {trial.values['load']:.2g}"
         yield Verdict(term, good, f"{WORDS[term] if good else NOT[term]} ({numbers})")
-        if good:
-            best = trial
     yield from _on_bounds(kept)
 
 

@@ -16,7 +16,8 @@ import numpy as np
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import address_of, call
-from planarfriction.compiler.memory import Doubles, Integers, Packed, Place, at, exists, layout, reader
+from planarfriction.compiler.memory import Doubles, Integers, Packed, Place, arrays_at, at, exists, layout, reader
+from planarfriction.kernels import cells
 from planarfriction.kernels.contacts import (
     BACK_SUBSTITUTE,
     CALLS,
@@ -24,12 +25,14 @@ from planarfriction.kernels.contacts import (
     EVALUATE,
     FACTOR,
     LINEARISE,
+    SEEN,
+    SEEN_SIZE,
     WORLD,
     Contacts,
+    Seen,
     contact_map,
     contact_map_slopes,
 )
-from planarfriction.kernels.law import law_of
 from planarfriction.kernels.settle import bring_back, factor_at
 from planarfriction.kernels.small_matrices import applied, inverse
 from planarfriction.kernels.springs import add_spring_slopes, spring_wrench
@@ -87,11 +90,13 @@ class Work(NamedTuple):
     wrench: Doubles
     """Wrench of each contact per unit load, [C, 3]."""
     twist: Doubles
-    """Twist of one contact and the factor on its stiffness, [4]."""
+    """Twist of one contact and what is behind it (see `contacts.Seen`), [10]."""
     factor: Doubles
     """Factor on the stiffness of each contact (see `settle.factor_at`), as `rates` left it, [C]."""
+    covered: Doubles
+    """Share of the load of each contact that lies on the body (see `contacts.Seen`), as `rates` left it, [C]."""
     stiffness: Doubles
-    """d wrench / d twist of one contact, [3, 3]."""
+    """d wrench / d twist of one contact, and by the place behind it (see `contacts.ModelFunctions`), [2, 3, 3]."""
     matrix: Doubles
     """Matrix of the body, [3, 3]."""
     inverse: Doubles
@@ -144,8 +149,8 @@ class System(Packed):
     ) -> None:
         n, square = len(contacts.count), (3, 3)
         work = layout(
-            Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=4, factor=n,
-            stiffness=square, matrix=square, inverse=square, to_pose=square, body=3, rows=(4, 3), frame=(n, 8),
+            Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=SEEN_SIZE, factor=n,
+            covered=n, stiffness=18, matrix=square, inverse=square, to_pose=square, body=3, rows=(4, 3), frame=(n, 8),
         )  # fmt: skip
         self._block, addresses = np.zeros(work.size), [address_of(each) for each in BODY_FUNCTIONS]
         sizes = n, int(contacts.state[n]), pressures, len(motion.breaks) - 1, len(motion.spring)
@@ -188,9 +193,8 @@ def settle_all(system: SystemRecord, piece: int, y: Doubles) -> None:
     """
     for c in range(system.size):
         if hardly_loaded(system, piece, c):
-            first, size = system.contacts.state[c], system.contacts.bristle[c]
-            count, factor = (system.contacts.state[c + 1] - first) // size, 1.0 / NO_LOAD
-            bring_back(law_of(record_of(system, piece, c)), size, at(y, first), factor, count)
+            contact, size = cells.read(record_of(system, piece, c)), system.contacts.bristle[c]
+            bring_back(contact, size, at(y, system.contacts.state[c]), 1.0 / NO_LOAD)
 
 
 @kernel
@@ -246,6 +250,22 @@ def seen_by(system: SystemRecord, c: int, y: Doubles) -> Doubles:
     return at(system.work.frame, 8 * c + 4) if exists(system.motion.mover) else at(y, system.bristles)
 
 
+@kernel
+def _placed(a: Doubles, x: float, y: float, angle: float) -> Vector:
+    """Return a way of the body, or a change of its pose, in the axes of a contact fixed to the world."""
+    return a[0] * x + a[1] * y, a[3] * x + a[4] * y, angle
+
+
+@kernel
+def _seen_from(work: Work, c: int, place: Doubles, pose: Doubles, a: Doubles, u: Doubles) -> Seen:
+    """Write what contact c sees of a body: twist, factor, place and axes, with all of the contact covered."""
+    seen = arrays_at(SEEN, work.twist)
+    put(seen.twist, applied(a, u))
+    put(seen.place, _placed(a, pose[0] - place[0], pose[1] - place[1], pose[2]))
+    seen.factor[0], seen.axes[0], seen.axes[1], seen.covered[0] = work.factor[c], place[2], place[3], 1.0
+    return seen
+
+
 @entry
 def rates(address: Place, piece: int, since: float, y: Doubles, dy: Doubles) -> None:
     """Write the right-hand side `dy` at `since` seconds into a piece, and wrenches per unit load into the workspace."""
@@ -258,13 +278,13 @@ def rates(address: Place, piece: int, since: float, y: Doubles, dy: Doubles) -> 
         first, w = system.contacts.state[c], at(work.wrench, 3 * c)
         place, seen = place_at(system, piece, since, c, body)
         contact_map(system.contacts.mount[c], place, at(body, 3), a)
-        put(work.twist, applied(a, seen))
         reference = system.contacts.reference[c]
         work.factor[c] = factor_at(reference, xp.maximum(load_of(system, piece, since, c), NO_LOAD * reference))
-        work.twist[3] = work.factor[c]
+        inputs = _seen_from(work, c, place, at(body, 3), a, seen)
         call(
             function_of(system, c, EVALUATE), (record_of(system, piece, c), at(y, first), work.twist, at(dy, first), w)
         )
+        work.covered[c] = inputs.covered[0]
         total = plus(total, total_load(system, piece, since, c), applied_back(a, w))
     for i in range(3):
         out[i] = system.motion.acceleration[3 * piece + i] + system.motion.inverse_mass[i] * total[i]
@@ -297,8 +317,7 @@ def linearise(address: Place, piece: int, y: Doubles) -> None:
             for i in range(3):
                 g[3 * i] -= omega * a[3 * i + 1]
                 g[3 * i + 1] += omega * a[3 * i]
-        put(work.twist, applied(a, seen))
-        work.twist[3] = work.factor[c]
+        _seen_from(work, c, place, at(y, system.bristles + 3), a, seen)
         z = at(y, system.contacts.state[c])
         call(
             function_of(system, c, LINEARISE), (record_of(system, piece, c), z, work.twist, linearisation_of(system, c))
@@ -318,11 +337,14 @@ def factor(address: Place, piece: int, since: float, y: Doubles, shift: float) -
         m[i], to_pose[i] = 0.0, 0.0
     for c in range(system.size):
         z, (a, g, h) = at(y, system.contacts.state[c]), maps_of(system, c)
+        for i in range(9, 18):
+            s[i] = 0.0
         call(function_of(system, c, FACTOR), (record_of(system, piece, c), z, shift, linearisation_of(system, c), s))
         load = total_load(system, piece, since, c)
         for j in range(3):
             by_u = applied_back(a, applied(s, (a[j], a[3 + j], a[6 + j])))
-            bpy = applied_back(a, applied(s, (g[j], g[3 + j], g[6 + j])))
+            place = applied(at(s, 9), (a[j], a[3 + j], 0.0) if j < 2 else (0.0, 0.0, 1.0))
+            bpy = applied_back(a, plus(applied(s, (g[j], g[3 + j], g[6 + j])), 1.0, place))
             for i in range(3):
                 weight, per_pose = system.motion.inverse_mass[i] * load, (h[3 * i + j] + bpy[i]) / shift
                 to_pose[3 * i + j] += weight * per_pose
@@ -361,6 +383,7 @@ def solve(address: Place, piece: int, since: float, y: Doubles, shift: float, r:
     for c in range(system.size):
         first, (a, g, _) = system.contacts.state[c], maps_of(system, c)
         put(v, plus(applied(a, u), 1.0, applied(g, pose)))
+        put(at(v, 3), _placed(a, pose[0], pose[1], pose[2]))
         states = record_of(system, piece, c), at(y, first), at(r, first), v, linearisation_of(system, c), at(out, first)
         call(function_of(system, c, BACK_SUBSTITUTE), states)
 

@@ -23,12 +23,12 @@ VECTOR = 8
 LANES = 64
 """Most cells of a block: several of the longest vectors of processors, so that constants are read once for all."""
 
-Z, WEIGHT, BY_LOAD, BAR, OUT = (LANES * n for n in (6, 9, 10, 11, 14))
-"""Fields of a block behind the numbers of the levers: state, weights, their slopes by the load, cotangent or change of
-the state, and the wrench with its change, which add up over the cells; three fields for a state, of which points use
-two. Blocks share nothing, so that each is seen to be free of dependences."""
+Z, WEIGHT, BY_LOAD, BAR, OUT = (LANES * n for n in (8, 11, 12, 13, 16))
+"""Fields of a block behind the numbers of the levers and an asymmetry: state, weights, their slopes by the load,
+cotangent or change of the state, and the wrench with its change, which add up over the cells; three fields for a state,
+of which points use two. Blocks share nothing, so that each is seen to be free of dependences."""
 
-BLOCK = LANES * 21
+BLOCK = LANES * 23
 """Numbers of a block: an odd number of fields, for if it were a power of two, blocks would drive each other out of the
 cache."""
 
@@ -56,6 +56,18 @@ class StepBars(NamedTuple):
     """In the order of `cells_rollout.PARAMETERS`."""
 
 
+class Limit(NamedTuple):
+    """Compiled functions of the limit of a bristle with a fixed stiffness (see `settle`)."""
+
+    within: Any
+    """`(law, z)`: return the bristle brought back onto its limit, if it is beyond."""
+    forth: Any
+    back: Any
+    """Forth and back of `within` (see `derive`), by z, `sigma_0` and `mu_s`."""
+    pushed: Any
+    """`(law, z, changes)`: bring back a bristle and its changes."""
+
+
 class Kind(NamedTuple):
     """Compiled functions of a kind of cells in blocks."""
 
@@ -67,8 +79,14 @@ class Kind(NamedTuple):
     retreat: Any
     """`(lever, law, block, lanes, interval, pull, load)`: carry the cotangent of the state over the step of
     an interval, its twist and dt; return `StepBars`."""
+    shares: Any
+    """`(law, block, lanes, interval, pull, load)`: add the derivatives of `load pull . wrench` of a step by the weights
+    of cells to the field `OUT`."""
     pushed: Any
     """`(law, z, u, dt, dz, du, changes of the law)`: step a cell and its change."""
+    law: Any
+    """`(law, block, i)`: return the law of cell i, with its asymmetry if there is one."""
+    limit: Limit
     vector: Any
     """`(row, first, stride)`: return the components of a bristle."""
 

@@ -9,9 +9,12 @@ from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, at
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import cells_rollout, cells_sensitivities
-from planarfriction.kernels.cell_blocks import BLOCK, LANES, Kind, StepBars, scratch
-from planarfriction.kernels.cell_passes import KINDS, backward_passes, forward_passes
+from planarfriction.kernels.cell_blocks import BLOCK, LANES, Kind, Limit, StepBars, scratch
+from planarfriction.kernels.cell_passes import KINDS, backward_passes, forward_passes, share_passes
 from planarfriction.kernels.cells import Lever
+from planarfriction.kernels.derive import derive
+from planarfriction.kernels.forward import forward
+from planarfriction.kernels.leaning_cells import Leaning
 from planarfriction.kernels.passes import Passes
 from planarfriction.kernels.vectors import Vector, plus, reader_of
 
@@ -46,6 +49,20 @@ def _retreat_of(written: Passes) -> Any:
     return retreat
 
 
+def _shares_of(written: Passes) -> Any:
+    """Return `cell_blocks.Kind.shares` from its passes."""
+    share, numbers = written.run, LANES * written.rows
+
+    @kernel
+    def shares(
+        law: LawNumbers, block: Doubles, lanes: int, interval: tuple[Vector, float], pull: Vector, load: float
+    ) -> None:
+        shared = interval[1], load, 1.0, pull[0], pull[1], pull[2]
+        share(law, interval[0], shared, block, scratch(numbers), lanes)
+
+    return shares
+
+
 class Rollouts(NamedTuple):
     """Entry points of a kind of cells."""
 
@@ -53,11 +70,31 @@ class Rollouts(NamedTuple):
     sensitivities: Any
 
 
+@kernel
+def _shared(law: LawNumbers, block: Doubles, i: int) -> LawNumbers:
+    return law
+
+
+def _leaning_at(first: int) -> Any:
+    """Return `cell_blocks.Kind.law` of cells whose asymmetry lies in two fields of a block, from one on."""
+
+    @kernel
+    def law_of_cell(law: LawNumbers, block: Doubles, i: int) -> Leaning:
+        return Leaning(law, (block[first + i], block[first + LANES + i]))
+
+    return law_of_cell
+
+
 @functools.cache
-def rollouts_of_cells(size: int, turned: bool) -> Rollouts:
-    """Return the rollouts of a kind of cells without asymmetry (see `KINDS`); they are written on first use."""
-    kind = KINDS[size, turned, False]
-    step, reader = kind.element.step, reader_of(size)
-    advance, retreat = _advance_of(forward_passes(kind)), _retreat_of(backward_passes(kind))
-    functions = Kind(kind.lever, size, advance, retreat, cells_rollout.pushed_of(step), reader)
-    return Rollouts(cells_rollout.bound(functions, kind.name), cells_sensitivities.bound(functions, step, kind.name))
+def rollouts_of_cells(size: int, turned: bool, leans: bool) -> Rollouts:
+    """Return the rollouts of a kind of cells (see `KINDS`); they are written on first use."""
+    kind = KINDS[size, turned, leans]
+    path, law = ("lean.law", _leaning_at(LANES * kind.numbers)) if leans else ("law", _shared)
+    step, within, by = kind.element.step, kind.element.within, ("z", f"{path}.sigma_0", f"{path}.mu_s")
+    limited = derive(within, by, ("z",))
+    limit = Limit(within, limited.forth, limited.back, forward(within, by, ("z",)))
+    pushed = forward(step, cells_rollout.by_of(path), ("z", "u"))
+    ways = _advance_of(forward_passes(kind)), _retreat_of(backward_passes(kind)), _shares_of(share_passes(kind)), pushed
+    functions = Kind(kind.lever, size, *ways, law, limit, reader_of(size))
+    sensitivities = cells_sensitivities.bound(functions, step, within, path, kind.name)
+    return Rollouts(cells_rollout.bound(functions, kind.name), sensitivities)

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, disc_cells, discs, leaning_cells, points
-from planarfriction.kernels.cell_blocks import BAR, BY_LOAD, LANES, WEIGHT, Z
+from planarfriction.kernels import cells, disc_cells, discs, leaning_cells, points, settle
+from planarfriction.kernels.cell_blocks import BAR, BY_LOAD, LANES, OUT, WEIGHT, Z
 from planarfriction.kernels.cells import CellsContact, Lever
-from planarfriction.kernels.cells_rollout import BY
+from planarfriction.kernels.cells_rollout import by_of
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.leaning_cells import Leaning
 from planarfriction.kernels.passes import Passes, passes
@@ -40,6 +40,8 @@ class Element(NamedTuple):
     """`(law, z, u)`: return z' and the traction."""
     step: Any
     """`(law, z, u, dt)`: return the bristle after dt and its traction."""
+    within: Any = settle.within
+    """`(law, z)`: return a bristle brought back onto its limit (see `settle`)."""
     forward: Division = Division(8, 2)
     backward: Division = Division(6, 6)
     rate: Division = Division(5, 0)
@@ -48,8 +50,10 @@ class Element(NamedTuple):
 
 POINT = Element("points", 2, points.evaluate, points.step, slopes=Division(2, 0))
 DISC = Element("discs", 3, discs.evaluate, discs.step)
-LEANING_POINT = Element("leaning points", 2, leaning_cells.evaluate, leaning_cells.step)
-LEANING_DISC = Element("leaning discs", 3, leaning_cells.evaluate_disc, leaning_cells.step_disc)
+LEANING_POINT = Element("leaning points", 2, leaning_cells.evaluate, leaning_cells.step, leaning_cells.within)
+LEANING_DISC = Element(
+    "leaning discs", 3, leaning_cells.evaluate_disc, leaning_cells.step_disc, leaning_cells.within_disc
+)
 """Elements whose law is a `Leaning`; the asymmetry stands behind the numbers of the lever."""
 
 
@@ -62,18 +66,15 @@ class CellKind(NamedTuple):
     numbers: int
     leans: bool = False
     """True for elements whose law is a `Leaning`."""
+    law: Any = LawNumbers
+    """Record of the numbers of the law."""
+    linear: bool = True
+    """See `general_cells.Bristle`."""
 
 
 @kernel
-def _leaning_point(contact: CellsContact, i: int, v: Doubles) -> Leaning:
-    c, n = contact.cells, contact.count
-    return Leaning(contact.law, (c[5 * n + i], c[6 * n + i]))
-
-
-@kernel
-def _leaning_disc(contact: CellsContact, i: int, v: Doubles) -> Leaning:
-    c, n = contact.cells, contact.count
-    return Leaning(contact.law, (c[6 * n + i], c[7 * n + i]))
+def _leaning(contact: CellsContact, i: int, v: Doubles) -> Leaning:
+    return Leaning(contact.law, (contact.lean[i], contact.lean[contact.count + i]))
 
 
 KINDS = {
@@ -81,8 +82,8 @@ KINDS = {
     (2, True, False): CellKind("turned", POINT, cells.LEVERS, 5),
     (3, False, False): CellKind("discs", DISC, disc_cells.POSITIONS, 3),
     (3, True, False): CellKind("turned_discs", DISC, disc_cells.LEVERS, 6),
-    (2, True, True): CellKind("leaning", LEANING_POINT, cells.LEVERS._replace(law=_leaning_point), 5, True),
-    (3, True, True): CellKind("leaning_discs", LEANING_DISC, disc_cells.LEVERS._replace(law=_leaning_disc), 6, True),
+    (2, True, True): CellKind("leaning", LEANING_POINT, cells.LEVERS._replace(law=_leaning), 5, True),
+    (3, True, True): CellKind("leaning_discs", LEANING_DISC, disc_cells.LEVERS._replace(law=_leaning), 6, True),
 }
 """Kinds of cells by the components of a bristle, and whether there are a metric and an asymmetry."""
 
@@ -98,16 +99,13 @@ class Rows(NamedTuple):
     n: int
 
 
-_LAW = {f"law.{name}": f"law.{name}" for name in LawNumbers._fields}
-
-
 class _Symbols:
     """Arguments of the functions of a cell in a trace."""
 
     def __init__(self, trace: Trace, kind: CellKind) -> None:
         self.trace = trace
         numbers = self.several("c", kind.numbers + 2 * kind.leans)
-        law = LawNumbers(*(Number(trace, name) for name in _LAW))
+        law = kind.law(*(Number(trace, f"{kind.law.__name__}.{name}") for name in kind.law._fields))
         self.law = Leaning(law, numbers[-2:]) if kind.leans else law
         self.cell, self.z, self.v = numbers[: kind.numbers], self.several("z", kind.element.size), self.several("v", 3)
         self.dt, self.weight = Number(trace, "dt"), Number(trace, "weight")
@@ -128,20 +126,26 @@ def _rows(letter: str, field: str, count: int) -> dict[str, str]:
     return {f"{letter}{m}": f"block.{field}[{m} * block.n + i]" for m in range(count)}
 
 
-_SHARED = {**_LAW, **{f"v{m}": f"v[{m}]" for m in range(3)}, "dt": "shared[0]"}
-"""Sources of the symbols that all cells share."""
+def _shared(kind: CellKind) -> dict[str, str]:
+    """Return the sources of the symbols that all cells share."""
+    law = {f"{kind.law.__name__}.{name}": f"law.{name}" for name in kind.law._fields}
+    return {**law, **{f"v{m}": f"v[{m}]" for m in range(3)}, "dt": "shared[0]"}
+
+
+_PULL = {f"p{m}": f"shared[{m + 3}]" for m in range(3)} | {"load": "shared[1]", "keeps": "shared[2]"}
+"""Sources of the cotangent of a wrench, of the load, and of 1, or 0 without load."""
 
 
 def _in_block(kind: CellKind) -> dict[str, str]:
     """Return the sources of the symbols of cells in a block."""
-    vectors = _fields("c", 0, kind.numbers) | _fields("z", Z, kind.element.size)
-    return {**_SHARED, **vectors, "weight": f"block[{WEIGHT} + i]"}
+    vectors = _fields("c", 0, kind.numbers + 2 * kind.leans) | _fields("z", Z, kind.element.size)
+    return {**_shared(kind), **vectors, "weight": f"block[{WEIGHT} + i]"}
 
 
 def _in_rows(kind: CellKind) -> dict[str, str]:
     """Return the sources of the symbols of cells in `Rows`."""
     vectors = _rows("c", "cells", kind.numbers + 2 * kind.leans) | _rows("z", "z", kind.element.size)
-    return {**_SHARED, **vectors, "weight": "block.weights[0 + i]"}
+    return {**_shared(kind), **vectors, "weight": "block.weights[0 + i]"}
 
 
 def _step_of(kind: CellKind) -> Callable[[Trace], Any]:
@@ -174,7 +178,7 @@ def backward_passes(kind: CellKind) -> Passes:
     These are the cotangents of the twist [3], of the load, and of the law in the order of `cells_rollout.PARAMETERS`.
     """
     element, lever = kind.element, kind.lever
-    written = derive(element.step, BY, ("z", "u"))
+    written = derive(element.step, by_of("lean.law" if kind.leans else "law"), ("z", "u"))
 
     def adjoint(trace: Trace) -> Any:
         s = _Symbols(trace, kind)
@@ -186,11 +190,29 @@ def backward_passes(kind: CellKind) -> Passes:
         along = sum(a * b for a, b in zip(pulled, traction, strict=True))
         return z_bar, twin(lever.wrench)(s.cell, u_bar), (s.weight + load * by_load) * along, tuple(law_bar)
 
-    pull = {f"p{m}": f"shared[{m + 3}]" for m in range(3)} | {"load": "shared[1]", "keeps": "shared[2]"}
     bar = _fields("b", BAR, element.size)
-    sources = _in_block(kind) | pull | bar | {"by_load": f"block[{BY_LOAD} + i]"}
+    sources = _in_block(kind) | _PULL | bar | {"by_load": f"block[{BY_LOAD} + i]"}
     name, division = f"{element.name}_back", element.backward._asdict()
     return passes(name, traced(adjoint), sources, list(bar.values()), **division)
+
+
+def share_passes(kind: CellKind) -> Passes:
+    """Write the derivative of the load times a step's wrench, along a vector, by the weights of the cells of a block.
+
+    It is added to the field `OUT`.
+    """
+
+    def share(trace: Trace) -> Any:
+        s = _Symbols(trace, kind)
+        _, traction = twin(kind.element.step)(s.law, s.z, s.u, s.dt)
+        pulled = twin(kind.lever.seen)(s.cell, s.several("p", 3))
+        along = sum(a * b for a, b in zip(pulled, traction, strict=True))
+        return (Number(trace, "before") + Number(trace, "load") * along,)
+
+    store = f"block[{OUT} + i]"
+    sources = {**_in_block(kind), **_PULL, "before": store}
+    name, division = f"{kind.element.name}_shares", kind.element.forward._asdict()
+    return passes(name, traced(share), sources, [store], **division)
 
 
 def rate_passes(kind: CellKind) -> Passes:
@@ -207,17 +229,19 @@ def rate_passes(kind: CellKind) -> Passes:
 
 
 def slope_passes(kind: CellKind) -> Passes:
-    """Write the derivatives of the rates of cells in `Rows`, by state and velocity."""
+    """Write the derivatives of the rates of cells in `Rows` by state and velocity, and of tractions unless linear."""
     element = kind.element
     written = derive(element.evaluate, ("z", "u"), ("z", "u"))
-    units = [tuple(float(m == j) for m in range(element.size)) for j in range(element.size)]
+    count = element.size if kind.linear else 2 * element.size
+    units = [tuple(float(m == j) for m in range(2 * element.size)) for j in range(count)]
 
     def slopes(trace: Trace) -> Any:
         s = _Symbols(trace, kind)
         _, tape = twin(written.forth)(s.law, s.z, s.u)
-        rows = [twin(written.back)(tape, (unit, (0.0,) * element.size)) for unit in units]
-        return tuple(by_z for by_z, _ in rows), tuple(by_u for _, by_u in rows)
+        rows = [twin(written.back)(tape, (unit[: element.size], unit[element.size :])) for unit in units]
+        halves = [rows[first : first + element.size] for first in range(0, count, element.size)]
+        return tuple(tuple(row[which] for row in half) for half in halves for which in range(2))
 
-    stores = [f"block.out[{m * LANES} + i]" for m in range(2 * element.size**2)]  # of a block: that lies apart
+    stores = [f"block.out[{m * LANES} + i]" for m in range(2 * count * element.size)]  # of a block: that lies apart
     name, division = f"slopes of {element.name}", element.slopes._asdict()
     return passes(name, traced(slopes), _in_rows(kind), stores, **division)

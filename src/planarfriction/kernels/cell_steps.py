@@ -14,7 +14,7 @@ from planarfriction.compiler.memory import Doubles, Place, at
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import cells, general_cells
 from planarfriction.kernels.cell_blocks import LANES, divided, scratch
-from planarfriction.kernels.cell_passes import DISC, KINDS, Rows, rate_passes, slope_passes, step_passes
+from planarfriction.kernels.cell_passes import DISC, KINDS, CellKind, Rows, rate_passes, slope_passes, step_passes
 from planarfriction.kernels.cells import CellsContact
 from planarfriction.kernels.contacts import ModelFunctions, functions_of
 from planarfriction.kernels.passes import Passes
@@ -76,10 +76,11 @@ def _run(written: Passes) -> Any:
 
 
 def evaluate(
-    contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, *, cell_rows: Any, rate: Any, copied: int
-) -> None:
+    contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, *, cell_rows: Any, rate: Any, copied: int,
+    read: Any,
+) -> None:  # fmt: skip
     """Write `z'`, and `W`."""
-    record, twist, total, block = cells.read(contact), three(v), (0.0, 0.0, 0.0), scratch(BLOCK)
+    record, twist, total, block = read(contact), three(v), (0.0, 0.0, 0.0), scratch(BLOCK)
     n, (_, lanes) = record.count, divided(record.count)
     for first in range(0, n, lanes):
         rows, count = cell_rows(record, z, first, lanes, block if copied > 0 else at(zdot, first), block)
@@ -90,24 +91,26 @@ def evaluate(
 
 
 def linearise(
-    contact: Place, z: Doubles, v: Doubles, lin: Doubles, *, bristle: Any, cell_rows: Any, slope: Any
+    contact: Place, z: Doubles, v: Doubles, lin: Doubles, *, bristle: Any, cell_rows: Any, slope: Any, read: Any
 ) -> None:
-    """Write A and F of each cell (see `general_cells`)."""
-    record, twist, block = cells.read(contact), three(v), scratch(BLOCK)
+    """Write A and F of each cell, and C and E unless tractions are linear (see `general_cells`)."""
+    record, twist, block = read(contact), three(v), scratch(BLOCK)
     n, (_, lanes) = record.count, divided(record.count)
     for first in range(0, n, lanes):
         rows, count = cell_rows(record, z, first, lanes, block, block)
         slope(record.law, twist, 0.0, rows, count)
-        for m in range(2 * bristle.size * bristle.size):
-            _copy(min(lanes, n - first), at(block, m * LANES), at(lin, m * n + first))
+        square = bristle.size * bristle.size
+        for m in range(2 * square if bristle.linear else 4 * square):
+            row = m if m < 2 * square else m + square  # behind the inverse
+            _copy(min(lanes, n - first), at(block, m * LANES), at(lin, row * n + first))
 
 
 def step(
     contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, cell_rows: Any, advance: Any,
-    copied: int,
+    copied: int, read: Any,
 ) -> None:  # fmt: skip
     """Advance the bristles by `dt` at a held twist, and write the wrench at the end."""
-    record, twist, total, block = cells.read(contact), three(v), (0.0, 0.0, 0.0), scratch(BLOCK)
+    record, twist, total, block = read(contact), three(v), (0.0, 0.0, 0.0), scratch(BLOCK)
     n, (_, lanes) = record.count, divided(record.count)
     for first in range(0, n, lanes):
         rows, count = cell_rows(record, z, first, lanes, block if copied > 0 else at(new, first), block)
@@ -127,12 +130,16 @@ class CellFunctions(NamedTuple):
 @functools.cache
 def functions_of_cells(size: int, turned: bool, leans: bool) -> CellFunctions:
     """Return the functions of contacts of a kind of cells (see `KINDS`); they are written on first use."""
-    kind = KINDS[size, turned, leans]
-    bristle = general_cells.bristle(kind.element.evaluate, kind.element.step, size, linear=True)
-    model = {"lever": kind.lever, "bristle": bristle, "read": cells.read}
+    return functions_of_kind(KINDS[size, turned, leans], cells.read)
+
+
+def functions_of_kind(kind: CellKind, read: Any) -> CellFunctions:
+    """Return the functions of contacts of a kind of cells whose records `read` reads."""
+    bristle = general_cells.bristle(kind.element.evaluate, kind.element.step, kind.element.size, kind.linear)
+    model = {"lever": kind.lever, "bristle": bristle, "read": read}
     templates, slope = (evaluate, linearise, *general_cells.RATES[2:]), _run(slope_passes(kind))
-    copied = size if size == DISC.size else 0  # points come by the hundred
-    model["cell_rows"] = _filled(kind.numbers + 2 * kind.leans, size) if copied else _in_place
+    copied = bristle.size if bristle.size == DISC.size else 0  # points come by the hundred
+    model["cell_rows"] = _filled(kind.numbers + 2 * kind.leans, bristle.size) if copied else _in_place
     rates = functions_of(kind.name, templates, **model, rate=_run(rate_passes(kind)), slope=slope, copied=copied)
     advance = _run(step_passes(kind))
     steps = step_functions(kind.name, (step, general_cells.slopes), **model, advance=advance, copied=copied)

@@ -22,6 +22,8 @@ class CellsContact(NamedTuple):
     """n"""
     cells: Doubles
     """Numbers of the cells: x, y [2, n], or L_xx, L_xy, L_yy, (L J rho)_x, (L J rho)_y, a_x, a_y [7, n]."""
+    lean: Doubles
+    """Rows a_x, a_y of these, [2, n]; none where friction is the same forwards and backwards."""
     weights: Doubles
     """[n]"""
 

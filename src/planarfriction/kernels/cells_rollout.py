@@ -28,11 +28,9 @@ from planarfriction.kernels.cell_blocks import (
     lever_at,
     totals,
 )
-from planarfriction.kernels.derive import derive
-from planarfriction.kernels.forward import forward
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rollouts import Bars, Inputs, row_of
-from planarfriction.kernels.settle import factor_at, softening, stiffened, within
+from planarfriction.kernels.settle import factor_at, softening, stiffened
 from planarfriction.kernels.vectors import Vector, add, plus, scatter, three, times
 
 PARAMETERS = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
@@ -41,13 +39,10 @@ PARAMETERS = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "b
 COLUMNS = tuple(LawNumbers._fields.index(name) for name in PARAMETERS)
 """Places of `PARAMETERS` in a row."""
 
-BY = ("z", "u", *(f"law.{name}" for name in PARAMETERS))
-"""Arguments by which steps of cells are differentiated."""
 
-
-def pushed_of(step: Any) -> Any:
-    """Return `Kind.pushed` of the step of a cell."""
-    return forward(step, BY, ("z", "u"))
+def by_of(path: str) -> tuple[str, ...]:
+    """Return the arguments by which steps of cells are differentiated, whose law stands at a path."""
+    return "z", "u", *(f"{path}.{name}" for name in PARAMETERS)
 
 
 # ---------------------------------------------------------------------- blocks
@@ -105,10 +100,6 @@ def _weigh(w: Doubles, blocks: int, lanes: int, weights: np.ndarray, by_load: np
 
 # ---------------------------------------------------------------------- limits of a fixed stiffness
 
-_LIMITED = "z", "law.sigma_0", "law.mu_s"
-_within = derive(within, _LIMITED, ("z",))
-_forth_within, _back_within, _pushed_within = _within.forth, _within.back, forward(within, _LIMITED, ("z",))
-
 
 @kernel
 def _bring_back(kind: Kind, law: LawNumbers, w: Doubles, blocks: int, lanes: int) -> None:
@@ -116,7 +107,8 @@ def _bring_back(kind: Kind, law: LawNumbers, w: Doubles, blocks: int, lanes: int
     for k in range(blocks):
         block = at(w, k * BLOCK)
         for i in range(lanes):
-            scatter(block, Z + i, LANES, within(law, kind.vector(block, Z + i, LANES)))
+            new = kind.limit.within(kind.law(law, block, i), kind.vector(block, Z + i, LANES))
+            scatter(block, Z + i, LANES, new)
 
 
 @kernel
@@ -126,8 +118,8 @@ def _bring_back_pull(kind: Kind, law: LawNumbers, w: Doubles, blocks: int, lanes
     for k in range(blocks):
         block = at(w, k * BLOCK)
         for i in range(lanes):
-            _, tape = _forth_within(law, kind.vector(block, Z + i, LANES))
-            bars = _back_within(tape, (kind.vector(block, BAR + i, LANES),))
+            _, tape = kind.limit.forth(kind.law(law, block, i), kind.vector(block, Z + i, LANES))
+            bars = kind.limit.back(tape, (kind.vector(block, BAR + i, LANES),))
             scatter(block, BAR + i, LANES, bars[0])
             total = plus(total, 1.0, bars[1:])
     return total
@@ -151,7 +143,8 @@ def _bring_back_push(kind: Kind, interval: Interval, block: Doubles, lanes: int)
     """Bring bristles back onto their limits, with their changes."""
     for i in range(lanes):
         z, change = kind.vector(block, Z + i, LANES), kind.vector(block, BAR + i, LANES)
-        z, change = _pushed_within(interval.law, z, change, interval.d_law[0], interval.d_law[4])
+        law, changes = kind.law(interval.law, block, i), (interval.d_law[0], interval.d_law[4])
+        z, change = kind.limit.pushed(law, z, change, *changes)
         scatter(block, Z + i, LANES, z)
         scatter(block, BAR + i, LANES, change)
 
@@ -269,6 +262,41 @@ def gradient(
     _gradient(kind, inputs, states, wrench_bar, span, bars, scratch)
 
 
+@kernel
+def _shares(
+    kind: Kind, inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: tuple[int, ...], out: np.ndarray,
+    scratch: np.ndarray,
+) -> None:  # fmt: skip
+    w, n, rows = pointer(scratch), states.shape[2] // kind.size, inputs.rows
+    blocks, lanes = divided(inputs.shapes.shape[1])
+    for b in range(span[0], span[1]):
+        twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
+        law, pulls, before = law_of(rows[row_of(rows, b)]), wrench_bar[row_of(wrench_bar, b)], states[row_of(states, b)]
+        _lay(w, blocks, inputs.data)
+        for t in range(inputs.dt.shape[0]):
+            load, pull, interval = loads[t], three(pulls[t]), (three(twists[t]), inputs.dt[t])
+            if load == 0.0:
+                continue
+            stiff = stiffened(law, inputs.reference, load)
+            _write(w, Z, before[t], n, kind.size)
+            if inputs.reference > 0.0:
+                _bring_back(kind, stiff, w, blocks, lanes)
+            for k in range(blocks):
+                kind.shares(stiff, at(w, k * BLOCK), lanes, interval, pull, load)
+        _read(w, OUT, out[b], n, 1)
+
+
+def shares(
+    inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: tuple[int, ...], out: np.ndarray, *, kind: Kind
+) -> None:
+    """Write the cotangents of the weights of cells, from those of the wrenches [B or 1, T, 3], to `out` [B, n].
+
+    Bristles do not see the weights: they are the `states` before each step [B or 1, T, size n], and stay.
+    """
+    scratch = np.empty(divided(inputs.shapes.shape[1])[0] * BLOCK)
+    _shares(kind, inputs, states, wrench_bar, span, out, scratch)
+
+
 # ---------------------------------------------------------------------- forwards
 
 
@@ -278,7 +306,8 @@ def _push_one(kind: Kind, interval: Interval, block: Doubles, i: int) -> None:
     lever, weight, load = kind.lever, block[WEIGHT + i], interval.load
     one, z, change = lever_at(lever, block, i), kind.vector(block, Z + i, LANES), kind.vector(block, BAR + i, LANES)
     u, d_u = lever.seen(one, interval.twist), lever.seen(one, interval.d_twist)
-    new, traction, d_new, d_traction = kind.pushed(interval.law, z, u, interval.dt, change, d_u, *interval.d_law)
+    law = kind.law(interval.law, block, i)
+    new, traction, d_new, d_traction = kind.pushed(law, z, u, interval.dt, change, d_u, *interval.d_law)
     scatter(block, Z + i, LANES, new)
     scatter(block, BAR + i, LANES, d_new)
     heavier = (weight + load * block[BY_LOAD + i]) * interval.d_load
@@ -351,6 +380,7 @@ class CellRollouts(NamedTuple):
     rollout: Any
     gradient: Any
     tangent: Any
+    shares: Any
 
 
 def bound(kind: Kind, name: str) -> CellRollouts:
@@ -358,4 +388,4 @@ def bound(kind: Kind, name: str) -> CellRollouts:
     return CellRollouts(*(bind(each, f"{name}_{each.__name__}", jit, kind=kind) for each in TEMPLATES))
 
 
-TEMPLATES = rollout, gradient, tangent
+TEMPLATES = rollout, gradient, tangent, shares

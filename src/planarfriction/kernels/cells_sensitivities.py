@@ -20,7 +20,7 @@ from planarfriction.kernels.cells_rollout import _lay, _read, _write
 from planarfriction.kernels.forward import forwards
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rollouts import Derivatives, row_of
-from planarfriction.kernels.settle import factor_at, stiffened, within
+from planarfriction.kernels.settle import factor_at, stiffened
 from planarfriction.kernels.vectors import Vector, add, plus, scatter, three
 
 _MOVING = "sigma_0", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
@@ -29,12 +29,6 @@ PARAMETERS = (*_MOVING, "sigma_1", "sigma_2")
 
 _PLACES = tuple(PARAMETERS.index(name) if name in PARAMETERS else -1 for name in LawNumbers._fields)
 """Place in `PARAMETERS` of each column of a row."""
-
-_BY = tuple((f"law.{name}", "z")[: 1 + (name in _MOVING)] for name in PARAMETERS)
-
-_pushed_within = forwards(
-    within, tuple((f"law.{name}", "z")[name not in ("sigma_0", "mu_s") :] for name in _MOVING), ("z",)
-).pushed
 
 _CHANGE, _PULL = BLOCK, BLOCK + 3 * LANES * len(_MOVING)
 """Fields behind a block: changes of the state, and traction with its changes."""
@@ -71,7 +65,7 @@ def _bring_back(kind: Kind, interval: Interval, block: Doubles, lanes: int) -> N
     """Bring bristles back onto their limits (see `settle`), with their changes."""
     for i in range(lanes):
         z, (a, b, c, d, e, f) = kind.vector(block, Z + i, LANES), _changes(kind, block, i)
-        bristles = _pushed_within(interval.law, z, interval.stiffer, a, b, 1.0, c, d, e, f)
+        bristles = kind.limit.pushed(kind.law(interval.law, block, i), z, interval.stiffer, a, b, 1.0, c, d, e, f)
         scatter(block, Z + i, LANES, bristles[0])
         scatter(block, _CHANGE + i, LANES, bristles[1:])
 
@@ -81,7 +75,7 @@ def _push_one(kind: Kind, interval: Interval, block: Doubles, i: int) -> None:
     z, u = kind.vector(block, Z + i, LANES), kind.lever.seen(lever_at(kind.lever, block, i), interval.twist)
     a, b, c, d, e, f = _changes(kind, block, i)
     changes = interval.stiffer, a, 1.0, b, 1.0, c, 1.0, d, 1.0, e, 1.0, f, 1.0, 1.0
-    results = kind.pushed(interval.law, z, u, interval.dt, *changes)
+    results = kind.pushed(kind.law(interval.law, block, i), z, u, interval.dt, *changes)
     bristles, tractions = results[::2], results[1::2]
     scatter(block, Z + i, LANES, bristles[0])
     scatter(block, _CHANGE + i, LANES, bristles[1:7])
@@ -162,7 +156,10 @@ def sensitivities(inputs: Any, span: tuple, z: np.ndarray, out: Derivatives, *, 
     _sensitivities(kind, inputs, span, z, out, scratch)
 
 
-def bound(kind: Kind, step: Any, name: str) -> Any:
-    """Return the entry point of a kind of cells, with the step of one and its changes by each number of the law."""
-    kind = kind._replace(pushed=forwards(step, _BY, ("z", "u")).pushed)
+def bound(kind: Kind, step: Any, within: Any, path: str, name: str) -> Any:
+    """Return the entry point of a kind of cells, from the step of one and its limit; `path` leads to their law."""
+    by = tuple((f"{path}.{each}", "z")[: 1 + (each in _MOVING)] for each in PARAMETERS)
+    limited = tuple((f"{path}.{each}", "z")[each not in ("sigma_0", "mu_s") :] for each in _MOVING)
+    limit = kind.limit._replace(pushed=forwards(within, limited, ("z",)).pushed)
+    kind = kind._replace(pushed=forwards(step, by, ("z", "u")).pushed, limit=limit)
     return bind(sensitivities, f"{name}_sensitivities", jit, kind=kind)

@@ -41,6 +41,26 @@ ROWS = Layout(Rows, twist=3, wrench=3, d_twist=3, d_wrench=3).offsets
 """Rows [4, 3] as `ModelFunctions` take them (see `memory.arrays_at`)."""
 
 
+class Seen(NamedTuple):
+    """Twist of a contact, and what else its rates and a contact with an edge (see `kernels.edge_cells`) see."""
+
+    twist: Doubles
+    """[3]"""
+    factor: Doubles
+    """Factor on the stiffness, [1]."""
+    place: Doubles
+    """Place of the body in the contact frame [m], and its angle in the world, [3]."""
+    axes: Doubles
+    """Cosine and sine of the angle of the contact frame in the world, [2]."""
+    covered: Doubles
+    """Share of the load of whole cells that lies on the body, to be written where there is an edge; else 1, [1]."""
+
+
+_SEEN = Layout(Seen, twist=3, factor=1, place=3, axes=2, covered=1)
+SEEN, SEEN_SIZE = _SEEN.offsets, _SEEN.size
+"""Places of `Seen` (see `memory.arrays_at`), and its size in words."""
+
+
 class ModelFunctions(NamedTuple):
     """Compiled functions of a kind of model, for the bristles z of one contact, per unit normal load.
 
@@ -49,15 +69,17 @@ class ModelFunctions(NamedTuple):
     """
 
     evaluate: Any
-    """`(contact, z, V, z', W)`: write z' and W; behind V is the factor on the stiffness, for `fixed_stiffness`."""
+    """`(contact, z, V, z', W)`: write z' and W; behind V is what `Seen` holds."""
     linearise: Any
     """`(contact, z, V, lin)`: write the derivatives of f into the workspace `lin` of the contact; V as above."""
     factor: Any
-    """`(contact, z, shift, lin, S)`: prepare D in `lin`, write S [3, 3] = dW/dV with z eliminated."""
+    """`(contact, z, shift, lin, S)`: prepare D in `lin`, write S [3, 3] = dW/dV with z eliminated.
+
+    With an edge, dW/dq by the place q of `Seen` is behind it, [3, 3]; there are zeros else."""
     eliminate: Any
     """`(contact, z, shift, r, lin, W)`: write the wrench that the residual r of z' causes."""
     back_substitute: Any
-    """`(contact, z, r, dV, lin, out)`: solve `D out = r + df/dV dV`."""
+    """`(contact, z, r, dV, lin, out)`: solve `D out = r + df/dV dV`; behind dV is the change of the place, [3]."""
     change: Any = None
     """`(contact, z, z', lin, dz, dz', rows, friction, size)`: write the changes of z' and of the wrench.
 

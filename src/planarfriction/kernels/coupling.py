@@ -15,17 +15,19 @@ A problem is a row of words (`layout`), so that compiled hosts call `solve` with
 
 from __future__ import annotations
 
-import functools
 import math
+
+import numpy as np
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
-from planarfriction.compiler.calls import address_of, call, pointer
-from planarfriction.compiler.memory import arrays_at, at, doubles
-from planarfriction.kernels.coupling_rows import INVALID, read
+from planarfriction.compiler.calls import call, pointer
+from planarfriction.compiler.memory import Doubles, Integers, Place, arrays_at, at, doubles
+from planarfriction.kernels.coupling_rows import INVALID, Patches, Problem, read
 from planarfriction.kernels.following import follow
 from planarfriction.kernels.settle import factor_at, stepped
 from planarfriction.kernels.small_matrices import leave_out_rising, solved
+from planarfriction.kernels.vectors import clear, copy
 
 DOWNHILL = 0.5
 """Largest slope beyond the root along a Newton step at which it may end, as a share of that at its start."""
@@ -51,7 +53,7 @@ ROUNDING = 1e-13
 
 
 @kernel
-def _applied(m, i, n, x, start):
+def _applied(m: Doubles, i: int, n: int, x: Doubles, start: float) -> float:
     """Return element i of `m x + start`, m of n columns."""
     for j in range(n):
         start += m[n * i + j] * x[j]
@@ -59,8 +61,8 @@ def _applied(m, i, n, x, start):
 
 
 @kernel
-def _bring_back(step, dx, dy):
-    """Bring the wrench of a patch that has moved, and its slopes, to the twist and the wrench about the origin."""
+def _bring_back(step: Doubles, dx: float, dy: float) -> None:
+    """Bring the wrench of a shifted patch, and its slopes, to the twist and the wrench about the origin."""
     for i in range(3):  # slopes by the spin: it moves the patch
         row = at(step, 3 + 3 * i)
         row[2] += dx * row[1] - dy * row[0]
@@ -70,45 +72,44 @@ def _bring_back(step, dx, dy):
 
 
 @kernel
-def _step(own, p, functions, k, load):
+def _step(patches: Patches, p: Problem, functions: Integers, k: int, load: float) -> None:
     """Step patch k under a load, at the twist that it sees."""
-    first, reference = own.firsts[k], own.reference[k]
+    first, reference = patches.firsts[k], patches.reference[k]
     if reference > 0.0:
-        states, factor = own.firsts[k + 1] - first, factor_at(reference, load)
-        given = own.bristle[k], states, factor, at(p.state, first), p.seen, p.dt[0], at(p.new, first), p.step
-        stepped(functions[k], p.acting[k], *given)
+        states, factor = patches.firsts[k + 1] - first, factor_at(reference, load)
+        bristles = patches.bristle[k], states, factor, at(p.state, first)
+        stepped(functions[k], p.acting[k], *bristles, p.seen, p.dt[0], at(p.new, first), p.step)
     else:
         call(functions[k], (p.acting[k], at(p.state, first), p.seen, p.dt[0], at(p.new, first), p.step))
 
 
 @kernel
-def _load_slopes(own, p):
+def _load_slopes(patches: Patches, p: Problem) -> None:
     """Write the slopes of the wrenches by the loads; where stiffness is fixed, by a step under another load."""
-    for k in range(own.count):
+    for k in range(patches.count):
         one, load = 3 * k, p.load[k]
         for i in range(3):
             p.unit_loaded[one + i] = p.unit[one + i]
-        if own.reference[k] > 0.0 and p.acting[k] != 0 and load > 0.0:
+        if patches.reference[k] > 0.0 and p.acting[k] != 0 and load > 0.0:
             p.seen[0], p.seen[1], p.seen[2] = p.twist[one], p.twist[one + 1], p.twist[one + 2]
-            _step(own, p, own.steps, k, (1.0 + LOAD_STEP) * load)
+            _step(patches, p, patches.steps, k, (1.0 + LOAD_STEP) * load)
             for i in range(3):
                 p.unit_loaded[one + i] += (p.step[i] - p.unit[one + i]) / LOAD_STEP
 
 
 @kernel
-def step_all(own, p, functions):
+def step_all(patches: Patches, p: Problem, functions: Integers) -> None:
     """Step all patches at the twists of a problem: write the new state and wrenches per unit load.
 
     `functions` are those of `Patches`: its `steps`, or its `slopes`, which write the slopes of the wrenches as well.
     """
-    for k in range(own.count):
-        seen, dx, dy, spin = p.seen, p.moved[2 * k], p.moved[2 * k + 1], p.twist[3 * k + 2]
+    for k in range(patches.count):
+        seen, dx, dy, spin = p.seen, p.shift[2 * k], p.shift[2 * k + 1], p.twist[3 * k + 2]
         if p.acting[k] == 0:
-            for i in range(12):
-                p.step[i] = 0.0
+            clear(p.step, 12)
         else:
             seen[0], seen[1], seen[2] = p.twist[3 * k] - spin * dy, p.twist[3 * k + 1] + spin * dx, spin
-            _step(own, p, functions, k, p.load[k])
+            _step(patches, p, functions, k, p.load[k])
             if dx != 0.0 or dy != 0.0:
                 _bring_back(p.step, dx, dy)
         for i in range(3):
@@ -118,31 +119,31 @@ def step_all(own, p, functions):
 
 
 @kernel
-def _host(own, p, held):
-    """Write the twists and, unless they are held, the loads that follow from the wrenches."""
-    n = 3 * own.count
+def _host(patches: Patches, p: Problem, keep_loads: bool) -> None:
+    """Write the twists and, unless they are kept, the loads that follow from the wrenches."""
+    n = 3 * patches.count
     for i in range(n):
         p.twist[i] = _applied(p.response, i, n, p.wrench, p.twist_0[i])
-    if not held:
-        for k in range(own.count):
+    if not keep_loads:
+        for k in range(patches.count):
             p.load[k] = xp.maximum(_applied(p.load_response, k, n, p.wrench, p.load_0[k]), 0.0)
 
 
 @kernel
-def _misfit(own, p):
+def _misfit(patches: Patches, p: Problem) -> float:
     """Return the difference of the twists and loads from those that the models' wrenches there cause [m/s].
 
     A load counts as the speed that all of it would cause as friction.
     """
-    n, w, largest, finite = 3 * own.count, p.change, 0.0, True
+    n, w, largest, finite = 3 * patches.count, p.change, 0.0, True
     for i in range(n):
         w[i] = p.load[i // 3] * p.unit[i]
-    for k in range(own.count):
+    for k in range(patches.count):
         missing = xp.maximum(_applied(p.load_response, k, n, w, p.load_0[k]), 0.0) - p.load[k]
         for i in range(3 * k, 3 * k + 3):
             gap = abs(_applied(p.response, i, n, w, p.twist_0[i]) - p.twist[i])
             if i == 3 * k + 2:
-                gap *= own.radius[k]
+                gap *= patches.radius[k]
             else:
                 gap = xp.maximum(gap, p.response[n * i + i] * abs(missing))
             finite = finite and xp.is_finite(gap)
@@ -151,40 +152,47 @@ def _misfit(own, p):
 
 
 @kernel
-def _newton(own, p, held, falling):
+def _write_rows(patches: Patches, p: Problem, k: int, keep_loads: bool) -> None:
+    """Write the rows of patch k in the system of the Newton step, whose right-hand side is `change`."""
+    n, a, gap, slopes, load = 3 * patches.count, p.response, p.gap, at(p.slopes, 9 * k), p.load[k]
+    lacks = _applied(p.load_response, k, n, p.wrench, p.load_0[k]) - load
+    follows = 0.0 if keep_loads or (load == 0.0 and lacks < 0.0) else 1.0
+    for i in range(3):
+        one, x, y, s = 3 * k + i, slopes[3 * i], slopes[3 * i + 1], slopes[3 * i + 2]
+        p.change[one] = (load + follows * lacks) * p.unit[one] - p.wrench[one]
+        p.change[one] += follows * lacks * (p.unit_loaded[one] - p.unit[one])
+        p.change[one] += x * gap[3 * k] + y * gap[3 * k + 1] + s * gap[3 * k + 2]
+        for j in range(n):
+            caused = x * a[n * 3 * k + j] + y * a[n * (3 * k + 1) + j] + s * a[n * (3 * k + 2) + j]
+            loaded = follows * p.unit_loaded[one] * p.load_response[n * k + j]
+            p.matrix[n * one + j] = (1.0 if j == one else 0.0) - caused - loaded
+
+
+@kernel
+def _newton(patches: Patches, p: Problem, keep_loads: bool, falling: bool) -> bool:
     """Write the Newton step from the wrenches into `change` and `move`; return True if it leads downhill.
 
     `falling`: without the directions in which slopes rise. Twists and loads need not be those that the wrenches cause:
     what they lack of these goes into the step.
     """
-    n, a, w, gap, change = 3 * own.count, p.response, p.wrench, p.gap, p.change
+    n = 3 * patches.count
     for i in range(n):
-        gap[i] = _applied(a, i, n, w, p.twist_0[i]) - p.twist[i]
-    for k in range(own.count):
-        slopes, load = at(p.slopes, 9 * k), p.load[k]
+        p.gap[i] = _applied(p.response, i, n, p.wrench, p.twist_0[i]) - p.twist[i]
+    for k in range(patches.count):
+        slopes = at(p.slopes, 9 * k)
         for i in range(9):
-            slopes[i] = load * p.unit_slopes[9 * k + i]
+            slopes[i] = p.load[k] * p.unit_slopes[9 * k + i]
         if falling:
             leave_out_rising(slopes, at(p.scale, 3 * k), p.turned, at(p.turned, 9))
-        lacks = _applied(p.load_response, k, n, w, p.load_0[k]) - load
-        follows = 0.0 if held or (load == 0.0 and lacks < 0.0) else 1.0
-        for i in range(3):
-            one, x, y, s = 3 * k + i, slopes[3 * i], slopes[3 * i + 1], slopes[3 * i + 2]
-            change[one] = (load + follows * lacks) * p.unit[one] - w[one]
-            change[one] += follows * lacks * (p.unit_loaded[one] - p.unit[one])
-            change[one] += x * gap[3 * k] + y * gap[3 * k + 1] + s * gap[3 * k + 2]
-            for j in range(n):
-                caused = x * a[n * 3 * k + j] + y * a[n * (3 * k + 1) + j] + s * a[n * (3 * k + 2) + j]
-                loaded = follows * p.unit_loaded[one] * p.load_response[n * k + j]
-                p.matrix[n * one + j] = (1.0 if j == one else 0.0) - caused - loaded
-    sign, downhill = solved(p.matrix, change, n), _downhill(own, p)
+        _write_rows(patches, p, k, keep_loads)
+    sign, downhill = solved(p.matrix, p.change, n), _downhill(patches, p)
     return sign > 0.0 and downhill > 0.0
 
 
 @kernel
-def _downhill(own, p):
+def _downhill(patches: Patches, p: Problem) -> float:
     """Write `A dW` into `move`; return `A dW . (dW - dV.P dV)` with P as it is, rising directions and all."""
-    n, move, downhill = 3 * own.count, p.move, 0.0
+    n, move, downhill = 3 * patches.count, p.move, 0.0
     for i in range(n):
         move[i] = _applied(p.response, i, n, p.change, 0.0)
     for i in range(n):
@@ -195,205 +203,193 @@ def _downhill(own, p):
 
 
 @kernel
-def _slope(own, p):
+def _slope(patches: Patches, p: Problem) -> float:
     """Return `A dW . s` at the wrenches."""
     total = 0.0
-    for i in range(3 * own.count):
+    for i in range(3 * patches.count):
         total += p.move[i] * (p.load[i // 3] * p.unit[i] - p.wrench[i])
     return total
 
 
 @kernel
-def too_far(first, here):
+def too_far(first: float, here: float) -> bool:
     """Return True where a slope beyond the root says to go back; one that is not positive at its start says nothing."""
     return first > 0.0 and not here >= -DOWNHILL * first
 
 
 @kernel
-def shortening_of(first, here):
+def shortening_of(first: float, here: float) -> float:
     """Return the share of a displacement to try next, from its slope at the start and the negative one at its end."""
     return xp.minimum(xp.maximum(first / (first - here), 0.1), 0.7)
 
 
 @kernel
-def _go(own, p, held, whole):
+def _go(patches: Patches, p: Problem, keep_loads: bool, whole: bool) -> None:
     """Go along the Newton step from the wrenches, and, unless it is to be `whole`, back where it goes too far."""
-    n, w, first, far = 3 * own.count, p.wrench, _slope(own, p), 1.0
-    for i in range(n):
-        p.start[i] = w[i]
+    n, w, first, far = 3 * patches.count, p.wrench, _slope(patches, p), 1.0
+    copy(w, p.start, n)
     for shortening in range(SHORTENINGS + 1):
         for i in range(n):
             w[i] = p.start[i] + far * p.change[i]
-        _host(own, p, held)
-        step_all(own, p, own.steps)
-        here = _slope(own, p)
+        _host(patches, p, keep_loads)
+        step_all(patches, p, patches.steps)
+        here = _slope(patches, p)
         if whole or not too_far(first, here) or shortening == SHORTENINGS:
             break
         far *= shortening_of(first, here)
-    if held:
-        _host(own, p, False)
+    if keep_loads:
+        _host(patches, p, False)
 
 
 @kernel
-def _valid(own, p, words):
+def _valid(patches: Patches, p: Problem, words: Doubles) -> bool:
     """Return True if all inputs are in range, and none is negative that must not be."""
     valid = p.dt[0] >= 0.0
-    for i in range(own.row.records):
+    for i in range(patches.row.records):
         valid = valid and xp.in_range(words[i])
-    for k in range(own.count):
+    for k in range(patches.count):
         valid = valid and p.free_load[k] >= 0.0
-    for i in range(3 * own.count):
-        valid = valid and p.response[(3 * own.count + 1) * i] >= 0.0
+    for i in range(3 * patches.count):
+        valid = valid and p.response[(3 * patches.count + 1) * i] >= 0.0
     return valid
 
 
 @kernel
-def prepare(own, p):
+def prepare(patches: Patches, p: Problem) -> float:
     """Write twists and loads without wrenches, and the scale; return the largest speed [m/s] that goes into a twist."""
-    n, a, largest = 3 * own.count, p.response, 0.0
+    n, a, largest = 3 * patches.count, p.response, 0.0
     for i in range(n):
         caused = _applied(a, i, n, p.guess, 0.0)
         p.twist_0[i] = p.free_twist[i] - caused
-        lever = own.radius[i // 3] if i % 3 == 2 else 1.0
+        lever = patches.radius[i // 3] if i % 3 == 2 else 1.0
         largest = xp.maximum(largest, lever * (abs(p.free_twist[i]) + abs(caused)))
         p.scale[i] = math.sqrt(a[n * i + i]) if a[n * i + i] > 0.0 else 1.0
-    for k in range(own.count):
+    for k in range(patches.count):
         p.load_0[k] = p.free_load[k] - _applied(p.load_response, k, n, p.guess, 0.0)
     return largest
 
 
 @kernel
-def _start(own, p, tolerance):
+def _start(patches: Patches, p: Problem, tolerance: float) -> tuple[float, bool]:
     """Step at the better of the twists that the wrenches cause and of rest; return the misfit, and True for rest."""
-    _host(own, p, False)
-    step_all(own, p, own.steps)
-    misfit = _misfit(own, p)
+    _host(patches, p, False)
+    step_all(patches, p, patches.steps)
+    misfit = _misfit(patches, p)
     if misfit > NEAR * tolerance:
-        for i in range(3 * own.count):
-            p.twist[i] = 0.0
-        step_all(own, p, own.steps)
-        at_rest = _misfit(own, p)
+        clear(p.twist, 3 * patches.count)
+        step_all(patches, p, patches.steps)
+        at_rest = _misfit(patches, p)
         if at_rest <= misfit:
             return at_rest, True
-        _host(own, p, False)
-        step_all(own, p, own.steps)
+        _host(patches, p, False)
+        step_all(patches, p, patches.steps)
     return misfit, False
 
 
 @kernel
-def _copy(own, twist, load, to_twist, to_load):
-    for i in range(3 * own.count):
-        to_twist[i] = twist[i]
-    for k in range(own.count):
-        to_load[k] = load[k]
+def _copy(patches: Patches, twist: Doubles, load: Doubles, to_twist: Doubles, to_load: Doubles) -> None:
+    copy(twist, to_twist, 3 * patches.count)
+    copy(load, to_load, patches.count)
 
 
 @kernel
-def _again(own, p, patches, problem, best):
+def _again(patches: Patches, p: Problem, patches_at: Place, problem_at: Place, best: float) -> float:
     """Solve without a guess, then from the wrenches of ever longer steps; return the misfit of the better solution.
 
     Bristles that have hardly moved only damp, which is easy to solve. The host's step keeps its length.
     """
     dt, iterations = p.dt[0], p.iterations[0]
-    _copy(own, p.twist, p.load, p.kept_twist, p.kept_load)
+    _copy(patches, p.twist, p.load, p.kept_twist, p.kept_load)
     p.again[0] = 0.0
     for stage in range(-1, STAGES + 1):
         if stage <= 0:
-            for i in range(3 * own.count):
-                p.wrench[i] = 0.0
+            clear(p.wrench, 3 * patches.count)
         p.dt[0] = dt if stage < 0 else dt / SHORTER ** (STAGES - stage)
-        call(own.solve, (patches, problem))
+        call(patches.solve, (patches_at, problem_at))
         iterations += p.iterations[0]
         if stage < 0 and p.converged[0] > 0.0:
             break
     p.dt[0], p.again[0], p.iterations[0] = dt, 1.0, iterations
     if p.residual[0] < best:
         return p.residual[0]
-    _copy(own, p.kept_twist, p.kept_load, p.twist, p.load)
+    _copy(patches, p.kept_twist, p.kept_load, p.twist, p.load)
     return best
 
 
 @kernel
-def _restrain(own, p):
+def _restrain(patches: Patches, p: Problem) -> None:
     """Scale wrenches that did not converge, so that they do no more work than the bristles give.
 
     The models' wrenches W at their twists V take at least `-W.V dt` from the bristles; under `s W` the host moves at
     `V_0 + s A W`. If that is more work at s = 1, s is that of the least; if it is still more, the bristles are let go,
     which gives all they hold, and s W does no work then, since none is done at s = 0.
     """
-    n, w, move, given, begin, bends = 3 * own.count, p.wrench, p.move, 0.0, 0.0, 0.0
+    n, w, move, work, begin, bends = 3 * patches.count, p.wrench, p.move, 0.0, 0.0, 0.0
     for i in range(n):
         move[i] = _applied(p.response, i, n, w, 0.0)
-        given, begin, bends = given + w[i] * p.twist[i], begin + w[i] * p.twist_0[i], bends + w[i] * move[i]
-    if begin + bends > given:
+        work, begin, bends = work + w[i] * p.twist[i], begin + w[i] * p.twist_0[i], bends + w[i] * move[i]
+    if begin + bends > work:
         s = xp.minimum(xp.maximum(-0.5 * begin / bends, 0.0), 1.0) if bends > 0.0 else 0.0
-        if s * (begin + s * bends) > given:
-            for i in range(own.states):
-                p.new[i] = 0.0
+        if s * (begin + s * bends) > work:
+            clear(p.new, patches.states)
         for i in range(n):
             w[i], p.twist[i] = s * w[i], p.twist_0[i] + s * move[i]
 
 
 @kernel
-def search(own, p, tolerance, most):
+def search(patches: Patches, p: Problem, tolerance: float, most: int) -> tuple[float, bool]:
     """Write the twists and loads of the least misfit; return that, and True if states and wrenches are those there."""
-    misfit, rest = _start(own, p, tolerance)
+    misfit, rest = _start(patches, p, tolerance)
     best = math.inf
     for iteration in range(most + 1):
         p.iterations[0] = iteration
         if misfit < best:
             best = misfit
-            _copy(own, p.twist, p.load, p.best_twist, p.best_load)
+            _copy(patches, p.twist, p.load, p.best_twist, p.best_load)
         if misfit <= tolerance or iteration == most or misfit == math.inf:
             break
-        held = iteration % ROUND >= JOINT
-        step_all(own, p, own.slopes)  # dear: not before they are needed, which at rest they are not
-        _load_slopes(own, p)
-        if not _newton(own, p, held, False):
-            _newton(own, p, held, True)
-        _go(own, p, held, rest)
-        rest, misfit = False, _misfit(own, p)
+        keep_loads = iteration % ROUND >= JOINT
+        step_all(patches, p, patches.slopes)  # dear: not before they are needed, which at rest they are not
+        _load_slopes(patches, p)
+        if not _newton(patches, p, keep_loads, False):
+            _newton(patches, p, keep_loads, True)
+        _go(patches, p, keep_loads, rest)
+        rest, misfit = False, _misfit(patches, p)
     if not misfit <= best:
-        _copy(own, p.best_twist, p.best_load, p.twist, p.load)
+        _copy(patches, p.best_twist, p.best_load, p.twist, p.load)
     return best, misfit <= best
 
 
 @entry
-def solve(patches, problem):
-    """Solve the problem of one row, whose address comes in; `patches` is that of its `Patches`."""
-    own = read(patches)
-    p = arrays_at(own.row, problem)
+def solve(patches_at: Place, problem_at: Place) -> None:
+    """Solve the problem of one row; arguments are the addresses of its `Patches` and of that row."""
+    patches = read(patches_at)
+    p = arrays_at(patches.row, problem_at)
     p.iterations[0], p.residual[0] = INVALID, math.inf
-    if not _valid(own, p, doubles(problem)):
+    if not _valid(patches, p, doubles(problem_at)):
         return
-    follow(own, p, problem)
-    tolerance = xp.maximum(p.tolerance[0], ROUNDING * prepare(own, p))
-    best, there = search(own, p, tolerance, int(p.most[0]))
+    follow(patches, p, problem_at)
+    tolerance = xp.maximum(p.tolerance[0], ROUNDING * prepare(patches, p))
+    best, current = search(patches, p, tolerance, int(p.most[0]))
     lost = best > tolerance and p.again[0] > 0.0
     if lost and p.most[0] > 0.0:
-        best = _again(own, p, patches, problem, best)
-    if lost or not there:
-        step_all(own, p, own.steps)
-    for i in range(3 * own.count):
+        best = _again(patches, p, patches_at, problem_at, best)
+    if lost or not current:
+        step_all(patches, p, patches.steps)
+    for i in range(3 * patches.count):
         p.wrench[i] = p.load[i // 3] * p.unit[i]
-    for k in range(own.count):
+    for k in range(patches.count):
         if p.load[k] == 0.0:  # without load there is no memory
-            for i in range(own.firsts[k], own.firsts[k + 1]):
+            for i in range(patches.firsts[k], patches.firsts[k + 1]):
                 p.new[i] = 0.0
     if lost and best > tolerance:
-        _restrain(own, p)
+        _restrain(patches, p)
     p.residual[0], p.converged[0] = best, 1.0 if best <= tolerance else 0.0
 
 
-@functools.cache
-def solve_address() -> int:
-    """Return the address of `solve` in this process."""
-    return address_of(solve)
-
-
 @jit
-def solve_batch(patches, problems, first, last):
-    """Solve the problems [E, words] from `first` to `last`; `patches` is the row of their `Patches`."""
-    own = read(patches)
+def solve_batch(words: np.ndarray, problems: np.ndarray, first: int, last: int) -> None:
+    """Solve the problems [E, words] from `first` to `last`; `words` are the row of their `Patches`."""
+    patches = read(words)
     for e in range(first, last):
-        call(own.solve, (pointer(patches), at(pointer(problems), problems.shape[1] * e)))
+        call(patches.solve, (pointer(words), at(pointer(problems), problems.shape[1] * e)))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from planarfriction.compiler.memory import Doubles, Integers, Layout, offsets_of, reader
-from planarfriction.kernels.following import Followers
 from planarfriction.kernels.steps import SLOPES
 
 ALONG = 1e-12
@@ -101,7 +100,7 @@ class Problem(NamedTuple):
     """Scratch of `leave_out_rising`, [2, 9]."""
     acting: Integers
     """Addresses of the records that act in this step, [k]."""
-    moved: Doubles
+    shift: Doubles
     """Displacements of patches that follow as a whole, [2k]."""
     weights: Doubles
     """Weights of the points of all patches that can follow."""
@@ -123,10 +122,23 @@ def layout(patches: int, states: int, points: int, copies: int) -> Layout:
     shapes |= dict.fromkeys(("dt", "tolerance", "most", "again", "iterations", "residual", "converged"), 1)
     shapes |= dict.fromkeys(("free_load", "load", "load_0", "best_load", "kept_load"), k)
     shapes |= dict.fromkeys(("follows", "records", "acting"), k)
-    shapes |= dict.fromkeys(("moments", "moved"), 2 * k) | {"weights": points, "copies": copies, "support": 7 * patches}
+    shapes |= dict.fromkeys(("moments", "shift"), 2 * k) | {"weights": points, "copies": copies, "support": 7 * patches}
     shapes |= dict.fromkeys(("state", "new"), states)
     shapes |= dict.fromkeys(("unit_slopes", "slopes"), 9 * k) | dict.fromkeys(("response", "matrix"), n * n)
     return Layout(Problem, **shapes | {"load_response": k * n, "step": SLOPES, "turned": 18, "seen": 3})
+
+
+class Followers(NamedTuple):
+    """Points of each patch that share its load: its cells, or its centre of pressure if it moves as a whole."""
+
+    x: Doubles
+    """Coordinates of the points of all patches [m]."""
+    y: Doubles
+    firsts: Integers
+    """First point of each patch, and behind the last the count of all, [k + 1]."""
+    words: Integers
+    """Words of the record of a patch whose points are cells, of which the last is the address of the weights; 0 of one
+    that moves as a whole, [k]."""
 
 
 class Patches(NamedTuple):

@@ -6,32 +6,18 @@ host that steps on gives the next step the moments that came out.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import Doubles, Integers, at, doubles, integers
+from planarfriction.compiler.memory import Doubles, Place, at, doubles, integers
+from planarfriction.kernels.coupling_rows import Patches, Problem
 from planarfriction.kernels.tilt import centre, tilt
-
-
-class Followers(NamedTuple):
-    """Points of each patch that share its load: its cells, or its centre of pressure if it moves as a whole."""
-
-    x: Doubles
-    """Coordinates of the points of all patches [m]."""
-    y: Doubles
-    firsts: Integers
-    """First point of each patch, and behind the last the count of all, [k + 1]."""
-    words: Integers
-    """Words of the record of a patch whose points are cells, of which the last is the address of the weights; 0 of one
-    that moves as a whole, [k]."""
+from planarfriction.kernels.vectors import copy
 
 
 @kernel
 def _borne(x: Doubles, y: Doubles, w: Doubles, n: int, support: Doubles, out: Doubles) -> None:
     """Write the weights that lie on the rectangle of the support, with their total unchanged; all if none does."""
-    for i in range(n):
-        out[i] = w[i]
+    copy(w, out, n)
     if not support[4] > 0.0:
         return
     total, borne, far = 0.0, 0.0, support[6]
@@ -48,13 +34,13 @@ def _borne(x: Doubles, y: Doubles, w: Doubles, n: int, support: Doubles, out: Do
 
 
 @kernel
-def _press(patches: Any, p: Any, problem: int, k: int, n: int, first: int) -> None:
+def _press(patches: Patches, p: Problem, problem_at: Place, k: int, n: int, first: int) -> None:
     """Write the weights of the n points of patch k, which begin at `first`, or how far it moves as a whole."""
     x, y = at(patches.followers.x, first), at(patches.followers.y, first)
     cx, cy = centre(p.moments[2 * k], p.moments[2 * k + 1], p.free_load[k])
     words, out = patches.followers.words[k], at(p.weights, first)
     if words == 0:
-        p.moved[2 * k], p.moved[2 * k + 1] = cx - x[0], cy - y[0]
+        p.shift[2 * k], p.shift[2 * k + 1] = cx - x[0], cy - y[0]
     elif p.records[k] != 0:
         record, copied = integers(p.records[k]), 0
         _borne(x, y, doubles(record[words - 1]), n, at(p.support, 7 * k), out)
@@ -62,28 +48,27 @@ def _press(patches: Any, p: Any, problem: int, k: int, n: int, first: int) -> No
         for j in range(k):
             copied += patches.followers.words[j]
         target = at(p.copies, copied)
-        for i in range(words - 1):
-            target[i] = record[i]
-        target[words - 1] = at(problem, patches.row.weights + first)
-        p.acting[k] = at(problem, patches.row.copies + copied)
+        copy(record, target, words - 1)
+        target[words - 1] = at(problem_at, patches.row.weights + first)
+        p.acting[k] = at(problem_at, patches.row.copies + copied)
 
 
 @kernel
-def hold(patches: Any, p: Any) -> None:
+def hold(patches: Patches, p: Problem) -> None:
     """Keep the pressures of the last solution in further ones of the same step."""
     for k in range(patches.count):
         p.follows[k] = -abs(p.follows[k])
 
 
 @kernel
-def follow(patches: Any, p: Any, problem: int) -> None:
-    """Write the records that act in the problem, whose address is `problem`, and how far patches move."""
+def follow(patches: Patches, p: Problem, problem_at: Place) -> None:
+    """Write the records that act in the problem, whose row is at `problem_at`, and how far patches move."""
     for k in range(patches.count):
         if p.follows[k] < 0.0:
             continue
         p.acting[k] = p.records[k]
-        p.moved[2 * k], p.moved[2 * k + 1] = 0.0, 0.0
+        p.shift[2 * k], p.shift[2 * k + 1] = 0.0, 0.0
         first = patches.followers.firsts[k]
         n = patches.followers.firsts[k + 1] - first
         if p.follows[k] > 0.0 and p.free_load[k] > 0.0 and n > 0:
-            _press(patches, p, problem, k, n, first)
+            _press(patches, p, problem_at, k, n, first)

@@ -14,7 +14,8 @@ from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, Place, arrays_at, at
 from planarfriction.kernels.cells import Lever
 from planarfriction.kernels.contacts import ROWS, traction
-from planarfriction.kernels.derive import derive
+from planarfriction.kernels.derive import derive, run_source, text_of
+from planarfriction.kernels.small_matrices import inverse
 from planarfriction.kernels.steps import SLOPES
 from planarfriction.kernels.vectors import (
     Vector,
@@ -56,8 +57,6 @@ class Bristle(NamedTuple):
 
     evaluate: Any
     """`(law, z, u)`: return z' and the traction."""
-    step: Any
-    """`(law, z, u, dt)`: return the bristle after dt and its traction."""
     linearise: Any
     """`(law, z, u)`: return z' and the traction with their derivatives, as `CellSlopes`."""
     linearise_step: Any
@@ -81,13 +80,13 @@ def bristle(evaluate: Any, step: Any, size: int = 2, linear: bool = False) -> Br
     linearise = slopes_of(evaluate, size) if evaluate else None  # not needed for steps alone, nor steps for rates
     readers = reader_of(size), reader_of(size * size)
     of_step = slopes_of(step, size) if step else None
-    return Bristle(evaluate, step, linearise, of_step, size, *readers, *_ALGEBRA[size], linear)
+    return Bristle(evaluate, linearise, of_step, size, *readers, *_ALGEBRA[size], linear)
 
 
 def slopes_of(function: Any, size: int) -> Any:
     """Return a function that returns two vectors with their derivatives by z and u, as `CellSlopes`."""
     written = derive(function, ("z", "u"), ("z", "u"))
-    forth, rows_of = written.forth, (_two_rows if size == 2 else _three_rows)(written.back)
+    forth, rows_of = written.forth, _rows_of(written.back, size)
 
     @kernel
     def slopes(*arguments: Any) -> CellSlopes:
@@ -97,30 +96,16 @@ def slopes_of(function: Any, size: int) -> Any:
     return slopes
 
 
-def _two_rows(back: Any) -> Any:
-    @kernel
-    def rows(tape: tuple) -> tuple[Vector, Vector, Vector, Vector]:
-        none, x, y = (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)
-        (new_zx, new_ux), (new_zy, new_uy) = back(tape, (x, none)), back(tape, (y, none))
-        (zx, ux), (zy, uy) = back(tape, (none, x)), back(tape, (none, y))
-        return (*new_zx, *new_zy), (*new_ux, *new_uy), (*zx, *zy), (*ux, *uy)
-
-    return rows
-
-
-def _three_rows(back: Any) -> Any:
-    @kernel
-    def rows(tape: tuple) -> tuple[Vector, Vector, Vector, Vector]:
-        none, x, y, s = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-        (new_zx, new_ux), (new_zy, new_uy), (new_zs, new_us) = (
-            back(tape, (x, none)),
-            back(tape, (y, none)),
-            back(tape, (s, none)),
-        )
-        (zx, ux), (zy, uy), (zs, us) = back(tape, (none, x)), back(tape, (none, y)), back(tape, (none, s))
-        return (*new_zx, *new_zy, *new_zs), (*new_ux, *new_uy, *new_us), (*zx, *zy, *zs), (*ux, *uy, *us)
-
-    return rows
+def _rows_of(back: Any, size: int) -> Any:
+    """Return a kernel of a tape that returns the derivatives of two vectors by z and u, row by row."""
+    lines = []
+    for m in range(2 * size):
+        bars = [float(m == j) for j in range(2 * size)]
+        lines.append(f"z{m}, u{m} = back(tape, ({tuple(bars[:size])}, {tuple(bars[size:])}))")
+    halves = range(size), range(size, 2 * size)
+    rows = [", ".join(f"*{by}{m}" for m in half) for half in halves for by in "zu"]
+    source = text_of("rows(tape)", [*lines, f"return {', '.join(f'({row})' for row in rows)}"])
+    return kernel(run_source("slopes", source, {"back": back})["rows"])
 
 
 @kernel
@@ -128,14 +113,6 @@ def _inverse_2(shift: float, m: Vector) -> Vector:
     a, b, c, d = shift - m[0], -m[1], -m[2], shift - m[3]
     per = 1.0 / (a * d - b * c)
     return per * d, -per * b, -per * c, per * a
-
-
-@kernel
-def _inverse_3(shift: float, m: Vector) -> Vector:
-    a, b, c, d, e, f, g, h, i = shift - m[0], -m[1], -m[2], -m[3], shift - m[4], -m[5], -m[6], -m[7], shift - m[8]
-    r, p, w = e * i - f * h, f * g - d * i, d * h - e * g
-    cofactors = r, c * h - b * i, b * f - c * e, p, a * i - c * g, c * d - a * f, w, b * g - a * h, a * e - b * d
-    return times(1.0 / (a * r + b * p + c * w), cofactors)
 
 
 @kernel
@@ -148,7 +125,7 @@ def _add_diagonal_3(a: Vector, x: float) -> Vector:
     return a[0] + x, a[1], a[2], a[3], a[4] + x, a[5], a[6], a[7], a[8] + x
 
 
-_ALGEBRA = {2: (_add_diagonal_2, _inverse_2), 3: (_add_diagonal_3, _inverse_3)}
+_ALGEBRA = {2: (_add_diagonal_2, _inverse_2), 3: (_add_diagonal_3, inverse)}
 
 
 @kernel
@@ -291,21 +268,6 @@ def pull_back(
     put(rows.d_twist, total)
 
 
-def step(
-    contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, lever: Lever, bristle: Bristle,
-    read: Any,
-) -> None:  # fmt: skip
-    """Advance the bristles by `dt` at a held twist, and write the wrench at the end."""
-    record, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
-    n = record.count
-    for i in range(n):
-        cell = lever.of(record, i)
-        end, t = bristle.step(lever.law(record, i, v), bristle.vector(z, i, n), lever.seen(cell, twist), dt)
-        scatter(new, i, n, end)
-        total = plus(total, record.weights[i], lever.wrench(cell, t))
-    put(out, total)
-
-
 @kernel
 def _put_cell(
     lever: Lever, bristle: Bristle, cell: Vector, weight: float, linear: CellSlopes, i: int, n: int, out: Doubles
@@ -340,4 +302,3 @@ def slopes(
 
 
 RATES = evaluate, linearise, factor, eliminate, back_substitute, change, solve_transposed, pull_back
-STEPS = step, slopes

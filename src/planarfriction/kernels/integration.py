@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.compiler import entry
+from planarfriction.compiler import entry, kernel
+from planarfriction.compiler.calls import call
 from planarfriction.compiler.memory import Doubles, Integers, at, reader
 
 
@@ -47,6 +48,8 @@ class Output(NamedTuple):
     """[M, number of bristle states], or [0, 0] when they are not wanted."""
     pressure: Doubles = np.empty((0, 2))
     """Last two bristle states, [M, 2], if they are the place of a pressure that follows its load; else [0, 2]."""
+    ended: Doubles = np.empty(0)
+    """Time since which each contact is beyond the edge of the body, NaN while it touches, [C]; [0] without edges."""
 
 
 class Progress(NamedTuple):
@@ -134,3 +137,20 @@ class RunRecord(NamedTuple):
 
 
 read_run = reader(RunRecord)
+
+
+@kernel
+def extend(run: RunRecord, share: float, value: float, slope: float, base: Doubles, out: Doubles) -> None:
+    """Write `base` plus multiples of the continuous extension, less y, and of its slope in s, at a share s of a step.
+
+    It is `(1 - s) y + s (new + (1 - s) (d_1 + s (d_2 + ...)))` with `new = y + sum m_j k_j`: a sum of stages.
+    """
+    s, m, dense, coupling = run.stage_count, run.method.m, run.method.dense, run.stages.coupling
+    for j in range(s):
+        inner, change = 0.0, 0.0
+        for p in range(run.order_of_dense - 1, -1, -1):
+            change = inner + share * change
+            inner = dense[p * s + j] + share * inner
+        coupling[j] = value * share * (m[j] + (1.0 - share) * inner)
+        coupling[j] += slope * (m[j] + (1.0 - 2.0 * share) * inner + share * (1.0 - share) * change)
+    call(run.combine, (coupling, run.stages.k, s, run.states, base, out))

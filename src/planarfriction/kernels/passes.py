@@ -26,6 +26,9 @@ from planarfriction.kernels.vectors import plus
 COSTS = {"exp(": 16, "sin(": 14, "cos(": 14, "log(": 16, "pow(": 30, "sqrt(": 8, " / ": 8}
 """Costs of operations, in sums and products."""
 
+SQUARE = "LawNumbers.gamma"
+"""Exponent that is 2 more often than not."""
+
 ARGUMENTS = "law, v, shared, block, work"
 
 
@@ -70,7 +73,7 @@ def passes(
         summed = [each for each in part.ends if each >= len(stores)]
         total = "".join(f"{_name(block.results[each])}, " for each in summed)
         texts += _loop(k, [*lines, f"return ({total})" if total else "return"], len(summed))
-        calls += _call(k, summed, any("pow(" in each.text for each in part.operations))
+        calls += _call(k, summed, any(SQUARE in each.arguments for each in part.operations))
     sums = "".join(f"sum_{each}, " for each in range(len(stores), len(block.results)))
     texts.append(text_of(f"run({ARGUMENTS}, lanes)", [*calls, f"return ({sums})" if sums else "return"]))
     source = "\n\n".join(texts)
@@ -98,7 +101,9 @@ def _call(k: int, sums: list[int], power: bool) -> list[str]:
 
 
 def _compiled(name: str, source: str, count: int) -> Any:
-    space = run_source(name, source, {"xp": xp, "math": math, "inf": math.inf, "plus": plus, "squared": squared})
+    space = run_source(
+        name, source, {"xp": xp, "math": math, "inf": math.inf, "nan": math.nan, "plus": plus, "squared": squared}
+    )
     for k in range(count):
         space[f"body_{k}"], space[f"pass_{k}"] = kernel(space[f"body_{k}"]), kernel(space[f"pass_{k}"])
     return kernel(space["run"])
@@ -191,7 +196,7 @@ def _cuts(kept: Sequence[Operation], again: Mapping[str, Operation], block: Bloc
             last[made[name]] = k
     handed = [sum(use >= end for use in last[:end]) for end in range(len(kept))]
     ends = set()
-    for middle in range(1, count):
+    for middle in range(1, count if len(kept) > 1 else 1):
         near = [k for k in range(1, len(kept)) if abs(reached[k] - middle) < 0.25]
         ends.add(min(near or [1], key=handed.__getitem__))
     return [0, *sorted(ends), len(kept)]

@@ -23,12 +23,14 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, kernel
 from planarfriction.compiler.memory import Doubles, Layout, Place, arrays_at, reader
 from planarfriction.formulas import LawNumbers
+from planarfriction.kernels.bristle_step import seen
 from planarfriction.kernels.contacts import ROWS, ModelFunctions, traction
 from planarfriction.kernels.derive import derive
+from planarfriction.kernels.law import grip
 from planarfriction.kernels.rules import ratio
 from planarfriction.kernels.small_matrices import applied, inverse
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
-from planarfriction.kernels.vectors import Vector, applied_back, dot, norm, plus, put, put_all, three, times
+from planarfriction.kernels.vectors import Vector, applied_back, norm, plus, put, put_all, three, times
 
 
 class PublishedPatch(NamedTuple):
@@ -134,12 +136,23 @@ def _raw(record: PublishedContact, z: Vector) -> Vector:
 
 
 @kernel
+def per_h(u: Vector, v: float) -> float:
+    """Return `1/|h|` where the limit surface gives `u = h v`; 1 at rest."""
+    return 1.0 / xp.where(norm(u) > 0.0, ratio(norm(u), v), 1.0)
+
+
+@kernel
+def decay_of(law: LawNumbers, z: Vector, u: Vector, v: float, per: float, q: float) -> float:
+    """Return the decay of a scaled bristle at the scaled speed v; `per` is `1/|h|`, q the grip."""
+    deflection, along = seen(z, norm(z), u, per, q)
+    return formulas.bristle_decay(xp, deflection, along, v, q, law)
+
+
+@kernel
 def _decay(law: LawNumbers, z: Vector, u: Vector, twist: Vector) -> float:
     """Return the decay of the bristle at the scaled twist for which the limit surface gives u."""
-    v, size = norm(twist), norm(z)
-    h = xp.where(norm(u) > 0.0, ratio(norm(u), v), 1.0)
-    q = law.sigma_0 / formulas.stribeck(xp, v, law)
-    return formulas.bristle_decay(xp, size * q / h, ratio(dot(z, u), size) / h, v, q, law)
+    v = norm(twist)
+    return decay_of(law, z, u, v, per_h(u, v), grip(law, v))
 
 
 _SLOPES = derive(_decay, ("z", "u", "twist"), ("z", "u", "twist"))

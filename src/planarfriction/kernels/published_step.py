@@ -17,9 +17,9 @@ from planarfriction.compiler.memory import Doubles, Place, reader
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import bristle_step, moment_steps, published_contact
 from planarfriction.kernels.derive import derive
+from planarfriction.kernels.law import grip
 from planarfriction.kernels.moment_steps import Contact, Cotangents, Framed, StepModel
-from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, through
-from planarfriction.kernels.rules import ratio
+from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, per_h, through
 from planarfriction.kernels.steps import step_functions
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
 from planarfriction.kernels.vectors import Vector, applied_back, norm, plus, times
@@ -87,9 +87,8 @@ def _step(
 ) -> tuple[Vector, Vector]:
     """Return the new state and the wrench at V_S = `twist`, where the limit surface gives u."""
     r, v = shape.contact_radius, norm(twist)
-    h = xp.where(v > 0.0, ratio(norm(u), v), 1.0)
     scaled = z[0], z[1], z[2] / r
-    new, k = bristle_step.step(law, scaled, u, v, 1.0 / h, law.sigma_0 / formulas.stribeck(xp, v, law), dt)
+    new, k = bristle_step.step(law, scaled, u, v, per_h(u, v), grip(law, v), dt)
     rate = plus(u, -k, new)
     fx = formulas.traction(new[0], rate[0], twist[0], law)
     fy = formulas.traction(new[1], rate[1], twist[1], law)

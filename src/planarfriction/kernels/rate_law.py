@@ -24,11 +24,12 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, reader
 from planarfriction.kernels import contacts
-from planarfriction.kernels.cells import Lever
-from planarfriction.kernels.contacts import ModelFunctions, functions_of
+from planarfriction.kernels.cell_passes import CellKind, Element
+from planarfriction.kernels.cell_steps import functions_of_kind
+from planarfriction.kernels.cells import LEVERS, Lever
+from planarfriction.kernels.contacts import ModelFunctions
 from planarfriction.kernels.forward import forward
-from planarfriction.kernels.general_cells import RATES, STEPS, Bristle, bristle
-from planarfriction.kernels.steps import StepFunctions, step_functions
+from planarfriction.kernels.steps import StepFunctions
 from planarfriction.kernels.vectors import Vector, norm, plus, times
 
 _SHARE = 1.0 - math.sqrt(0.5)
@@ -61,8 +62,8 @@ def _solved(a: float, b: float, c: float, d: float, per_determinant: float, r: V
 
 
 @functools.cache
-def bristle_of(rate: Callable, pull: Callable = traction) -> Bristle:
-    """Return the functions of a bristle from `rate(xp, law, z, u)` and its traction `pull(xp, law, z, z', u)`."""
+def element_of(name: str, rate: Callable, pull: Callable = traction) -> Element:
+    """Return the element of a bristle from `rate(xp, law, z, u)` and its traction `pull(xp, law, z, z', u)`."""
     rate, pull = (each if hasattr(each, "py_func") else kernel(each) for each in (rate, pull))
     z_name, u_name = list(inspect.signature(rate.py_func).parameters)[2:4]
     pushed = forward(rate, (z_name,), (z_name, u_name))
@@ -88,7 +89,7 @@ def bristle_of(rate: Callable, pull: Callable = traction) -> Bristle:
         new = _within(plus(plus(z, 1.5 * dt, first), 0.5 * dt, second), largest)
         return new, pull(xp, law, new, rate(xp, law, new, u), u)
 
-    return bristle(evaluate, step)
+    return Element(name, 2, evaluate, step)
 
 
 class CellFunctions(NamedTuple):
@@ -100,12 +101,12 @@ class CellFunctions(NamedTuple):
     steps: StepFunctions
 
 
-def cell_functions(name: str, law: Any, bristle_: Bristle, lever: Lever) -> CellFunctions:
-    """Bind the functions of contacts to a record of numbers of a law, its bristle and a lever; compile none yet."""
+def cell_functions(element: Element, law: Any, lever: Lever) -> CellFunctions:
+    """Bind the functions of contacts to an element, the record of its law's numbers and a lever; compile none yet."""
     fields = [("law", law), ("count", int), ("cells", Doubles), ("weights", Doubles)]
     record = NamedTuple(f"{law.__name__}Cells", fields)
-    model = {"lever": lever, "bristle": bristle_, "read": reader(record)}
-    return CellFunctions(record, functions_of(name, RATES, **model), step_functions(name, STEPS, **model))
+    kind = CellKind(element.name, element, lever, 5 if lever is LEVERS else 2, law=law, linear=False)
+    return CellFunctions(record, *functions_of_kind(kind, reader(record)))
 
 
 def fingerprint(names: Sequence[str], *functions: Callable) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterable, Mapping
 from types import CellType, CodeType, FunctionType, ModuleType
 from typing import Any
@@ -26,11 +27,24 @@ class Rewriting:
             id(original): (twin, original) for original, twin in known
         }  # an `id` is that of an object that is kept
         self._names, self._finished = names or {}, finished
+        self._begun: dict[int, tuple[Any, Any]] = {}
+        self._lock = threading.RLock()
 
     def __call__(self, original: Any) -> Any:
-        """Return the twin."""
+        """Return the twin; other threads see it once the globals of all that it calls are there."""
         if id(original) in self._twins:
             return self._twins[id(original)][0]
+        with self._lock:
+            outermost = not self._begun
+            twin = self._twin(original)
+            if outermost:
+                self._twins.update(self._begun)
+                self._begun.clear()
+        return twin
+
+    def _twin(self, original: Any) -> Any:
+        if id(original) in self._begun:
+            return self._begun[id(original)][0]
         if isinstance(original, ModuleType):
             return _Module(original, self)
         if isinstance(original, tuple):
@@ -42,7 +56,7 @@ class Rewriting:
         cells = [CellType() for _ in function.__closure__ or ()]
         made = FunctionType(function.__code__, space, function.__name__, function.__defaults__, tuple(cells))
         twin = self._finished(made)
-        self._twins[id(original)] = twin, original
+        self._begun[id(original)] = twin, original
         for name in _global_names(function.__code__):
             if name in function.__globals__:
                 space[name] = self(function.__globals__[name])

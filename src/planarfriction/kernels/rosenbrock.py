@@ -21,14 +21,15 @@ from planarfriction.kernels.body import (
     settle_all,
 )
 from planarfriction.kernels.contacts import contact_map
-from planarfriction.kernels.integration import Method, Output, Progress, RunRecord, Stages, combine, read_run
+from planarfriction.kernels.ends import INSTANT, note_ends, share_until_end
+from planarfriction.kernels.integration import Method, Output, Progress, RunRecord, Stages, combine, extend, read_run
 from planarfriction.kernels.rest import at_rest, speed_of
 from planarfriction.kernels.small_matrices import applied
 from planarfriction.kernels.springs import spring_drift
 from planarfriction.kernels.step_control import MOTION, fitted, growth
 from planarfriction.kernels.vectors import Vector, applied_back, norm, plus, put, three, times
 
-DONE, PAUSED, STEP_TOO_SMALL, AT_REST = 0, 1, 2, 3
+DONE, PAUSED, STEP_TOO_SMALL, AT_REST, APART = range(5)
 """Outcomes of `advance`."""
 
 STEPS, REJECTIONS, EVALUATIONS, JACOBIANS = 0, 1, 2, 3
@@ -93,6 +94,7 @@ def _record(run: RunRecord, system: SystemRecord, piece: int, since: float, stat
         out.body[6 * m + i] = state[system.bristles + i]
     for c in range(system.size):
         load, row = load_of(system, piece, since, c), m * system.size + c
+        load = load if system.work.covered[c] > 0.0 else 0.0
         out.load[row] = load
         put(at(out.wrench, 3 * row), times(load, three(at(system.work.wrench, 3 * c))))
     if exists(out.bristles):
@@ -147,23 +149,6 @@ def forget_unloaded(system: SystemRecord, piece: int, y: Doubles) -> None:
         if load[first + c] == 0.0 and load[first + system.size + c] == 0.0:
             for i in range(system.contacts.state[c], system.contacts.state[c + 1]):
                 y[i] = 0.0
-
-
-@kernel
-def _extend(run: RunRecord, share: float, value: float, slope: float, base: Doubles, out: Doubles) -> None:
-    """Write `base` plus multiples of the continuous extension, less y, and of its slope in s, at a share s of a step.
-
-    It is `(1 - s) y + s (new + (1 - s) (d_1 + s (d_2 + ...)))` with `new = y + sum m_j k_j`: a sum of stages.
-    """
-    s, m, dense, coupling = run.stage_count, run.method.m, run.method.dense, run.stages.coupling
-    for j in range(s):
-        inner, change = 0.0, 0.0
-        for p in range(run.order_of_dense - 1, -1, -1):
-            change = inner + share * change
-            inner = dense[p * s + j] + share * inner
-        coupling[j] = value * share * (m[j] + (1.0 - share) * inner)
-        coupling[j] += slope * (m[j] + (1.0 - 2.0 * share) * inner + share * (1.0 - share) * change)
-    call(run.combine, (coupling, run.stages.k, s, run.states, base, out))
 
 
 @kernel
@@ -225,9 +210,9 @@ def _missed_inside(run: RunRecord, system: SystemRecord, piece: int, since: floa
     work, shift, largest = run.stages, 1.0 / (step * run.method.gamma), 0.0
     for i in range(looks):
         share = (i + 1.0) / (looks + 1.0)
-        _extend(run, share, 1.0, 0.0, run.progress.y, work.argument)
+        extend(run, share, 1.0, 0.0, run.progress.y, work.argument)
         call(system.rates, (run.system, piece, since + share * step, work.argument, work.rate))
-        _extend(run, share, 0.0, -1.0 / step, work.rate, work.right)
+        extend(run, share, 0.0, -1.0 / step, work.rate, work.right)
         call(system.solve, (run.system, piece, since, run.progress.y, shift, work.right, work.error))
         largest = xp.maximum(largest, _error(run, system) / _DOUBT)
     run.progress.statistics[EVALUATIONS] += looks
@@ -264,6 +249,8 @@ def _start(run: RunRecord, system: SystemRecord, piece: int) -> None:
     progress.clock[STEP] = xp.minimum(progress.clock[STEP], progress.clock[FIRST])
     if piece == 0 and progress.cursor[SAMPLE] == 0 and run.output.time[0] == motion.breaks[0]:
         _record(run, system, piece, 0.0, progress.y)
+    if exists(run.output.ended):
+        note_ends(run, system, piece, 0.0, motion.breaks[piece])
 
 
 @kernel
@@ -276,7 +263,7 @@ def _accept(run: RunRecord, system: SystemRecord, piece: int, step: float, last:
     while progress.cursor[SAMPLE] < run.samples and samples[progress.cursor[SAMPLE]] <= time:
         sample = samples[progress.cursor[SAMPLE]]
         instant = reached if sample == time else sample - begin
-        _extend(run, (instant - since) / step, 1.0, 0.0, progress.y, run.stages.argument)
+        extend(run, (instant - since) / step, 1.0, 0.0, progress.y, run.stages.argument)
         _record(run, system, piece, instant, run.stages.argument)
     for i in range(run.states):
         progress.y[i] = run.stages.new[i]
@@ -315,12 +302,21 @@ def advance(run: Place, max_steps: int) -> int:
                 progress.statistics[REJECTIONS] += 1
                 clock[STEP] = longer
                 continue
+            if exists(run.output.ended):
+                share = share_until_end(run, system, piece, clock[SINCE], step)
+                if (1.0 - share) * step > INSTANT:
+                    progress.statistics[REJECTIONS] += 1
+                    clock[STEP], fresh = xp.maximum(share * step, INSTANT), False
+                    continue
             time = _accept(run, system, piece, step, step == remaining)
             if starting:
                 clock[FIRST], starting = longer, False
             clock[STEP] = xp.maximum(longer, clock[STEP]) if step == remaining else longer
             if system.motion.stop_speed > 0.0 and _rests(run, system, address, piece, time):
                 return AT_REST
+            if exists(run.output.ended) and note_ends(run, system, piece, clock[SINCE], time):
+                _record_last(run, system, piece, time)
+                return APART
         forget_unloaded(system, piece, progress.y)
         progress.cursor[PIECE], clock[SINCE] = piece + 1, 0.0
     return DONE
@@ -329,14 +325,20 @@ def advance(run: Place, max_steps: int) -> int:
 @kernel
 def _rests(run: RunRecord, system: SystemRecord, address: Place, piece: int, time: float) -> bool:
     """Return True if the body is at rest, after a sample of its place."""
-    progress, since = run.progress, run.progress.clock[SINCE]
-    call(run.at_rest, (address, piece, since))
+    call(run.at_rest, (address, piece, run.progress.clock[SINCE]))
     if run.stages.verdict[1] == 0.0:
         return False
+    _record_last(run, system, piece, time)
+    return True
+
+
+@kernel
+def _record_last(run: RunRecord, system: SystemRecord, piece: int, time: float) -> None:
+    """Write a sample where a run ends early."""
+    progress = run.progress
     if progress.cursor[SAMPLE] < run.samples:
         run.output.time[progress.cursor[SAMPLE]] = time
-        _record(run, system, piece, since, progress.y)
-    return True
+        _record(run, system, piece, progress.clock[SINCE], progress.y)
 
 
 FUNCTIONS = (*BODY_FUNCTIONS, combine, attempt, advance)

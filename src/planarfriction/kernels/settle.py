@@ -4,23 +4,22 @@ With the stiffness `K = sigma_0 f_ref` [N/m] a patch under the load f is the pub
 f_ref/f`, in place of `sigma_0`. Rates and tractions per unit load then follow the published law at l times the
 deflection, and a step of dt from z is 1/l of a step of `l dt` from `l z`.
 
-At rest a published bristle is never bent further than `mu_s/sigma_0`. One that a falling load has left beyond is
-brought back onto that limit, by steps as they begin (`stepped`), by the solver within a short time (`recovery`).
+At rest a published bristle is never bent further than `mu_s/sigma_0`, seen from `a mu_s/sigma_0` where friction differs
+forwards and backwards (see `leaning_cells`). One that a falling load has left beyond is brought back onto that limit,
+by steps as they begin (`stepped`), by the solver within a short time (`recovery`).
 """
 
 from __future__ import annotations
-
-import math
 
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call
-from planarfriction.compiler.memory import Doubles, Place, at
+from planarfriction.compiler.memory import Doubles, Place, at, exists
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.bristle_step import ROUNDING, cap
-from planarfriction.kernels.law import law_of
-from planarfriction.kernels.vectors import Vector, norm, scatter, times
+from planarfriction.kernels.cells import CellsContact, read
+from planarfriction.kernels.vectors import Vector, norm, plus, square, times
 
 RECOVERY = 1.0
 """Speed [m/s]: a bristle far beyond its limit returns to it as fast as it would forget while sliding at this speed."""
@@ -64,33 +63,48 @@ def recovery(law: LawNumbers, z: Vector, speed: float) -> float:
 
 
 @kernel
-def settle(law: LawNumbers, size: int, z: Doubles, factor: float, n: int, out: Doubles) -> None:
-    """Write `factor z` of n bristles of so many components to `out`, brought back onto their limits."""
-    if size == 3:
-        for i in range(n):
-            scatter(out, i, n, within(law, times(factor, (z[i], z[n + i], z[2 * n + i]))))
-    else:
-        for i in range(n):
-            scatter(out, i, n, within(law, times(factor, (z[i], z[n + i]))))
+def _middle(contact: CellsContact, factor: float, i: int) -> Vector:
+    """Return the middle of the limit of bristle i: not zero where friction differs forwards and backwards."""
+    n, lean, x, y = contact.count, contact.lean, 0.0, 0.0
+    if exists(lean):
+        largest = contact.law.mu_s / (factor * contact.law.sigma_0)
+        x, y = largest * lean[i], largest * lean[n + i]
+    return x, y, 0.0
 
 
 @kernel
-def bring_back(law: LawNumbers, size: int, z: Doubles, factor: float, n: int) -> None:
-    """Bring bristles back onto their limits at a load, and leave others as they are."""
+def settle(contact: CellsContact, size: int, z: Doubles, factor: float, out: Doubles) -> None:
+    """Write `factor z` of bristles of so many components to `out`, brought back onto their limits."""
+    law, n = contact.law, contact.count
     for i in range(n):
-        beyond = _beyond(law, size, z, factor, n, i)
+        seen, middle = times(factor, _out(contact, size, z, factor, i)), _middle(contact, 1.0, i)
+        back = cap(norm(seen) * law.sigma_0 / law.mu_s, 1.0)
+        for m in range(size):
+            out[m * n + i] = middle[m] + back * seen[m] if back < 1.0 else factor * z[m * n + i]
+
+
+@kernel
+def bring_back(contact: CellsContact, size: int, z: Doubles, factor: float) -> None:
+    """Bring bristles back onto their limits at a load, and leave others as they are."""
+    n = contact.count
+    for i in range(n):
+        beyond, middle = _beyond(contact, size, z, factor, i), _middle(contact, factor, i)
         if beyond > ROUNDING:
             for m in range(size):
-                z[m * n + i] /= beyond
+                z[m * n + i] = middle[m] + (z[m * n + i] - middle[m]) / beyond
 
 
 @kernel
-def _beyond(law: LawNumbers, size: int, z: Doubles, factor: float, n: int, i: int) -> float:
+def _out(contact: CellsContact, size: int, z: Doubles, factor: float, i: int) -> Vector:
+    """Return bristle i as seen from the middle of its limit."""
+    n = contact.count
+    return plus((z[i], z[n + i], z[2 * n + i] if size == 3 else 0.0), -1.0, _middle(contact, factor, i))
+
+
+@kernel
+def _beyond(contact: CellsContact, size: int, z: Doubles, factor: float, i: int) -> float:
     """Return the deflection of bristle i over its limit."""
-    square = 0.0
-    for m in range(size):
-        square += z[m * n + i] * z[m * n + i]
-    return factor * math.sqrt(square) * law.sigma_0 / law.mu_s
+    return factor * norm(_out(contact, size, z, factor, i)) * contact.law.sigma_0 / contact.law.mu_s
 
 
 @kernel
@@ -102,7 +116,7 @@ def stepped(
 
     Slopes by the state and of the new state are to be multiplied: see `unscale`.
     """
-    settle(law_of(record), size, z, factor, states // size, new)
+    settle(read(record), size, z, factor, new)
     call(function, (record, new, twist, factor * dt, new, out))
     for i in range(states):
         new[i] = new[i] / factor
@@ -110,33 +124,30 @@ def stepped(
 
 @kernel
 def unscale(
-    record: Place, size: int, z: Doubles, factor: float, n: int, by_twist: Doubles, of_wrench: Doubles,
-    by_state: Doubles,
-) -> None:  # fmt: skip
+    record: Place, size: int, z: Doubles, factor: float, by_twist: Doubles, of_wrench: Doubles, by_state: Doubles
+) -> None:
     """Turn derivatives of a published step into derivatives of `stepped`, in place.
 
     New state by twist [size n, 3], wrench by state [3, size, n], new state by state [size, size, n].
     """
-    law, states = law_of(record), size * n
-    for m in range(3 * states):
+    contact = read(record)
+    n = contact.count
+    for m in range(3 * size * n):
         by_twist[m] = by_twist[m] / factor
         of_wrench[m] = of_wrench[m] * factor
     for i in range(n):
-        beyond = _beyond(law, size, z, factor, n, i)
+        beyond, out = _beyond(contact, size, z, factor, i), _out(contact, size, z, factor, i)
         if beyond > ROUNDING:
-            _turn_rows(z, size, n, i, beyond, 3, of_wrench)
-            _turn_rows(z, size, n, i, beyond, size, by_state)
+            _turn_rows(out, size, n, i, beyond, 3, of_wrench)
+            _turn_rows(out, size, n, i, beyond, size, by_state)
 
 
 @kernel
-def _turn_rows(z: Doubles, size: int, n: int, i: int, beyond: float, rows: int, by_state: Doubles) -> None:
+def _turn_rows(out: Vector, size: int, n: int, i: int, beyond: float, rows: int, by_state: Doubles) -> None:
     """Multiply rows of derivatives by a bristle with its derivatives by the bristle before it was brought back."""
-    square = 0.0
-    for m in range(size):
-        square += z[m * n + i] * z[m * n + i]
     for k in range(rows):
         row, along = at(by_state, k * size * n), 0.0
         for m in range(size):
-            along += row[m * n + i] * z[m * n + i]
+            along += row[m * n + i] * out[m]
         for m in range(size):
-            row[m * n + i] = (row[m * n + i] - along * z[m * n + i] / square) / beyond
+            row[m * n + i] = (row[m * n + i] - along * out[m] / square(out)) / beyond

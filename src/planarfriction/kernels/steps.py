@@ -24,7 +24,7 @@ from planarfriction.compiler.memory import Doubles, Place, at, reader
 from planarfriction.formulas import LIGHTEST
 from planarfriction.kernels.bind import bind
 from planarfriction.kernels.settle import factor_at, stepped, unscale
-from planarfriction.kernels.vectors import plus, put, three, times
+from planarfriction.kernels.vectors import clear, copy, plus, put, three, times
 
 SLOPES = 12
 """Numbers that `StepFunctions.slopes` writes."""
@@ -120,8 +120,7 @@ def _step(
         put(wrench, times(load, three(unit)))
     else:
         put(wrench, (0.0, 0.0, 0.0))
-        for i in range(table.states):
-            new[i] = 0.0
+        clear(new, table.states)
 
 
 @jit
@@ -179,8 +178,7 @@ def _step_fixed(
     unit, more, less = at(new, s), factor_at(table.reference, load * (1.0 + NUDGE)), load * (1.0 - NUDGE)
     stepped(table.function, record, table.size, s, more, z, inputs, dt, new, unit)
     above = three(unit)
-    for i in range(s):
-        by_load[i] = new[i]
+    copy(new, by_load, s)
     stepped(table.function, record, table.size, s, factor_at(table.reference, less), z, inputs, dt, new, unit)
     change = times(0.5 / NUDGE, plus(above, -1.0, three(unit)))
     for i in range(s):
@@ -189,7 +187,7 @@ def _step_fixed(
     stepped(table.function, record, table.size, s, factor, z, inputs, dt, new, unit)
     put(wrench_load, plus(three(unit), 1.0, change))
     by_twist = at(unit, SLOPES)
-    unscale(record, table.size, z, factor, s // table.size, by_twist, at(by_twist, 3 * s), at(by_twist, 6 * s))
+    unscale(record, table.size, z, factor, by_twist, at(by_twist, 3 * s), at(by_twist, 6 * s))
 
 
 @kernel
@@ -202,8 +200,7 @@ def _jacobians(table: Stepped, b: int, z: Doubles, inputs: Doubles, out: Doubles
         _step_fixed(table, b, z, inputs, new, by_load, at(wrench_twist, 9))
     else:
         call(table.function, (_record(table, b), z, inputs, dt, new, unit))
-        for i in range(s):
-            by_load[i] = 0.0
+        clear(by_load, s)
         for m in range(3):
             wrench_twist[9 + m] = unit[m]
     for m in range(9):

@@ -16,7 +16,7 @@ import numpy as np
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.memory import Doubles
-from planarfriction.kernels.vectors import Vector
+from planarfriction.kernels.vectors import Vector, copy
 
 SOFTNESS = 1e-9
 """Compliance of the centre of pressure [-]: it may miss the one asked for by so many radii of gyration, times the slope
@@ -172,8 +172,7 @@ def tilt(x: Doubles, y: Doubles, w: Doubles, n: int, cx: float, cy: float, out: 
     for i in range(n):
         total += w[i]
     if not total > 0.0:
-        for i in range(n):
-            out[i] = w[i]
+        copy(w, out, n)
         return
     s = _scaled(x, y, w, n, total, cx, cy)
     plane = _plane(x, y, w, n, total, s)

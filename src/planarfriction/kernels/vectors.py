@@ -240,6 +240,20 @@ def put_all(row: Doubles, numbers: Vector) -> None:
 
 
 @kernel
+def copy(source: Any, target: Any, count: int) -> None:
+    """Write the first numbers of one row to another."""
+    for i in range(count):
+        target[i] = source[i]
+
+
+@kernel
+def clear(target: Any, count: int) -> None:
+    """Write zeros to the first numbers of a row."""
+    for i in range(count):
+        target[i] = 0.0
+
+
+@kernel
 def applied_back(m: Any, a: Any) -> Vector:
     """Return `M' a`."""
     return (

@@ -30,7 +30,4 @@ register = LAWS.register
 
 # it brings the compiler with it, which laws of numbers do not need
 __getattr__, _, _ = lazy_loader.attach(__name__, submod_attrs={"rate_law": ["RateLaw"]})
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__dir__ = __all__.copy

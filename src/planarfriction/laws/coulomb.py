@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.described import described
 from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 
 
-@described
 @dataclass(frozen=True)
 class Coulomb(Checked):
     """Coulomb friction: the wrench lies on the limit surface scaled by `mu f_N`.

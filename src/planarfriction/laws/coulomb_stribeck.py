@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from planarfriction import validation
-from planarfriction.described import described
 from planarfriction.equality import checked
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws.base import FrictionLaw
 
 
-@described
 @dataclass(frozen=True)
 class CoulombStribeck(FrictionLaw):
     """Coulomb friction with Stribeck and viscous terms, regularised by a creep speed.

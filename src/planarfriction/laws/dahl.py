@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from planarfriction import validation
-from planarfriction.described import described
 from planarfriction.equality import checked
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws.base import FrictionLaw
@@ -14,7 +13,6 @@ _SPEED = 1e-3
 """Speed [m/s] that solvers measure errors against; Dahl friction does not depend on the speed."""
 
 
-@described
 @dataclass(frozen=True)
 class Dahl(FrictionLaw):
     """Dahl friction per unit normal load: LuGre without Stribeck effect, damping and viscous friction.

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from planarfriction import validation
-from planarfriction.described import described
 from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
@@ -22,7 +21,6 @@ def _below_one(name: str, value: Any) -> float:
     return value
 
 
-@described
 @dataclass(frozen=True)
 class ElastoPlastic(Checked):
     """Elasto-plastic bristles: purely elastic below breakaway, so that a sticking contact does not creep.
@@ -48,7 +46,6 @@ def _elasto_plastic(name: str, value: Any) -> ElastoPlastic:
     return ElastoPlastic(_below_one(name, value))
 
 
-@described
 @dataclass(frozen=True)
 class LuGre(FrictionLaw):
     """LuGre friction per unit normal load, with Stribeck and viscous terms.

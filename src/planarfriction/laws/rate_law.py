@@ -149,10 +149,9 @@ class RateLaw(FrictionLaw):
         names = [each.name for each in dataclasses.fields(cls)]  # pyright: ignore[reportArgumentType]
         names += [name for name in _COMMON if name not in names]
         record = NamedTuple(f"{cls.__name__}Numbers", [(name, float) for name in names])  # pyright: ignore
-        bristle = rate_law.bristle_of(cls.bristle_rate, cls.bristle_traction)
-        kind = "" if lever is cells.POSITIONS else "_turned"
         mark = rate_law.fingerprint(names, cls.bristle_rate, cls.bristle_traction)
-        return rate_law.cell_functions(f"{cls.__name__}_{mark}{kind}", record, bristle, lever)
+        name = f"{cls.__name__}_{mark}{'' if lever is cells.POSITIONS else '_turned'}"
+        return rate_law.cell_functions(rate_law.element_of(name, cls.bristle_rate, cls.bristle_traction), record, lever)
 
     def contact(self, lever: cells.Lever, numbers: np.ndarray, weights: np.ndarray) -> Any:
         """Return the record of a contact of n cells with these `numbers` and `weights` `[n]`, which compiled code

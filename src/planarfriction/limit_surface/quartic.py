@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.errors import FrictionError, InvalidValueError, MissingExtraError
+from planarfriction.errors import FrictionError, InvalidValueError, needing
 from planarfriction.geometry import transformed
 from planarfriction.limit_surface.base import LimitSurface, _rows, scaling
 from planarfriction.limit_surface.cells import LimitSurfaceCells
@@ -121,10 +121,8 @@ def _solve(problem: Any) -> None:
 
 
 def _cvxpy() -> Any:
-    try:
+    with needing("cvxpy", "quartic"):
         import cvxpy
-    except ImportError:
-        raise MissingExtraError("cvxpy", "quartic") from None
     return cvxpy
 
 

@@ -12,7 +12,7 @@ from planarfriction.compiled.distributed import CompiledDistributed
 from planarfriction.compiled.rate_cells import CompiledRateCells
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LIGHTEST
-from planarfriction.laws.base import is_rate_law, refuse_creep, refuse_fixed_stiffness, refuse_rate_law
+from planarfriction.laws.base import is_rate_law, refuse_creep, refuse_rate_law
 from planarfriction.models.base import FrictionModel, ModelJacobians
 
 
@@ -33,8 +33,8 @@ class DistributedModel(FrictionModel):
     A law with a `reference_load` (`LuGre`, `Dahl`) has a stiffness that does not grow with the load; a bristle that a
     falling load has left beyond its limit slips back onto it (see docs/physics.md, "Stiffness and load").
 
-    Raises InvalidValueError for what is not a patch or a law, for a law that creeps or has a `reference_load` on a
-    patch with an asymmetry, and for one with a `reference_load` on a patch whose shape depends on the load.
+    Raises InvalidValueError for what is not a patch or a law, for a law that creeps on a patch with an asymmetry, and
+    for one with a `reference_load` on a patch whose shape depends on the load.
 
     Source: Waltersson and Karayiannidis 2024, section III.
     """
@@ -46,7 +46,6 @@ class DistributedModel(FrictionModel):
         if self.patch.asymmetric:
             refuse_creep(self.law, "patches with an asymmetry")  # at rest they would push
             refuse_rate_law(self.law, "patches with an asymmetry")
-            refuse_fixed_stiffness(self.law, "patches with an asymmetry")
         if self.law.reference_load is not None and self.patch.depends_on_load:
             rule = "have a shape that does not depend on the load, for a law with a reference_load"
             raise InvalidValueError("patch", rule, self.patch.name or "one that does")

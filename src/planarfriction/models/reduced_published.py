@@ -10,7 +10,6 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.compiled.published import CompiledPublished
-from planarfriction.compiled.remembered import Remembered
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.published_contact import slopes_in
@@ -102,16 +101,19 @@ class PublishedShapes:
     """Shapes of a patch at any load, updated as `on_load_change` says (see `ReducedModelPublished`)."""
 
     def __init__(self, surface: LimitSurface, patch: ContactPatch, on_load_change: str) -> None:
-        self._surface, self._patch = surface, patch
+        self._arguments = self._surface, self._patch, _ = surface, patch, on_load_change
         self.depends_on_load = patch.depends_on_load and on_load_change != "keep"
         self._rescales = on_load_change == "rescale"
-        self._recent: Remembered[PublishedShape] = Remembered(REMEMBERED)
+        self._recent = functools.lru_cache(REMEMBERED)(self._built)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return PublishedShapes, self._arguments  # threads share recent shapes, copies of a model do not
 
     def shape_at(self, load: float | None) -> PublishedShape:
         """Return the shape at a load > 0 [N]; recent loads are cached. None: any load, if it does not change it."""
         if load is None or not self.depends_on_load:
             return self.reference
-        return self._recent.get(load, lambda: self._built(load))
+        return self._recent(load)
 
     @functools.cached_property
     def reference(self) -> PublishedShape:

@@ -5,7 +5,4 @@ from planarfriction.online.observer import Estimate, FrictionObserver
 from planarfriction.online.sensors import Measurement, Sensors
 
 __all__ = ["Estimate", "FrictionObserver", "Hinge", "Hold", "Measurement", "Sensors", "SlideBy", "TurnBy"]
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__dir__ = __all__.copy

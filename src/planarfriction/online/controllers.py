@@ -96,8 +96,9 @@ class Slip(GripController):
     While the part slips, a grip f accelerates it by `A (1 - f/f_b)`, A that of its load alone and `f_b` the grip that
     balances it. So `f = f_b (1 - a/A)`, `a = a_d + k_v (v_d - v) + k_x (x_d - x)`, with the place and the speed of the
     part when the grip acts. `f_b` is that of the first slip, then follows `f_b' = f_b k_i (v - v_c)`, `v_c = v_d + 2
-    (x_d - x)`. A part that has stuck is released slowly; at the goal, or where it sticks within `tolerance` of it, it
-    is caught: to release it there would move it by more.
+    (x_d - x)`. A part that has stuck is released slowly. Near the goal it is caught; where it sticks there, or after
+    `duration`, short dips of the grip let it slip on until it is within `tolerance`: a part whose static friction is
+    larger would move by millimetres before late samples show it. The next dip is deeper if it moved too little.
     """
 
     axis: int

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.described import described
 from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 
@@ -38,7 +37,6 @@ FARTHEST = 2.0**62
 """Largest row or column in size: an integer of NumPy still."""
 
 
-@described
 @dataclass(frozen=True)
 class Grid(Checked):
     """A regular grid of boxes in the contact frame: x to the right, y up, **row 0 is the top row** (largest y).

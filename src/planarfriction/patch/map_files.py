@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.described import described
 from planarfriction.equality import Checked, checked
 from planarfriction.errors import FileError, FrictionError, InvalidValueError, shown
 from planarfriction.patch.grid import MOST_CELLS
@@ -43,7 +42,6 @@ FEWEST_LABELS = 3
 """Number of consecutive integers from which a row or column may be labels in place of pressures."""
 
 
-@described
 @dataclass(frozen=True)
 class MapReading(Checked):
     """Options with which a pressure map is read, from a file or, where they apply, from an array.

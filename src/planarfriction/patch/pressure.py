@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import formulas, validation
-from planarfriction.described import described
 from planarfriction.equality import ByValue, Checked, checked
 from planarfriction.errors import InvalidValueError, shown
 from planarfriction.families import PRESSURES
@@ -82,7 +81,6 @@ class Uniform(Pressure):
         return np.ones(len(positions))
 
 
-@described
 @dataclass(frozen=True)
 class LinearGradient(Pressure):
     """Pressure that changes linearly over the patch: `p ~ 1 + gx x + gy y`.
@@ -104,7 +102,6 @@ class LinearGradient(Pressure):
         return 1.0 + gx * positions[:, 0] + gy * positions[:, 1]
 
 
-@described
 @dataclass(frozen=True, kw_only=True)
 class SoftFinger(Pressure):
     """Soft fingertip whose contact grows with the load: `p(s) ~ (1 - (s/R)^k)^(1/k)`, `R = min(c f_N^n, radius_max)`.

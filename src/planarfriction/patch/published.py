@@ -110,18 +110,8 @@ def published(name: str, cells: Any = None, width: Any = None) -> ContactPatch:
 
 
 def cells(
-    positions: Any,
-    areas: Any,
-    pressure: Any = None,
-    grid: Any = None,
-    cell_size: Any = None,
-    outline: Any = None,
-    name: Any = None,
-    point_shares: Any = None,
-    radii: Any = None,
-) -> ContactPatch:
+    positions: Any, areas: Any, pressure: Any = None, grid: Any = None, cell_size: Any = None, outline: Any = None,
+    name: Any = None, point_shares: Any = None, radii: Any = None,
+) -> ContactPatch:  # fmt: skip
     """Return the patch that `ContactPatch.to_dict` described."""
-    given = {"positions": positions, "areas": areas, "pressure": pressure, "grid": grid}
-    given |= {"cell_size": cell_size, "outline": outline, "name": name}
-    given |= {"point_shares": point_shares, "radii": radii}
-    return ContactPatch.from_dict({key: value for key, value in given.items() if value is not None})
+    return ContactPatch.from_dict({key: value for key, value in locals().items() if value is not None})

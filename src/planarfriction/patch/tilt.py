@@ -45,11 +45,8 @@ def weights_under(patch: Any, normal_force: Any, moments: Any) -> np.ndarray:
     if normal_force is None:
         raise InvalidValueError("normal_force", "be given with moments: they are of its size", "None")
     load, moments = validation.non_negative_numbers("normal_force", normal_force), moments_of(moments)
-    try:
-        batch = np.broadcast_shapes(load.shape, moments.shape[:-1])
-    except ValueError:
-        shapes = f"shapes {list(load.shape)}, {list(moments.shape)}"
-        raise InvalidValueError("moments", "broadcast with normal_force", shapes) from None
+    shapes = load.shape, moments.shape[:-1]
+    batch = validation.common_shape("moments", shapes, "broadcast with normal_force")
     if math.prod(batch) * patch.cells > validation.MOST_NUMBERS:
         rule = f"be at most {validation.MOST_NUMBERS // patch.cells} pairs for {patch.cells} cells"
         raise InvalidValueError("moments", rule, math.prod(batch))

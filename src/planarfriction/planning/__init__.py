@@ -23,7 +23,4 @@ __all__ = [
     "plan_push",
     "push",
 ]
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__dir__ = __all__.copy

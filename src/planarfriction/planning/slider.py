@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.described import described
 from planarfriction.equality import ByValue, Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.limit_surface import LimitSurface
@@ -71,7 +70,6 @@ class Slider(ByValue):
         return np.einsum("mi,mi->m", self.outline - validation.vector("point", point, 2), self.inward)
 
 
-@described
 @dataclass(frozen=True)
 class Pusher(Checked):
     """The pusher: a point, or a flat face that faces along its own x axis.

@@ -20,7 +20,4 @@ __all__ = [
     "plot_patch",
     "plot_solution",
 ]
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__dir__ = __all__.copy

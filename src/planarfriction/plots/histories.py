@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from matplotlib import rcParams
+from matplotlib.font_manager import FontProperties
 
 import planarfriction as pf
 from planarfriction import validation
@@ -26,24 +28,37 @@ NAMED = 6
 """Runs that the legend names where there are more than colours."""
 
 LONGEST, LETTER, HANDLE = 60, 6.6, 48.0
-"""Letters in a line of the legend; width of a letter, and of a line with its gaps [pt]."""
-
-# Panels of the body and of the contacts: title, kind of unit, and how to get the values from the dataset.
-_BODY = (
-    ("x", "length", lambda data: data["x"]),
-    ("y", "length", lambda data: data["y"]),
-    ("θ", "angle", lambda data: data["theta"]),
-    ("speed", "speed", lambda data: np.hypot(data["vx"], data["vy"])),
-)
-_CONTACT = (
-    ("fx", "force", lambda data: data["fx"]),
-    ("fy", "force", lambda data: data["fy"]),
-    ("τ", "torque", lambda data: data["tau"]),
-    ("normal force", "force", lambda data: data["normal_force"]),
-)
+"""Letters in a line of the legend; width of a letter of 10 pt, and of a line with its gaps [pt]."""
 
 
-def plot_histories(solutions: pf.Solution | Mapping[str, pf.Solution]) -> style.PlotFigure:
+class _Panel(NamedTuple):
+    title: str
+    kind: str
+    """Kind of unit."""
+    of_contacts: bool
+    get: Callable
+    """Values from the dataset of a solution."""
+
+
+_PANELS = {
+    "x": _Panel("x", "length", False, lambda data: data["x"]),
+    "y": _Panel("y", "length", False, lambda data: data["y"]),
+    "theta": _Panel("θ", "angle", False, lambda data: data["theta"]),
+    "speed": _Panel("speed", "speed", False, lambda data: np.hypot(data["vx"], data["vy"])),
+    "fx": _Panel("fx", "force", True, lambda data: data["fx"]),
+    "fy": _Panel("fy", "force", True, lambda data: data["fy"]),
+    "tau": _Panel("τ", "torque", True, lambda data: data["tau"]),
+    "normal_force": _Panel("normal force", "force", True, lambda data: data["normal_force"]),
+}
+
+
+def plot_histories(
+    solutions: pf.Solution | Mapping[str, pf.Solution],
+    *,
+    panels: Sequence[str] | None = None,
+    size: Any = None,
+    axes: Any = None,
+) -> style.PlotFigure:
     """Plot position, angle, speed, forces, torque and normal force against time.
 
     `solutions` is one solution or a mapping from label to solution; several are overlaid. Colours distinguish the runs,
@@ -51,31 +66,67 @@ def plot_histories(solutions: pf.Solution | Mapping[str, pf.Solution]) -> style.
     first to the last, and the legend names some. Left the body (world axes, centre of mass), right the contacts: the
     friction wrench on the body about the origin of the contact frame, and the normal force.
 
-    Raises InvalidValueError for what is not a solution.
+    `panels` chooses among "x", "y", "theta", "speed", "fx", "fy", "tau" and "normal_force", drawn one below the other.
+    `size` is the width and the height of the figure [inch]; `axes` are axes to draw into, one for each of `panels`,
+    instead of a new figure, without a legend of their own.
+
+    Raises InvalidValueError for what is not a solution, and for unknown panels, a wrong size or wrong axes.
     """
-    figure = style.new_figure(9.6, 8.0)
-    draw_histories(figure, solutions)
+    known = as_runs(solutions)
+    if axes is not None:
+        drawn = list(np.ravel(np.asarray(axes, dtype=object)))
+        for each in drawn:
+            style.check_axes("axes", each, size)
+        chosen = validation.choices("panels", [*_PANELS] if panels is None else panels, _PANELS)
+        if len(drawn) != len(chosen):
+            raise InvalidValueError("axes", f"be one for each of {len(chosen)} panels", f"{len(drawn)}")
+        _draw_panels(drawn, chosen, known)
+        return drawn[0].figure
+    if panels is None:
+        figure = style.new_figure(9.6, 8.0, size)
+        draw_histories(figure, known)
+        return figure
+    chosen = validation.choices("panels", panels, _PANELS)
+    figure = style.new_figure(5.6, 1.0 + 1.8 * len(chosen), size)
+    column = list(figure.subplots(len(chosen), sharex=True, squeeze=False)[:, 0])
+    _draw_panels(column, chosen, known)
+    _finish(figure, column, chosen, known)
     return figure
 
 
 def draw_histories(figure: Any, solutions: pf.Solution | Mapping[str, pf.Solution]) -> None:
     """Draw the eight panels of `plot_histories` into a figure or subfigure."""
-    known = as_runs(solutions)
-    runs = {label: each.data for label, each in known.items()}
-    colours = _colours(list(known.values()))
-    clock = unit_for("time", *(data["time"] for data in runs.values()))
-    panels = figure.subplots(4, 2, sharex=True)
-    for column, quantities in enumerate((_BODY, _CONTACT)):
-        lines = [_lines(runs, get) for *_, get in quantities]
-        for row, (title, kind, _) in enumerate(quantities):
-            alike = [line.shown for other, each in enumerate(lines) if quantities[other][1] == kind for line in each]
-            _draw_panel(panels[row, column], title, kind, lines[row], alike, clock, colours)
-    for axes in panels[-1]:
-        axes.set_xlabel(f"time [{clock.label}]")
+    known, panels = as_runs(solutions), figure.subplots(4, 2, sharex=True)
+    axes, chosen = list(panels.T.ravel()), list(_PANELS)
+    _draw_panels(axes, chosen, known)
+    for each in panels[:-1].ravel():
+        each.set_xlabel("")
     panels[0, 0].set_title("body: position, angle, speed", fontsize="medium")
     panels[0, 1].set_title("contacts: friction on the body, normal force", fontsize="medium")
-    figure.align_ylabels(panels)
-    _legend(figure, panels[0, 1], runs)
+    _finish(figure, axes, chosen, known)
+
+
+def _draw_panels(axes: Sequence[Any], chosen: Sequence[str], known: Mapping[str, pf.Solution]) -> None:
+    """Draw each of the chosen panels into its axes; panels of the same kind and side share a unit."""
+    runs = {label: each.data for label, each in known.items()}
+    colours, panels = _colours(list(known.values())), [_PANELS[name] for name in chosen]
+    clock = unit_for("time", *(data["time"] for data in runs.values()))
+    lines = [_lines(runs, panel.get) for panel in panels]
+    for place, panel, own in zip(axes, panels, lines, strict=True):
+        sides = zip(panels, lines, strict=True)
+        alike = [line.shown for other, each in sides if (other.kind, other.of_contacts) == panel[1:3] for line in each]
+        _draw_panel(place, panel.title, panel.kind, own, alike, clock, colours)
+        place.set_xlabel(f"time [{clock.label}]")
+
+
+def _finish(figure: Any, axes: Sequence[Any], chosen: Sequence[str], known: Mapping[str, pf.Solution]) -> None:
+    """Align labels, keep those of time in the last row, and add a legend."""
+    figure.align_ylabels(axes)
+    for above in axes[:-1] if len(chosen) < len(_PANELS) else ():
+        above.set_xlabel("")
+    named = next((each for each, name in zip(axes, chosen, strict=True) if _PANELS[name].of_contacts), None)
+    runs = {label: each.data if named else each.data.isel(contact=[0]) for label, each in known.items()}
+    _legend(figure, named or axes[0], runs)
 
 
 def as_runs(solutions: pf.Solution | Mapping[str, pf.Solution]) -> dict[str, pf.Solution]:
@@ -147,7 +198,7 @@ def _look(run: int, contact: int, colours: list[Any]) -> dict[str, Any]:
     # Later runs are drawn dashed over the earlier ones, so that curves that coincide are both seen.
     many = len(colours) > len(style.PALETTE)
     line_style = style.LINE_STYLES[(contact if many else run + contact) % len(style.LINE_STYLES)]
-    return {"color": colours[run], "linestyle": line_style, "linewidth": 0.9 if many else 1.4}
+    return {"color": colours[run], "linestyle": line_style, **({"linewidth": 0.9} if many else {})}
 
 
 def _legend(figure: Any, axes: Any, runs: dict[str, xr.Dataset]) -> None:
@@ -170,7 +221,8 @@ def _legend(figure: Any, axes: Any, runs: dict[str, xr.Dataset]) -> None:
         return
     entries = [(line, style.wrapped(words, LONGEST)) for line, words in entries]
     longest = max(len(line) for _, words in entries for line in words.splitlines())
-    room = int(72.0 * figure.bbox.width / figure.dpi / (LETTER * longest + HANDLE))
+    size = FontProperties(size=rcParams["legend.fontsize"]).get_size_in_points() / 10.0
+    room = int(72.0 * figure.bbox.width / figure.dpi / (LETTER * longest + HANDLE) / size)
     ncols = max(1, min(4, room, len(entries) if columns == 1 else columns))
     figure.legend(
         *zip(*entries, strict=True), loc="outside upper center", ncols=ncols, frameon=False, title=title,

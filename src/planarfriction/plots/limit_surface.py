@@ -9,7 +9,7 @@ from matplotlib import colormaps
 
 import planarfriction as pf
 from planarfriction import geometry, validation
-from planarfriction.errors import MissingExtraError
+from planarfriction.errors import InvalidValueError, needing
 from planarfriction.families import SURFACES
 from planarfriction.plots import style
 
@@ -41,20 +41,29 @@ def sample_limit_surface(surface: Any, polar: np.ndarray, azimuth: np.ndarray) -
     return twists, surface.wrench(twists)
 
 
-def plot_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> style.PlotFigure:
+def plot_limit_surface(
+    surface: Any, *, beside: Any = "ellipsoid", size: Any = None, ax: Any = None
+) -> style.PlotFigure:
     """Draw the limit surface (fx, fy, tau/r) for mu f_N = 1 about the centre of pressure, next to another one.
 
     `surface` is any limit surface; `beside` another one, "ellipsoid" for that of the same patch, or None to draw
     `surface` alone. Both panels have the same limits and colours, for the height tau/r. All axes are dimensionless.
+    `size` is the width and the height of the figure [inch]; `ax` are axes of three dimensions (`projection="3d"`) to
+    draw `surface` alone into.
 
-    Raises InvalidValueError unless both are limit surfaces.
+    Raises InvalidValueError unless both are limit surfaces, and for a wrong size or axes.
     """
+    if ax is not None:
+        style.check_axes("ax", ax, size)
+        if not hasattr(ax, "plot_surface"):
+            raise InvalidValueError("ax", 'have three dimensions (projection="3d")', ax)
+        beside = None
     names, scaled, limit = _sampled(surface, beside)
-    figure = style.new_figure(4.4 * len(names), 4.3)
+    figure = ax.figure if ax is not None else style.new_figure(4.4 * len(names), 4.3, size)
     for column, (name, (directions, mesh)) in enumerate(zip(names, scaled, strict=True)):
-        axes = figure.add_subplot(1, len(names), column + 1, projection="3d")
+        axes = ax if ax is not None else figure.add_subplot(1, len(names), column + 1, projection="3d")
         draw_surface(axes, mesh, directions, limit)
-        axes.set_title(name, fontsize="medium")
+        axes.set_title(style.wrapped(name, 30), fontsize="medium")
     return figure
 
 
@@ -67,11 +76,9 @@ def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any
     Raises MissingExtraError without plotly, the extra `[plotly]`, and InvalidValueError unless both are limit surfaces.
     """
     names, scaled, limit = _sampled(surface, beside)
-    try:
+    with needing("plotly", "plotly"):
         from plotly import graph_objects as go
         from plotly.subplots import make_subplots
-    except ImportError:
-        raise MissingExtraError("plotly", "plotly") from None
     figure = make_subplots(cols=len(names), specs=[[{"type": "scene"}] * len(names)], subplot_titles=names)
     for column, (directions, mesh) in enumerate(scaled):
         points = dict(zip("xyz", np.moveaxis(mesh, -1, 0), strict=True))
@@ -151,10 +158,12 @@ def draw_surface(axes: Any, mesh: np.ndarray, directions: np.ndarray, limit: flo
     drawn = axes.plot_surface(
         *np.moveaxis(mesh, -1, 0), rstride=1, cstride=1, facecolors=colours, linewidth=0, antialiased=False, shade=False
     )
-    ticks = [-1.0, -0.5, 0.0, 0.5, 1.0]
+    narrow = style.axes_width(axes) < 0.5 * style.NARROW
+    ticks = [-1.0, 0.0, 1.0] if narrow else [-1.0, -0.5, 0.0, 0.5, 1.0]
     for name, label in (("x", "$f_x$"), ("y", "$f_y$"), ("z", "$\\tau/r$")):
         axes.set(**{f"{name}lim": (-limit, limit), f"{name}ticks": ticks, f"{name}label": f"{label} [-]"})
-    axes.tick_params(labelsize="small")
-    axes.set_box_aspect((1.0, 1.0, 1.0), zoom=0.9)
+        getattr(axes, f"{name}axis").labelpad = -6.0 if narrow else 4.0
+    axes.tick_params(labelsize="x-small" if narrow else "small", **({"pad": 0} if narrow else {}))
+    axes.set_box_aspect((1.0, 1.0, 1.0), zoom=0.75 if narrow else 0.9)
     axes.view_init(elev=22, azim=-55)
     return drawn

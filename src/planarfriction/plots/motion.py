@@ -36,30 +36,33 @@ ROUND, CORNERS = 0.02, 12
 """Share by which the radii of a round outline differ at most [-]; corners that it has at least."""
 
 
-def plot_motion(solution: pf.Solution) -> style.PlotFigure:
+def plot_motion(solution: pf.Solution, *, size: Any = None, ax: Any = None) -> style.PlotFigure:
     """Draw the outline of the body and the patches at 12 instants, evenly spaced in time and coloured by time.
 
     World axes, equal scales. Patches fixed to the world are drawn once; patches on the body, and pads that are driven,
     at each instant. A body without an outline is drawn as the rim of its patches, with a line from its centre of mass
     along its x axis. The thin line is the path of the centre of mass. A body that is tiny beside its path is drawn
-    larger, and the title says so, as it does where the body hardly moves.
+    larger, and the title says so, as it does where the body hardly moves. `size` is the width and the height of the
+    figure [inch]; `ax` are axes to draw into instead of a new figure.
 
-    Raises InvalidValueError for what is not a solution of a scene.
+    Raises InvalidValueError for what is not a solution of a scene, and for a wrong size or axes.
     """
     strobe = _strobe(solution)
     width, height = np.diff(strobe.limits, axis=-1)[:, 0]
-    figure = style.new_figure(6.4, float(np.clip(1.0 + 4.6 * height / width, 2.6, 5.6)))
-    _draw(figure, strobe)
+    figure, axes = style.place(ax, 6.4, float(np.clip(1.0 + 4.6 * height / width, 2.6, 5.6)), size)
+    _draw(axes, strobe)
     figure.draw_without_rendering()  # the aspect sets the ticks, which the layout has to know
     return figure
 
 
-def plot_solution(solution: pf.Solution) -> style.PlotFigure:
+def plot_solution(solution: pf.Solution, *, size: Any = None) -> style.PlotFigure:
     """Draw the motion of the body (left) and the time histories of body and contacts (right).
 
-    Raises InvalidValueError for what is not a solution of a scene.
+    `size` is the width and the height of the figure [inch].
+
+    Raises InvalidValueError for what is not a solution of a scene, and for a wrong size.
     """
-    figure = style.new_figure(14.0, 6.8)
+    figure = style.new_figure(14.0, 6.8, size)
     parts: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.45))
     motion, histories = parts
     draw_motion(motion, solution)
@@ -70,7 +73,7 @@ def plot_solution(solution: pf.Solution) -> style.PlotFigure:
 
 def draw_motion(figure: Any, solution: pf.Solution) -> None:
     """Draw `plot_motion` into a figure or subfigure."""
-    _draw(figure, _strobe(solution))
+    _draw(figure.subplots(), _strobe(solution))
 
 
 class _Strobe(NamedTuple):
@@ -101,9 +104,9 @@ def _strobe(solution: pf.Solution) -> _Strobe:
     return _Strobe(solution, time[chosen], poses[chosen], poses, larger, limits)
 
 
-def _draw(figure: Any, strobe: _Strobe) -> None:
+def _draw(axes: Any, strobe: _Strobe) -> None:
     solution, times = strobe.solution, strobe.times
-    axes, pads = figure.subplots(), [each for each in solution.scene.contacts if each.mounted_on == "world"]
+    pads = [each for each in solution.scene.contacts if each.mounted_on == "world"]
     scale = Normalize(times[0], times[-1] if times[-1] > times[0] else times[0] + 1.0)
     for time, pose in zip(times, strobe.poses, strict=True):
         colour = style.TIME_COLOURS(scale(time))
@@ -117,7 +120,7 @@ def _draw(figure: Any, strobe: _Strobe) -> None:
     for contact in (each for each in pads if each.support_velocity is None):
         _draw_shape(axes, _on_mount(contact), style.PAD_COLOUR)
     style.show_lengths(axes, 1e-3 * float(np.abs(strobe.limits).max()))
-    axes.locator_params(nbins=7)
+    axes.locator_params(nbins=style.ticks(axes, 7))
     axes.update_datalim(strobe.limits.T)
     axes.margins(0.0)
     axes.set_aspect("equal", adjustable="datalim")  # narrow motions fill the panel too

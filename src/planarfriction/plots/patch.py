@@ -22,22 +22,25 @@ NARROWEST = 0.3
 _CORNERS = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
 
-def plot_patch(patch: pf.ContactPatch, *, normal_force: float | None = None) -> style.PlotFigure:
+def plot_patch(
+    patch: pf.ContactPatch, *, normal_force: float | None = None, size: Any = None, ax: Any = None
+) -> style.PlotFigure:
     """Draw the pressure on a patch, and its centre of pressure.
 
     Cells of a grid are drawn with their true area at their true centroid and coloured by their pressure; a
     patch without a grid is drawn as points, or as its discs, coloured by the force on them, `w f_N`. Without
-    `normal_force` [N] the colours show both per newton of load. Lengths in mm.
+    `normal_force` [N] the colours show both per newton of load. Lengths in mm. `size` is the width and the height of
+    the figure [inch]; `ax` are axes to draw into instead of a new figure, without a legend.
 
-    Raises InvalidValueError unless `patch` is a patch, for a load below zero, and without a load that is needed.
+    Raises InvalidValueError unless `patch` is a patch, for a load below zero, without a load that is needed, and for a
+    wrong size or axes.
     """
 
     validation.instance("patch", patch, pf.ContactPatch, "a ContactPatch")
     load = 1.0 if normal_force is None else validation.non_negative("normal_force", normal_force)
     weights = patch.weights(normal_force)
     centre = 1e3 * patch.centre_of_pressure(normal_force)
-    figure = style.new_figure(5.6, _height(patch))
-    axes = figure.add_subplot()
+    figure, axes = style.place(ax, 5.6, _height(patch), size)
     if patch.grid is None:
         drawn, label = _draw_points(axes, patch, weights * load, normal_force)
     else:
@@ -52,10 +55,15 @@ def plot_patch(patch: pf.ContactPatch, *, normal_force: float | None = None) -> 
     limits = 1e-3 * np.array([axes.get_xlim(), axes.get_ylim()])
     sides = np.diff(limits, axis=-1)[:, 0]
     for axis, share in zip((axes.xaxis, axes.yaxis), sides / sides.max(), strict=True):
-        axis.set_major_locator(MaxNLocator(max(2, round(6.0 * share)), steps=[1, 2, 2.5, 5, 10]))
+        axis.set_major_locator(MaxNLocator(max(2, round(style.ticks(axes, 6) * share)), steps=[1, 2, 2.5, 5, 10]))
     style.show_lengths(axes, float(np.abs(limits).max()))
-    figure.suptitle(_title(patch, weights, normal_force), fontsize="medium")
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", frameon=False, fontsize="small")
+    if ax is not None:
+        axes.set_title(style.wrapped(patch.name, 24), fontsize="medium")
+    else:
+        narrow = figure.get_figwidth() < style.NARROW
+        title = _title(patch, weights, normal_force, 44 if narrow else 62)
+        figure.suptitle(title, fontsize="small" if narrow else "medium")
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", frameon=False, fontsize="small")
     style.tidy(axes)
     return figure
 
@@ -111,7 +119,7 @@ def _draw_points(axes, patch: pf.ContactPatch, force: np.ndarray, normal_force: 
     return points, f"{name} [{unit.label}]"
 
 
-def _title(patch: pf.ContactPatch, weights: np.ndarray, normal_force: float | None) -> str:
+def _title(patch: pf.ContactPatch, weights: np.ndarray, normal_force: float | None, width: int) -> str:
     loaded = int((weights > 0.0).sum())
     radius = unit_for("length", patch.contact_radius(normal_force))
     what = ("disc" if patch.has_discs else "point" if patch.grid is None else "cell") + "s" * (loaded != 1)
@@ -120,4 +128,4 @@ def _title(patch: pf.ContactPatch, weights: np.ndarray, normal_force: float | No
     if normal_force is not None:
         force = unit_for("force", normal_force)
         text += f", load {force.factor * normal_force:.6g} {force.label}"
-    return style.wrapped(text, 62)
+    return style.wrapped(text, width)

@@ -8,20 +8,23 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import colormaps
+from matplotlib import colormaps, rcParams
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.shown import unit_for
 
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Line colours that colour-blind readers tell apart (Okabe and Ito), the most distinct first."""
 
-DISTRIBUTED, PUBLISHED, ELLIPSOID, OTHER, SECOND, FEW, EXACT = PALETTE
+DISTRIBUTED, PUBLISHED, ELLIPSOID, OTHER, FEW, SECOND, EXACT = PALETTE
 """Colours in every figure: sums over cells and their model, the published table and its model, the ellipsoid and its
-model, something else, a second thing else, `ReducedModel` with few discs, what is exact."""
+model, something else, `ReducedModel` with few discs, a second thing else, what is exact."""
 
 MEASURED = "0.6"
 """Colour of what was measured, drawn as a broad line below the rest."""
@@ -41,6 +44,9 @@ TIME_COLOURS = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.92, 256)),
 PAD_COLOUR = "#D55E00"
 """Colour of contact patches in the plane."""
 
+
+NARROW = 4.5
+"""Width [inch] below which a figure, or axes and their share of it, have small titles and few ticks."""
 
 WITHOUT_WINDOW = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
 """Backends of matplotlib that draw to files alone."""
@@ -76,9 +82,49 @@ class PlotFigure(Figure):
         return buffer.getvalue()
 
 
-def new_figure(width: float, height: float) -> PlotFigure:
-    """Return an empty figure of `width` x `height` inches with constrained layout, 120 dots per inch."""
+def new_figure(width: float, height: float, size: Any = None) -> PlotFigure:
+    """Return an empty figure of `width` x `height` inches, or of a `size` that a user asks for, 120 dots per inch.
+
+    Letters larger than 10 pt, as on slides, enlarge the figure unless it has a `size`.
+
+    Raises InvalidValueError unless `size` is two numbers > 0.
+    """
+    if size is None:
+        width, height = (max(1.0, rcParams["font.size"] / 10.0) * each for each in (width, height))
+    else:
+        width, height = validation.positive_array("size", size, (2,))
     return PlotFigure(figsize=(width, height), layout="constrained", dpi=120)
+
+
+def place(ax: Any, width: float, height: float, size: Any) -> tuple[Any, Any]:
+    """Return a new figure with its axes, or the `ax` of a user with its figure.
+
+    Raises InvalidValueError for a wrong `size`, for both, and for what is no axes.
+    """
+    if ax is None:
+        figure = new_figure(width, height, size)
+        return figure, figure.add_subplot()
+    check_axes("ax", ax, size)
+    return ax.figure, ax
+
+
+def check_axes(name: str, ax: Any, size: Any) -> None:
+    """Raise InvalidValueError unless `ax` are axes of matplotlib, whose figure has its size already."""
+    if not isinstance(ax, Axes):
+        raise InvalidValueError(name, "be axes of matplotlib", ax)
+    if size is not None:
+        raise InvalidValueError("size", f"be left out with {name}: the figure has a size", size)
+
+
+def axes_width(axes: Any) -> float:
+    """Return the width of axes [inch]."""
+    return axes.get_position().width * axes.figure.bbox.width / axes.figure.dpi
+
+
+def ticks(axes: Any, most: int) -> int:
+    """Return the number of ticks of an axis: `most`, or fewer where axes are narrow."""
+    width = axes_width(axes)
+    return most if width > 0.75 * NARROW else max(2, round(most * width / NARROW))
 
 
 def model_colour(model: Any) -> str | None:

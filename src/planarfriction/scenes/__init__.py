@@ -48,7 +48,4 @@ register = SCENES.register
 
 # it brings the compiled solver with it
 __getattr__, _, _ = lazy_loader.attach(__name__, submod_attrs={"simulation": ["simulate"]})
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__dir__ = __all__.copy

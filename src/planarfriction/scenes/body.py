@@ -50,7 +50,10 @@ class Body(ByValue):
     gravity: tuple[float, float] = checked(floats, 2, default=(0.0, -9.81))
     """Gravity in the plane of motion, world axes [m/s^2]."""
     outline: np.ndarray | None = checked(_polygon, default=None, repr=False)
-    """Polygon for drawings, in body axes with the centre of mass at the origin, shape `[M, 2]` [m], or None."""
+    """Polygon in body axes with the centre of mass at the origin, shape `[M, 2]` [m], or None.
+
+    It is for drawings, and for contacts with an `edge`.
+    """
 
     if TYPE_CHECKING:  # what is given may be more than what is kept
 

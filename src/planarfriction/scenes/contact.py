@@ -73,6 +73,12 @@ class Contact(ByValue):
     """
     height: float = 0.0
     """Height of the body's centre of mass above the contact [m], >= 0, where the pressure follows the load."""
+    edge: bool = False
+    """True if only cells on the body, within its `outline`, carry load, the others carry it for them.
+
+    A cell that lies on the edge carries by the part of its area that is on the body, at the centroid of this part. The
+    contact ends when none is. It is fixed to the world, and its model has bristles on cells.
+    """
 
     if TYPE_CHECKING:  # what is given may be more than what is kept
 
@@ -88,6 +94,7 @@ class Contact(ByValue):
             support_velocity: Signal | ArrayLike | None = None,
             pressure: Literal["fixed", "follows"] = "fixed",
             height: float = 0.0,
+            edge: bool = False,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -107,18 +114,26 @@ class Contact(ByValue):
         self._set(height=validation.non_negative(f"height {of_contact}", self.height))
         self._check_pressure(of_contact)
 
+        if validation.instance(f"edge {of_contact}", self.edge, bool, "True or False"):
+            self._check_cells(of_contact, "edge", "world", "False on the body: only a pad of the world leaves the body")
+
     def _check_pressure(self, of_contact: str) -> None:
         if self.pressure == "fixed":
             if self.height > 0.0:
                 raise InvalidValueError(f"height {of_contact}", "be 0 where the pressure is 'fixed'", self.height)
             return
+        rule = "'fixed' on the world: only a patch of the body follows its load"
+        self._check_cells(of_contact, "pressure", "body", rule)
+
+    def _check_cells(self, of_contact: str, name: str, mount: str, otherwise: str) -> None:
+        """Check that the contact is fixed to its mount, and that its model has bristles on cells."""
         from planarfriction.models import DistributedModel
 
-        if self.mounted_on != "body":
-            rule = "be 'fixed' on the world: only a patch of the body follows its load"
-            raise InvalidValueError(f"pressure {of_contact}", rule, self.pressure)
+        if self.mounted_on != mount:
+            raise InvalidValueError(f"{name} {of_contact}", f"be {otherwise}", getattr(self, name))
         if not isinstance(getattr(self.model, "reduction", None), DistributedModel):
-            rule = "have bristles on cells where the pressure follows (DistributedModel, ReducedModel)"
+            where = "the pressure follows" if name == "pressure" else "the body has an edge"
+            rule = f"have bristles on cells where {where} (DistributedModel, ReducedModel)"
             raise InvalidValueError(f"model {of_contact}", rule, self.model)
 
     @property

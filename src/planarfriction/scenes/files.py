@@ -40,8 +40,8 @@ _LONG_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*
 _OPTIONS = ("save_every", "stop_speed", "rtol", "atol", "name", "start")
 BODY_KEYS = ("mass", "inertia", "position", "angle", "velocity", "gravity", "outline", "size")
 CONTACT_KEYS = (
-    *("name", "mounted_on", "position", "angle", "count", "pressure", "height", "normal_force", "support_velocity"),
-    *("model", "patch", "law"),
+    *("name", "mounted_on", "position", "angle", "count", "pressure", "height", "edge"),
+    *("normal_force", "support_velocity", "model", "patch", "law"),
 )
 SPRING_KEYS = ("stiffness", "damping", "at", "torsion", "torsion_damping", "anchor")
 
@@ -84,9 +84,9 @@ def scene_to_dict(scene: Any, of_part: Callable[[Any], dict[str, Any]] = part_to
 
 
 def _keys_of(contact: Contact) -> tuple[str, ...]:
-    """Return the keys of a contact but for its model; those of a fixed pressure go without saying."""
-    keys = CONTACT_KEYS[:9]
-    return keys if contact.pressure == "follows" else tuple(each for each in keys if each not in ("pressure", "height"))
+    """Return the keys of a contact but for its model; a fixed pressure and no edge go without saying."""
+    left_out = ("pressure", "height") if contact.pressure == "fixed" else ()
+    return tuple(each for each in CONTACT_KEYS[:10] if each not in (*left_out, *([] if contact.edge else ["edge"])))
 
 
 def _plain(value: Any, of_part: Callable[[Any], dict[str, Any]]) -> Any:
@@ -150,7 +150,7 @@ def _contacts(scene: Section) -> list[Contact]:
     tables = _tables(scene, "contact")
     for number, table in enumerate(tables, 1):
         table.only(CONTACT_KEYS)
-        options = {key: table.get(key) for key in CONTACT_KEYS[:7] if key in table}
+        options = {key: table.get(key) for key in CONTACT_KEYS[:8] if key in table}
         if "name" not in table and len(tables) > 1:
             options["name"] = f"contact {number}"
         load, model = read_signal(table, "normal_force"), model_from_dict(table)

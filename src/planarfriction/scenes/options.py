@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.described import described
 from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.scenes.signal import MOST_SAMPLES, SAME_TIME, sample_count
@@ -35,7 +34,6 @@ class Plan(NamedTuple):
     """Largest number of steps."""
 
 
-@described
 @dataclass(frozen=True)
 class SolverOptions(Checked):
     """Options of the simulation of a scene; None takes those of the scene, or of the function that gets them.

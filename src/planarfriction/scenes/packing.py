@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planarfriction.compiled.edge import under_edge
 from planarfriction.compiled.following import STATES, following
 from planarfriction.compiled.packed import PackedModel
 from planarfriction.compiler.memory import places_of
@@ -34,10 +35,19 @@ MOST_PIECES = 10**12
 
 
 def packed_contact(
-    contact: Contact, loads: Sequence[float | None] | np.ndarray, between: tuple[float, float] | None = None
+    contact: Contact,
+    loads: Sequence[float | None] | np.ndarray,
+    between: tuple[float, float] | None = None,
+    outline: np.ndarray | None = None,
 ) -> PackedModel:
-    """Pack the model of a contact (see `FrictionModel.packed`), with a pressure that follows the load if it does."""
+    """Pack the model of a contact (see `FrictionModel.packed`), with a pressure that follows the load if it does.
+
+    `outline` is that of the body, for contacts with an edge.
+    """
     packed = contact.model.packed(loads, between)
+    if contact.edge:
+        refuse_fixed_stiffness(contact.model.law, "an edge")
+        return under_edge(contact.model.compiled, packed, outline)
     if contact.pressure == "fixed":
         return packed
     refuse_fixed_stiffness(contact.model.law, "a pressure that follows the load")
@@ -284,16 +294,17 @@ class SegmentBatches:
         """Pack the next pieces: addresses of records, which of them each contact has on each piece, the pieces."""
         pieces = np.arange(self._done, min(self._done + self._ahead, self._pieces.count))
         old = [model for model, between in zip(self.models, self._between, strict=False) if between is None]
-        rows, count, self.models = [], len(pieces), []
+        rows, count, self.models, outline = [], len(pieces), [], self._scene.body.outline
         for c, contact in enumerate(self._scene.contacts):
             between = self._between[c]
             if between is None:
-                self.models.append(old.pop(0) if old else packed_contact(contact, [None]))
+                self.models.append(old.pop(0) if old else packed_contact(contact, [None], None, outline))
                 rows.append(np.zeros(len(pieces), np.int64))
                 continue
             held = self._pieces.held(c, pieces[:count])
             loads, row = _in_order(np.where(held > 0.0, held, between[0]))  # any, where there is no load
-            self.models.append(packed_contact(contact, loads, between if self._most < MOST_PIECES else None))
+            between = between if self._most < MOST_PIECES else None
+            self.models.append(packed_contact(contact, loads, between, outline))
             rows.append(row)
             packed = len(self.models[c].records)
             count = count if packed == len(loads) else int(np.argmax(row == packed))

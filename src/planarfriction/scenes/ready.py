@@ -65,12 +65,14 @@ def in_hand(
     mass: float = 0.2,
     size: Sequence[float] = (0.15, 0.08),
     t_end: float = 2.0,
+    edge: bool = False,
 ) -> Scene:
     """Make the scene of a plate held upright between finger pads that slips and turns under gravity as the grip varies.
 
     The pads are fixed at the origin of the world and do not turn; the `fingers` share one state, each pressing with the
     full `normal_force` [N] (a signal or a number; default: `in_hand_load(1)`). `centre_of_mass` [m] is where the
-    centre of the plate of `size` (width, height) [m] and `mass` [kg] starts, at rest.
+    centre of the plate of `size` (width, height) [m] and `mass` [kg] starts, at rest. With `edge`, only the part of the
+    pads that is on the plate carries load; as published, the plate has no edge.
 
     Raises InvalidValueError for a parameter that breaks its rule.
 
@@ -79,7 +81,7 @@ def in_hand(
     inertia, centre = rectangle_inertia(mass, size), validation.vector("centre_of_mass", centre_of_mass, 2)
     body = Body(mass, inertia, centre, gravity=(0.0, -GRAVITY), outline=rectangle_outline(size))
     load = in_hand_load(1, t_end=t_end) if normal_force is None else normal_force
-    return Scene(body, [Contact(model, load, count=fingers, name="fingers")], t_end, name="in-hand")
+    return Scene(body, [Contact(model, load, count=fingers, name="fingers", edge=edge)], t_end, name="in-hand")
 
 
 def drift_force(load: Literal["tangential", "normal"], *, t_end: float = 5.0) -> Signal:

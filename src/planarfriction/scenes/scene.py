@@ -131,6 +131,9 @@ class Scene(ByValue):
             if contact.pressure == "follows" and len(self.contacts) > 1:
                 rule = "be 'fixed' beside other contacts, which share the load in a way that statics leaves open"
                 raise InvalidValueError(f"pressure of contact {contact.name!r}", rule, contact.pressure)
+            if contact.edge and (self.body.outline is None or self.velocity is not None):
+                rule = "be False unless the body moves freely and has an outline"
+                raise InvalidValueError(f"edge of contact {contact.name!r}", rule, True)
         sample_count(self.t_end, self.save_every, "save_every")
         validation.text("name", self.name)
         self._check_start()
@@ -144,6 +147,8 @@ class Scene(ByValue):
         moves = [name for name, velocity in driven.items() if any(velocity)]
         if self.start == "equilibrium" and any(contact.pressure == "follows" for contact in self.contacts):
             raise InvalidValueError("start", "be 'rest' or 'sliding' if the pressure follows the load", self.start)
+        if self.start == "equilibrium" and any(contact.edge for contact in self.contacts):
+            raise InvalidValueError("start", "be 'rest' or 'sliding' if a contact has an edge", self.start)
         if self.start == "equilibrium" and self.velocity is not None:
             raise InvalidValueError("start", "be 'rest' or 'sliding' if the velocity is prescribed", self.start)
         if self.start == "equilibrium" and moves:

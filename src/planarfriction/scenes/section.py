@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import difflib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -42,9 +41,10 @@ class Section:
     def only(self, keys: Iterable[str]) -> Section:
         """Return this table if it has no other keys than `keys`, or raise an error with the nearest valid name."""
         keys = list(keys)
+        valid = f" (valid: {', '.join(keys)})"
         for key in self.data:
             if key not in keys:
-                self.fail(f"unknown key {_shown(key)}{_hint(key, keys)}")
+                self.fail(f"unknown key {_shown(key)}{validation.hint(key, keys) or valid}")
         return self
 
     def get(self, key: str, default: Any = _REQUIRED) -> Any:
@@ -97,8 +97,3 @@ class Section:
 
 def _shown(value: Any) -> str:
     return shown(validation.quoted(value))
-
-
-def _hint(key: Any, valid: Sequence[str]) -> str:
-    near = difflib.get_close_matches(key[:200], valid, n=1) if isinstance(key, str) else []
-    return f" (did you mean {near[0]!r}?)" if near else f" (valid: {', '.join(valid)})"

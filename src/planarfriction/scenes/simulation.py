@@ -39,6 +39,7 @@ _QUANTITIES = {
     "normal_force": ("N", "normal force of one of the identical contacts"),
     "pressure_x": ("m", "centre of pressure along x of the contact frame"),
     "pressure_y": ("m", "centre of pressure along y of the contact frame"),
+    "ended": ("s", "time since which the contact is beyond the edge of the body; NaN while it touches"),
 }
 """Unit and description of what is recorded."""
 
@@ -112,7 +113,7 @@ def simulate(
     solution = Solution(_histories(scene, batches, run.output), cost, run.status, run.message, scene)
     if run.status == "interrupted":
         raise SimulationInterrupted(solution)
-    if run.status not in ("success", "at rest"):
+    if run.status not in ("success", "at rest", "left its contacts"):
         raise SolverError(f"at t = {run.output.time[-1]:g} s: {run.message}", solution)
     return solution
 
@@ -125,7 +126,8 @@ def _output(scene: Scene, times: np.ndarray, batches: SegmentBatches, bristles: 
     recorded = np.empty((count, states) if bristles == "all" else (0, 0))
     follows = sum(contact.pressure == "follows" for contact in scene.contacts)
     body, wrench, load = map(np.empty, ((count, 6), (count, contacts, 3), (count, contacts)))
-    return Output(times, body, wrench, load, recorded, np.empty((follows * count, 2)))
+    ended = np.full(contacts if any(contact.edge for contact in scene.contacts) else 0, np.nan)
+    return Output(times, body, wrench, load, recorded, np.empty((follows * count, 2)), ended)
 
 
 def _histories(scene: Scene, batches: SegmentBatches, output: Output) -> dict[str, History]:
@@ -145,6 +147,8 @@ def _histories(scene: Scene, batches: SegmentBatches, output: Output) -> dict[st
         centres = centres_of_pressure(scene.contacts[0], output.pressure, output.load[:, 0])
         for i, name in enumerate(("pressure_x", "pressure_y")):
             histories[name] = history(name, centres[:, i : i + 1])
+    if len(output.ended):
+        histories["ended"] = history("ended", output.ended)._replace(dims=("contact",))
     if len(output.bristles):
         for c, contact in enumerate(scene.contacts):
             first, cells = batches.bristles, batches.cells[c]

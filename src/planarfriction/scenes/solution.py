@@ -75,7 +75,8 @@ class Solution:
     statistics: Statistics
     """Number of steps and computing time."""
     status: str
-    """"success", "at rest", or the reason for an early end: "interrupted", "step too small", "step limit"."""
+    """"success", "at rest", "left its contacts", or the reason for an early end: "interrupted", "step too small",
+    "step limit"."""
     message: str
     """Message in one sentence, with a remedy if the solver failed."""
     scene: Scene
@@ -96,7 +97,14 @@ class Solution:
         end = (f"{each}={float(self.histories[each].values[-1]):.4g}" for each in ("x", "y", "theta") if len(time))
         cost = f"{self.statistics.steps} steps in {1e3 * self.statistics.wall_time:.3g} ms"
         until = f"{len(time)} samples to t={float(time[-1]):g} s" if len(time) else "no samples"
-        return f"Solution({name}, {self.status}: {until}, {', '.join([*end, cost])})"
+        return f"Solution({name}, {self.status}: {until}, {', '.join([*end, *self._ends(), cost])})"
+
+    def _ends(self) -> list[str]:
+        """Return in words when contacts with an edge have ended."""
+        if "ended" not in self.histories:
+            return []
+        times, names = (np.asarray(self.histories[each].values) for each in ("ended", "contact"))
+        return [f"{str(name)!r} ended at t={t:.4g} s" for name, t in zip(names, times, strict=True) if t == t]
 
     def _repr_html_(self) -> str:
         return picture("solution in a notebook", self)

@@ -48,12 +48,13 @@ def first_slopes(scene: Any, shaped: np.ndarray, d_loads: np.ndarray, d_pull: np
     motion = _least_energy(cells, pull)
     bent, slope = cells.bent(motion)
     share = np.repeat(d_loads / np.where(loads == 0.0, 1.0, loads), sizes, axis=1)
-    longer = share * (cells.fixed & cells.full(motion))  # of a fixed stiffness the limit grows with the load
-    share = np.where(cells.fixed, longer, share)
-    held = np.einsum("kn,n,nij,ni->kj", share, cells.stiffness, cells.levers, bent)
+    longer = bent - np.einsum("nij,nj->ni", slope, cells.levers @ motion)  # limits of a fixed stiffness grow with loads
+    fixed = cells.fixed[:, None]
+    held = np.einsum("kn,n,nij,ni->kj", share, cells.stiffness, cells.levers, np.where(fixed, longer, bent))
     stiff = np.einsum("n,nia,nij,njb->ab", cells.stiffness, cells.levers, slope, cells.levers)
     motions = np.linalg.lstsq(stiff, (d_pull - held).T, rcond=None)[0]
-    moved = np.einsum("nij,njb,bk->kni", slope, cells.levers, motions) + longer[:, :, None] * bent
+    moved = np.einsum("nij,njb,bk->kni", slope, cells.levers, motions)
+    moved = moved + share[:, :, None] * np.where(fixed, longer, 0.0)
     return _states(scene, shaped, moved, sizes)
 
 
@@ -115,10 +116,6 @@ class _BristleField(NamedTuple):
     """Deflection of each bristle that is as far from its largest in all directions `[n, 3]` [m]."""
     fixed: np.ndarray
     """True for cells whose stiffness does not grow with the load, bool `[n]`."""
-
-    def full(self, motion: np.ndarray) -> np.ndarray:
-        """Return which cells are bent as far as they can be after a small motion of the body, bool `[n]`."""
-        return _lengths(self.levers @ motion - self.middle) > self.largest
 
     def bent(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the deflections `[n, 3]` after a small motion of the body, and slopes `[n, 3, 3]` by the stretch."""

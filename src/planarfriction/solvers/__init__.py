@@ -17,7 +17,4 @@ __all__ = ["RODAS3", "RODAS4", "Integration", "Statistics", "integrate"]
 # these bring the compiled code
 _HOMES = {"methods": ["RODAS3", "RODAS4"], "structured": ["Integration", "integrate"]}
 __getattr__, _, _ = lazy_loader.attach(__name__, submod_attrs=_HOMES)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__dir__ = __all__.copy

@@ -25,12 +25,13 @@ _STATES_PER_SLICE = 400_000
 _FIRST_STEP = 1e-6
 """First trial step [s]: below the relaxation time of a bristle, so that it is hardly ever rejected."""
 
-_STEP_LIMIT = 4
+_STEP_LIMIT = 5
 """Outcome beside those of the compiled loop: all steps that a run may try are taken."""
 
 _MESSAGES = {
     kernels.DONE: ("success", "reached the end"),
     kernels.AT_REST: ("at rest", "the body came to rest"),
+    kernels.APART: ("left its contacts", "the body left its last contact"),
     kernels.PAUSED: ("interrupted", "interrupted before the end"),
     kernels.STEP_TOO_SMALL: (
         "step too small",
@@ -149,7 +150,7 @@ def integrate(
             raise
         outcome = kernels.PAUSED
     reached = int(at.cursor[1])
-    kept = Output(*(array[:reached] if len(array) else array for array in output))
+    kept = Output(*(array[:reached] if len(array) else array for array in output[:-1]), output.ended)
     status, message = _MESSAGES[int(outcome)]
     statistics = Statistics(*at.statistics.tolist(), wall_time=wall_time, compile_time=compile_time)
     return Integration(kept, status, message, statistics)

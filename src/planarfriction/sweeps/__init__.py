@@ -3,7 +3,4 @@
 from planarfriction.sweeps.running import Progress, finished_runs, sweep
 
 __all__ = ["Progress", "finished_runs", "sweep"]
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__dir__ = __all__.copy

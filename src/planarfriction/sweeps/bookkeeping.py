@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from time import monotonic
@@ -17,7 +16,7 @@ from planarfriction.scenes.signal import SAME_TIME
 from planarfriction.scenes.solution import History
 from planarfriction.sweeps.quantities import Grid
 from planarfriction.sweeps.records import FAILED, Record, failure, pack, unpack
-from planarfriction.writing import make_folder, put
+from planarfriction.writing import make_folder, replacing, write_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,7 +84,7 @@ class Bookkeeper:
     def add(self, index: Index, key: str, record: Record, scene: Scene | None) -> None:
         """Keep the record of a run that has just ended."""
         if self._folder is not None:
-            self._store(key, record, scene)
+            self._store(self._folder / f"{key}.failed.json", key, record, scene)
         self.new += 1
         if record.status == FAILED:
             self.failed += 1
@@ -95,24 +94,25 @@ class Bookkeeper:
     def flush(self, at_once: bool = False) -> None:
         """Write the open records as one file, whole or not at all, so seldom that a long sweep has few files."""
         now = monotonic()
-        if self._open and (at_once or now - self._written > BETWEEN + SHARE * (now - self._begin)):
+        due = at_once or now - self._written > BETWEEN + SHARE * (now - self._begin)
+        if self._folder is not None and self._open and due:
             content = pack(self._open)
-            put(f"{self._folder}{os.sep}{_name(content)}", content)
+            with replacing(self._folder / _name(content)) as file:
+                file.write(content)
             self._open.clear()
             self._written = now
 
-    def _store(self, key: str, record: Record, scene: Scene | None) -> None:
+    def _store(self, failed: Path, key: str, record: Record, scene: Scene | None) -> None:
         """Keep the record of a run for the next file, or write the file of a failure."""
-        failed = f"{self._folder}{os.sep}{key}.failed.json"
         if record.status != FAILED:
             self._open[key] = record
             with contextlib.suppress(OSError):
-                os.unlink(failed)
+                failed.unlink(missing_ok=True)
         elif key:  # there is a scene
             try:
-                put(failed, failure(record.reason, scene).encode())
+                write_text(failed, failure(record.reason, scene))
             except FileError:
-                if not os.path.isdir(failed):
+                if not failed.is_dir():
                     raise
 
     def dataset(self) -> xr.Dataset:

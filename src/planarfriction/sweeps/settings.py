@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import re
 import tomllib
@@ -105,9 +104,8 @@ def _set(table: Any, parts: list[str], value: Any, path: str, where: str, valid:
         raise InvalidValueError(path, f"end at {where}, which is {shown(table)}", f"{key!r} after it")
     valid = list(table) if valid is None else list(dict.fromkeys(valid))
     if key not in valid:
-        near = difflib.get_close_matches(key, valid, n=1)
-        hint = f" (did you mean {near[0]!r}?)" if near else ""
-        raise InvalidValueError(path, f"name a value of the scene: {where} has {', '.join(valid)}", f"{key!r}{hint}")
+        given = f"{key!r}{validation.hint(key, valid)}"
+        raise InvalidValueError(path, f"name a value of the scene: {where} has {', '.join(valid)}", given)
     name = key if where == "the scene" else f"{where}.{key}"
     if not rest:
         return {**table, key: value}

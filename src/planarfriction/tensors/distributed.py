@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, disc_cells, discs, leaning_cells, points
+from planarfriction.kernels import cells, disc_cells, discs, leaning_cells, points, settle
 from planarfriction.kernels.leaning_cells import Leaning
 from planarfriction.models import DistributedModel
 from planarfriction.patch import ContactPatch
@@ -56,11 +56,6 @@ def cells_of(patch: ContactPatch, law: Any, normal_force: float | None) -> Cells
     return Cells(numbers, patch.weights(normal_force))
 
 
-def obstacle(levers) -> str:
-    """Return the reason why compiled rollouts do not take cells of such numbers, or an empty text."""
-    return "for friction that is not the same forwards and backwards" if len(levers) > 6 else ""
-
-
 def positions_of(xp, shape: Cells):
     """Return the positions of the cells, x then y [m], `[2, N]`."""
     if len(shape.levers) < 5:
@@ -85,6 +80,17 @@ def _bristle(xp, name: str, law: LawNumbers, shape: Cells, z, u, *dt):
     return tuple(joined(xp, each) for each in found)
 
 
+def middle(xp, law: LawNumbers, shape: Cells):
+    """Return the middle of the limit of every bristle at rest `[..., d, N]`, or 0.0 (see `kernels.settle`)."""
+    _, asymmetry = _numbers(shape)
+    if asymmetry is None:
+        return 0.0
+    lean = asymmetry.array
+    if KINDS[len(shape.levers)].bristles == 3:
+        lean = xp.concatenate([lean, 0.0 * lean[:1]], -2)
+    return law.mu_s / law.sigma_0 * lean
+
+
 # ---------------------------------------------------------------------- steps
 
 
@@ -102,6 +108,12 @@ def drive(xp, law: LawNumbers, shape: Cells, twist) -> tuple[Any]:
     """Return the velocities that the cells see at a twist `[..., d, N]`, as a tuple of this array."""
     seen = over(xp)(KINDS[len(shape.levers)].lever.seen)
     return (joined(xp, seen(_numbers(shape)[0], split(twist[..., None]))),)
+
+
+def limited(xp, law: LawNumbers, shape: Cells, z):
+    """Return bristles brought back onto their limits (see `kernels.settle`)."""
+    seen_from = middle(xp, law, shape)
+    return seen_from + over(xp)(settle.within)(law, Vector(z - seen_from)).array
 
 
 def evaluate(xp, law: LawNumbers, shape: Cells, z, by):

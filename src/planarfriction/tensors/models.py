@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from planarfriction import models
+from planarfriction import models, validation
+from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import distributed, published
@@ -26,10 +28,17 @@ class CellsModel(TensorModel):
         """Shape of the state of one contact, `(2, N)` of points, `(3, N)` of discs."""
         return distributed.KINDS[len(self.positions)].bristles, self.positions.shape[1]
 
-    @property
-    def obstacle(self) -> str:
-        """Reason why compiled rollouts do not take the model, or an empty text."""
-        return super().obstacle or distributed.obstacle(self.positions)
+    def weighted(self, patch: ContactPatch) -> ContactPatch:
+        """Return the `patch` of the model's cells, or its discs if there are fewer, with the present weights.
+
+        Raises InvalidValueError for a patch that has other cells.
+        """
+        validation.instance("patch", patch, ContactPatch, "a ContactPatch")
+        weights = self.xp.to_numpy(self.weights)
+        cells = patch if patch.cells <= len(weights) else patch.discs(len(weights))
+        if cells.cells != len(weights):
+            raise InvalidValueError("patch", f"have the {len(weights)} cells of the model", cells.cells)
+        return dataclasses.replace(cells, pressure=weights / cells.areas, point_shares=None)
 
     def _shape(self, values: Mapping[str, Any]) -> distributed.Cells:
         return distributed.Cells(self.positions, self.weights)

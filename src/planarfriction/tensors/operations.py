@@ -15,6 +15,7 @@ import numpy as np
 
 from planarfriction import derivatives
 from planarfriction.derivatives.parameters import Packed
+from planarfriction.derivatives.rollouts import weights_vjp
 from planarfriction.derivatives.scene_function import SceneFunction
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
@@ -26,17 +27,22 @@ Arrays = Sequence[Any]
 
 
 class RolloutOperation(NamedTuple):
-    """Last state and wrenches of a rollout, of state, twist, load and parameters; `held` is `dt` and the buffers."""
+    """Last state and wrenches of a rollout, of state, twist, load, parameters and any weights; `held` is `dt` and the
+    buffers."""
 
     pack: Callable[..., Packed]
-    """Function that makes the parts of the model from the buffers."""
+    """Function that makes the parts of the model from weights of cells, if there are any, and the buffers."""
     axes: int
     """Axes of the state of a contact."""
+    cells: bool = False
+    """True if the weights of cells are the last input."""
+    weighs: bool = False
+    """True if their cotangent is wanted; it is 0 otherwise."""
 
     @property
     def inner(self) -> tuple[int, ...]:
-        """Number of inner axes of state, twist, load and parameters."""
-        return self.axes, 2, 1, 1
+        """Number of inner axes of state, twist, load, parameters and any weights."""
+        return self.axes, 2, 1, *(1,) * (1 + self.cells)
 
     @property
     def outer(self) -> tuple[int, ...]:
@@ -45,22 +51,31 @@ class RolloutOperation(NamedTuple):
 
     def run(self, held: Arrays, inputs: Arrays, keep: bool) -> tuple[Arrays, Arrays]:
         """Return the last state and the wrenches, and with `keep` the states before each step."""
-        state, twist, load, parameters = inputs
+        state, twist, load, parameters, *weights = inputs
         roll = derivatives.rollout_states if keep else derivatives.rollout
-        found = roll(self.pack(*held[1:]), state, twist, load, float(held[0]), parameters=parameters)
+        found = roll(self.pack(*weights, *held[1:]), state, twist, load, float(held[0]), parameters=parameters)
         return found[:2], found[2:]
 
     def push(self, held: Arrays, inputs: Arrays, changes: Arrays) -> Arrays:
-        """Return the changes of the last state and of the wrenches."""
-        (state, twist, load, parameters), model = inputs, self.pack(*held[1:])
-        tangent = derivatives.RolloutTangent(*changes)
-        return derivatives.rollout_jvp(model, state, twist, load, float(held[0]), tangent, parameters=parameters)[2:]
+        """Return the changes of the last state and of the wrenches, which are linear in the weights."""
+        (state, twist, load, parameters, *weights), tangent = inputs, derivatives.RolloutTangent(*changes[:4])
+        given, more = (state, twist, load, float(held[0])), {"parameters": parameters}
+        *_, end, wrenches = derivatives.rollout_jvp(self.pack(*weights, *held[1:]), *given, tangent, **more)
+        if self.cells and changes[4].any():
+            wrenches = wrenches + derivatives.rollout(self.pack(changes[4], *held[1:]), *given, **more).wrenches
+        return end, wrenches
 
     def pull(self, held: Arrays, inputs: Arrays, bars: Arrays, kept: Arrays) -> Arrays:
-        """Return the cotangents of state, twist, load and parameters."""
-        (state, twist, load, parameters), model = inputs, self.pack(*held[1:])
+        """Return the cotangents of state, twist, load, parameters and any weights."""
+        (state, twist, load, parameters, *weights), step = inputs, float(held[0])
         more = {"parameters": parameters, "states": kept[0] if kept else None}
-        return derivatives.rollout_vjp(model, state, twist, load, float(held[0]), bars[1], bars[0], **more)
+        model = self.pack(*weights, *held[1:])
+        found = derivatives.rollout_vjp(model, state, twist, load, step, bars[1], bars[0], **more)
+        if not self.cells:
+            return found
+        if not self.weighs:
+            return *found, np.zeros(weights[0].shape)
+        return *found, weights_vjp(model, state, twist, load, step, bars[1], weights[0], **more)
 
 
 class SceneOperation(NamedTuple):

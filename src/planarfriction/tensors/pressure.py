@@ -6,17 +6,18 @@ whose derivatives are those of the rule: cells that are about to lift press with
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
-from planarfriction.kernels.tilt import FARTHEST, NARROW, REACH, SOFTNESS
+from planarfriction.kernels import tilt
+from planarfriction.kernels.tilt import FARTHEST, NARROW, SOFTNESS
 from planarfriction.tensors.distributed import Cells, positions_of
+from planarfriction.tensors.elements import over
 
 
 def centre_of(xp: Any, moments: Any, load: Any) -> Any:
     """Return the centre of pressure `(-m_y, m_x)/f_N` `[..., 2]` [m]; 0 without load."""
-    loaded = (load > 0.0)[..., None]
-    turned = xp.stack([-moments[..., 1], moments[..., 0]], -1)
-    return xp.clip(xp.where(loaded, turned / xp.where(loaded, load[..., None], 1.0), 0.0), -REACH, REACH)
+    return xp.stack(over(xp)(tilt.centre)(moments[..., 0], moments[..., 1], xp.where(load > 0.0, load, math.inf)), -1)
 
 
 def twist_at(xp: Any, twist: Any, offset: Any) -> Any:

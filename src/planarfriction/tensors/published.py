@@ -10,13 +10,10 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from planarfriction import formulas, models
-from planarfriction.compiler import compiled_math
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import bristle_step, published_contact
-from planarfriction.kernels.bristle_step import seen
 from planarfriction.kernels.law import grip
 from planarfriction.kernels.published_contact import PublishedPatch, Root
-from planarfriction.kernels.vectors import norm, plus
 from planarfriction.laws import FrictionLaw
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models.reduced_published import PublishedShape
@@ -115,22 +112,14 @@ def drive(xp, law: LawNumbers, own: PublishedNumbers, twist) -> Drive:
     )
     speed = xp.norm(twist, -2)
     u = wide(own.surface(narrow(twist), narrow(speed)))
-    u_norm = xp.norm(u, -2)
-    slides = u_norm > 0.0
-    per_h = xp.where(slides, speed, 1.0) / xp.where(slides, u_norm, 1.0)
+    per_h = over(xp)(published_contact.per_h)(Vector(u), speed)
     return Drive(u, speed, per_h, over(xp)(grip)(law, speed), viscous)
-
-
-def _rate(law, z, u, speed, per_h, grip):
-    """Return z' of the scaled bristle."""
-    deflection, along = seen(z, norm(z), u, per_h, grip)
-    return plus(u, -formulas.bristle_decay(compiled_math, deflection, along, speed, grip, law), z)
 
 
 def evaluate(xp, law: LawNumbers, own: PublishedNumbers, z, by: Drive):
     """Return the rate of the bristle, and its pull (see `wrench`)."""
     z = scaled(xp, own, z)
-    rate = over(xp)(_rate)(law, Vector(z), Vector(by.velocity), *by[1:4]).array
+    rate = by.velocity - over(xp)(published_contact.decay_of)(law, Vector(z), Vector(by.velocity), *by[1:4]) * z
     return raw(xp, own, rate), formulas.traction(z, rate, by.viscous, law)
 
 

@@ -7,7 +7,7 @@ from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
 
 from planarfriction import validation
-from planarfriction.derivatives.parameters import PARAMETERS
+from planarfriction.derivatives.parameters import PARAMETERS, check_range
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import settle
@@ -43,7 +43,8 @@ def evaluate(xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, 
     else:
         z = over(xp)(settle.factor_at)(reference, inner(load)) * z
         rate, pull = equations.evaluate(xp, law, shape, z, by)
-        back = over(xp)(settle.recovery)(law, Vector(z), xp.norm(by[0], -2)) * z
+        out = z - equations.middle(xp, law, shape)
+        back = over(xp)(settle.recovery)(law, Vector(out), xp.norm(by[0], -2)) * out
         rate, pull = rate - back, pull + law.sigma_1 * back
     return equations.narrow(rate), load[..., None] * equations.wrench(xp, shape, pull)
 
@@ -67,7 +68,7 @@ def advance(xp: Any, equations: Any, contact: Contact, z: Any, by: Any, load: An
         new, pull = equations.advance(xp, law, shape, z, by, dt)
     else:
         factor = over(xp)(settle.factor_at)(reference, xp.where(loaded, inner(load), reference))
-        z = over(xp)(settle.within)(law, Vector(factor * z)).array
+        z = equations.limited(xp, law, shape, factor * z)
         new, pull = equations.advance(xp, law, shape, z, by, factor * dt)
         new = new / factor
     return xp.where(loaded, new, 0.0), pull
@@ -108,11 +109,6 @@ class TensorModel:
     def state_shape(self) -> tuple[int, ...]:
         """Shape of the state of one contact."""
         return (3,)
-
-    @property
-    def obstacle(self) -> str:
-        """Reason why compiled rollouts do not take the model, or an empty text."""
-        return "" if self.reference_load is None else "for a law with a reference_load"
 
     def rest(self, batch: int | Sequence[int] = ()) -> Any:
         """Return the state of a contact at rest, or of a `batch`: `[*batch, *state_shape]`."""
@@ -172,6 +168,14 @@ class TensorModel:
             rule = f"have shape [..., {len(self.names)}] ({', '.join(self.names)})"
             raise InvalidValueError("parameters", rule, f"shape {list(shape)}")
         return parameters
+
+    def _in_range(self, values: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return physical values; raise InvalidValueError for one that can be read and is out of its range."""
+        for name, value in values.items():
+            seen = self.xp.extremes(name, value)
+            if seen is not None:
+                check_range(name, *seen)
+        return values
 
     def _number(self, name: str, value: Any) -> Any:
         return self.xp.real(name, value)

@@ -4,18 +4,14 @@ Needs PyTorch: `pip install 'planarfriction[torch]'`; before it, for the process
 `pip install torch --index-url https://download.pytorch.org/whl/cpu`.
 """
 
-try:
-    import torch as _torch  # noqa: F401
-except ImportError:
-    from planarfriction.errors import MissingExtraError
+from planarfriction.errors import needing
 
-    raise MissingExtraError("torch", "torch") from None
-
-from planarfriction.derivatives import Rollout
-from planarfriction.tensors.operations import SceneMotion
-from planarfriction.torch.models import DistributedModel, ReducedModel, ReducedModelPublished
-from planarfriction.torch.reduced_planar import ReducedPlanarLuGre
-from planarfriction.torch.rollout import rollout, simulate_scene, tracking_loss
+with needing("torch", "torch"):
+    from planarfriction.derivatives import Rollout
+    from planarfriction.tensors.operations import SceneMotion
+    from planarfriction.torch.models import DistributedModel, ReducedModel, ReducedModelPublished
+    from planarfriction.torch.reduced_planar import ReducedPlanarLuGre
+    from planarfriction.torch.rollout import rollout, simulate_scene, tracking_loss
 
 __all__ = [
     "DistributedModel",

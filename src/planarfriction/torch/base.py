@@ -26,9 +26,11 @@ class Compiled(NamedTuple):
     """A model as compiled rollouts take it."""
 
     pack: Callable[..., Packed]
-    """Function that makes the model from the `buffers` as NumPy arrays."""
+    """Function that makes the model from the weights, if there are any, and the `buffers` as NumPy arrays."""
     buffers: tuple[Tensor, ...]
     """The model's own numbers of the patch."""
+    weights: tuple[Tensor, ...] = ()
+    """The weights of the cells, if there are cells: they can have gradients."""
 
 
 _BRISTLES = {False: "plain", True: "elasto-plastic"}
@@ -155,7 +157,9 @@ class FrictionModule(TensorModel, nn.Module):
     def _vector(self, parameters: Tensor | None) -> Tensor:
         if parameters is None:
             return self.physical()
-        return self._counted(parameters, parameters.shape[-1] if parameters.ndim else 0, parameters.shape)
+        vector = self._counted(parameters, parameters.shape[-1] if parameters.ndim else 0, parameters.shape)
+        self._in_range(self._named(vector))
+        return vector
 
 
 def _like(by: Any, values: Any) -> Any:

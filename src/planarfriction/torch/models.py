@@ -69,9 +69,15 @@ class DistributedModel(FrictionModule, CellsModel):
         """Share of the load on each cell `[N]`, with its gradient."""
         return torch.softmax(self.raw_weights, 0)
 
+    def value(self, name: str) -> Tensor:
+        """Return a physical value, or the `weights`, with its gradient."""
+        return self.weights if name == "weights" else super().value(name)
+
     def compiled(self) -> Compiled:
         """Return the model as compiled rollouts take it."""
-        return Compiled(functools.partial(pack_cells, self.elasto_plastic), (self.positions, self.weights))
+        reference = () if self.reference_load is None else (self.reference_load,)
+        pack = functools.partial(pack_cells, self.elasto_plastic)
+        return Compiled(pack, (self.positions, *reference), (self.weights,))
 
 
 class SurfaceBuffers(nn.Module):

@@ -23,11 +23,14 @@ import torch
 from torch import Tensor, nn
 
 from planarfriction import validation
+from planarfriction.derivatives.parameters import POSITIVE
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.tensors.steps import LAW
 from planarfriction.torch.namespace import xp
 
-_POSITIVE = ("sigma_0", "mu_c", "v_s", "gamma", "contact_radius", "second_moment")
+_GROWING = {*POSITIVE, "second_moment"}
+"""Parameters that are `p_0 exp(w)`; a trained mu_s has a rule of its own."""
+
 _AT_MU_S = "mu_c has been trained up to mu_s, which is fixed and which it cannot exceed: name mu_s in trainable too"
 _LARGEST_EXPONENT = 30.0
 """A positive value stays within a factor e^30 = 1e13 of where it started, so that none overflows or becomes zero."""
@@ -61,7 +64,7 @@ class PhysicalParameters(nn.Module):
         self.register_buffer("places", places, persistent=False)
         bounded = "mu_c" if "mu_s" not in chosen else ""  # a mu_c below a fixed mu_s has a rule of its own
         for rule, members in {
-            "grows": set(_POSITIVE) - {bounded},
+            "grows": _GROWING - {bounded},
             "moves": {"centre_x", "centre_y"},
             "folds": {"sigma_1", "sigma_2"},
         }.items():
@@ -122,7 +125,7 @@ def _raw(name: str, values: Mapping[str, float], *, fixed_static: bool) -> tuple
     if name == "mu_s" or (name == "mu_c" and fixed_static):
         excess = (values["mu_s"] - mu_c) / mu_c
         return 1.0 + excess, excess / (1.0 + excess)
-    if name in _POSITIVE:
+    if name in _GROWING:
         return 1.0, 0.0
     if name == "breakaway_ratio":
         return 1.0, -float(torch.log1p(torch.tensor(-value, dtype=torch.float64)))

@@ -43,13 +43,15 @@ def rollout(
     if twist.shape[-2] == 0:
         raise InvalidValueError("twist", "have T > 0 steps", f"shape {list(twist.shape)}")
     compiled = model.compiled()
-    obstacle = model.obstacle or _obstacle(model, compiled, *inputs)
+    obstacle = _obstacle(model, compiled, *inputs)
     if method == "adjoint" and obstacle:
         raise InvalidValueError("method", f"be 'eager' {obstacle}", repr(method))
     if method == "eager" or obstacle:
         return Rollout(*model.rollout(*inputs, parameters=parameters))
-    operation, held = RolloutOperation(compiled.pack, len(model.state_shape)), (step, *compiled.buffers)
-    return Rollout(*adjoint.call(operation, held, start, twist, load, model._vector(parameters)))
+    weights, held = compiled.weights, (step, *compiled.buffers)
+    cells, weighs = len(weights) > 0, any(each.requires_grad for each in weights)
+    operation = RolloutOperation(compiled.pack, len(model.state_shape), cells, weighs)
+    return Rollout(*adjoint.call(operation, held, start, twist, load, model._vector(parameters), *weights))
 
 
 def _obstacle(model: FrictionModule, compiled: Compiled, *tensors: Tensor) -> str:

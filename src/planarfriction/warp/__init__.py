@@ -3,14 +3,10 @@
 Needs Warp: `pip install 'planarfriction[warp]'`.
 """
 
-try:
-    import warp as _warp  # noqa: F401
-except ImportError:
-    from planarfriction.errors import MissingExtraError
+from planarfriction.errors import needing
 
-    raise MissingExtraError("warp-lang", "warp") from None
-
-from planarfriction.warp.coupled import CoupledPatches
-from planarfriction.warp.model import Model
+with needing("warp-lang", "warp"):
+    from planarfriction.warp.coupled import CoupledPatches
+    from planarfriction.warp.model import Model
 
 __all__ = ["CoupledPatches", "Model"]

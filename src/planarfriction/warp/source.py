@@ -8,10 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction.export.c_source import Writer
+from planarfriction.export.c_values import Array, Fixed
 from planarfriction.export.library import PARAMETERS, PRECISIONS, tilt_of
+from planarfriction.export.loops import Loops
 from planarfriction.export.pieces import Pieces, pieces_of
 from planarfriction.export.twins import twin
-from planarfriction.kernels import coupling
+from planarfriction.kernels import coupling, small_matrices
 from planarfriction.kernels.trace import Block, Number, Trace, traced
 from planarfriction.models import FrictionModel
 
@@ -86,6 +88,7 @@ def coupled_source_of(
         loaded="loaded" if any(each.fixed for each in pieces) else "unit",
         rounding=list(map(writer.constant, ROUNDING[precision])),
         shortening="\n".join(writer.lines(traced(_shortening), ["too_far", "share"], indent=" " * 16)),
+        systems=_systems(writer, 4 * len(which)),
         **{name.lower(): writer.constant(getattr(coupling, name)) for name in names},
     )
     return Source(text, numbers)
@@ -94,6 +97,14 @@ def coupled_source_of(
 def _shortening(trace: Trace) -> Any:
     slopes = Number(trace, "first"), Number(trace, "here")
     return twin(coupling.too_far)(*slopes), twin(coupling.shortening_of)(*slopes)
+
+
+def _systems(writer: Writer, unknowns: int) -> str:
+    """Return the functions of the linear systems, and of slopes that fall."""
+    loops, names = Loops(writer), ("slopes", "scale", "turned", "axes")
+    loops.add(small_matrices.leave_out_rising, tuple(Array(name, (9,)) for name in names))
+    loops.add(small_matrices.solved, (Array("matrix", (unknowns**2,)), Array("x", (unknowns,)), Fixed(unknowns)))
+    return "\n\n".join(loops.functions).replace("static ", "static CUDA_CALLABLE ")
 
 
 def _described(models: Sequence[Described], precision: str, slopes: bool) -> tuple[list[dict[str, Any]], np.ndarray]:

@@ -3,14 +3,10 @@
 Needs Drake: `pip install 'planarfriction[drake]'`.
 """
 
-try:
-    import pydrake as _pydrake  # noqa: F401
-except ImportError:
-    from planarfriction.errors import MissingExtraError
+from planarfriction.errors import needing
 
-    raise MissingExtraError("drake", "drake") from None
-
-from planarfriction.adapters.drake.friction import Friction, Report
-from planarfriction.adapters.drake.patches import PatchContact, prepare
+with needing("drake", "drake"):
+    from planarfriction.adapters.drake.friction import Friction, Report
+    from planarfriction.adapters.drake.patches import PatchContact, prepare
 
 __all__ = ["Friction", "PatchContact", "Report", "prepare"]

@@ -6,17 +6,11 @@ Needs MJX and JAX: `pip install 'planarfriction[mjx]'`.
 import contextlib as _contextlib
 import sys as _sys
 
-try:
-    import jax as _jax  # noqa: F401
+from planarfriction.errors import needing
 
-    with _contextlib.redirect_stdout(_sys.stderr):  # MJX prints which of its back ends it misses
-        import mujoco.mjx as _mjx  # noqa: F401
-except ImportError:
-    from planarfriction.errors import MissingExtraError
-
-    raise MissingExtraError("mjx", "mjx") from None
-
-from planarfriction.adapters.mjx.friction import Friction
-from planarfriction.adapters.mujoco import PatchContact, prepare
+# MJX prints which of its back ends it misses
+with needing("mjx", "mjx"), _contextlib.redirect_stdout(_sys.stderr):
+    from planarfriction.adapters.mjx.friction import Friction
+    from planarfriction.adapters.mujoco.patches import PatchContact, prepare
 
 __all__ = ["Friction", "PatchContact", "prepare"]

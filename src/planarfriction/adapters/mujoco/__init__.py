@@ -3,14 +3,10 @@
 Needs MuJoCo: `pip install 'planarfriction[mujoco]'`.
 """
 
-try:
-    import mujoco as _mujoco  # noqa: F401
-except ImportError:
-    from planarfriction.errors import MissingExtraError
+from planarfriction.errors import needing
 
-    raise MissingExtraError("mujoco", "mujoco") from None
-
-from planarfriction.adapters.mujoco.friction import Friction
-from planarfriction.adapters.mujoco.patches import PatchContact, prepare
+with needing("mujoco", "mujoco"):
+    from planarfriction.adapters.mujoco.friction import Friction
+    from planarfriction.adapters.mujoco.patches import PatchContact, prepare
 
 __all__ = ["Friction", "PatchContact", "prepare"]

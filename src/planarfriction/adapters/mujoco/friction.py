@@ -31,6 +31,7 @@ from planarfriction.adapters.mujoco.patches import (
     place_of_parameters,
     write_parameters,
 )
+from planarfriction.compiler.calls import address_of
 from planarfriction.compiler.memory import place_of, row_of
 from planarfriction.coupling import CoupledPatches
 from planarfriction.environments import check
@@ -267,7 +268,7 @@ class Friction:
             m=self.m._address, same_count=len(same()), same=place_of(same()),
             nv=self.m.nv, nuserdata=self.m.nuserdata, count=k, states=self.coupled.state_shape[0], words=packed.words,
             scratch_words=scratch.size, problem=place_of(problem), patches=place_of(packed.row),
-            solve=kernels.solve_address(), plan=loops.plan_address(), free_count=len(joints),
+            solve=address_of(kernels.solve), plan=address_of(loops.plan), free_count=len(joints),
             parameters=self._place, laws=place_of(laws), record_words=place_of(packed.sizes),
             free_joints=place_of(free), free_dofs=place_of(free) + 8 * len(joints),
             extents=place_of(extents), memory=self._memory, scratch=scratch.offsets, **places, **layout(),

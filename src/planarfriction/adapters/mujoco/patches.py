@@ -87,19 +87,15 @@ class PatchContact(Checked):
 
 def memory(patches: Sequence[PatchContact], nv: int, nuserdata: int) -> Any:
     """Return the places of what patches remember in the user data, at their end; raise where there is no room."""
-    layout = _layout(patches, nv)
+    layout = layout_of(patches, nv)
     if nuserdata < layout.size:
         raise InvalidValueError("nuserdata", f"be at least {layout.size} (prepare adds them)", nuserdata)
     return Memory(*(nuserdata - layout.size + place for place in layout.offsets))
 
 
-def _layout(patches: Sequence[PatchContact], nv: int) -> Layout:
+def layout_of(patches: Sequence[PatchContact], nv: int) -> Layout:
+    """Return the layout of the numbers that patches remember."""
     return memory_layout(sum(math.prod(patch.model.state_shape) for patch in patches), len(patches), nv)
-
-
-def room_of(patches: Sequence[PatchContact], nv: int) -> int:
-    """Return the count of numbers that patches remember."""
-    return _layout(patches, nv).size
 
 
 def prepare(spec: Any, patches: Sequence[PatchContact]) -> Any:
@@ -132,7 +128,7 @@ def prepare(spec: Any, patches: Sequence[PatchContact]) -> Any:
             for name, value in _between(compiled, [compiled.geom(name).id for name in patch.geoms]).items():
                 setattr(pair, name, value)
         pair.condim = 1
-    room = _layout(patches, compiled.nv).size
+    room = layout_of(patches, compiled.nv).size
     record = next((each for each in spec.numerics if each.name == RECORD), None)
     taken = 0 if record is None else int(record.data[0])
     record = spec.add_numeric(name=RECORD) if record is None else record

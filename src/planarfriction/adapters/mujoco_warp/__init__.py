@@ -3,14 +3,10 @@
 Needs MuJoCo Warp: `pip install 'planarfriction[mujoco-warp]'`.
 """
 
-try:
-    import mujoco_warp as _mujoco_warp  # noqa: F401
-except ImportError:
-    from planarfriction.errors import MissingExtraError
+from planarfriction.errors import needing
 
-    raise MissingExtraError("mujoco-warp", "mujoco-warp") from None
-
-from planarfriction.adapters.mujoco.patches import PatchContact, prepare
-from planarfriction.adapters.mujoco_warp.friction import Friction
+with needing("mujoco-warp", "mujoco-warp"):
+    from planarfriction.adapters.mujoco.patches import PatchContact, prepare
+    from planarfriction.adapters.mujoco_warp.friction import Friction
 
 __all__ = ["Friction", "PatchContact", "prepare"]

@@ -20,10 +20,10 @@ from planarfriction.adapters.mujoco.patches import (
     Placed,
     check_once,
     check_options,
+    layout_of,
     memory,
     parameters_in,
     place_of_parameters,
-    room_of,
     surface_velocities,
 )
 from planarfriction.adapters.mujoco_warp.loops import geometry, responses
@@ -95,7 +95,7 @@ class Friction:
             mujoco.mj_forward(m, d)
             self.data = mjw.put_data(m, d, nworld=worlds, nconmax=nconmax, njmax=njmax)
         prepared = m.nuserdata if any(each.pair >= 0 for each in self.placed) else 0
-        size = room_of(patches, m.nv)
+        size = layout_of(patches, m.nv).size
         self._memory = self.data.userdata if prepared else wp.zeros((worlds, size), dtype=float)
         self._at = memory(patches, m.nv, prepared or size)
         self._make(worlds)
@@ -167,41 +167,27 @@ class Friction:
 
         Raises InvalidValueError for another model and other data than `model` and `data`.
         """
-        own, dt = self._bound(m, d), m.opt.timestep
-        worlds, patches, frames, scratch, problem = d.nworld, self._patches, self._frames, self._scratch, self._problem
-        contacts, results = own["contacts"], self._results
+        host, patches, frames, scratch = self._bound(m, d), self._patches, self._frames, self._scratch
+        problem, results = self._problem, self._results
+        host.timestep = m.opt.timestep
 
         def launch(kernel: Any, *inputs: Any) -> None:
-            wp.launch(kernel, dim=worlds, inputs=inputs)
+            wp.launch(kernel, dim=d.nworld, inputs=inputs)
 
-        before = frames.held, frames.before
-        launch(geometry.recall, patches, self._places, d.time, dt, self._memory, self._state, problem.guess, *before)
-        places = d.site_xpos, d.site_xmat
-        geoms = d.geom_xpos, d.geom_xmat
-        moving = d.qvel, self._state, problem.guess, d.qfrc_passive
-        launch(geometry.place, patches, own["tree"], contacts, frames, *places, *geoms, *moving)
+        launch(geometry.recall, patches, self._places, host, frames, problem, self._memory)
+        launch(geometry.place, patches, host, frames, problem)
         mjw.fwd_actuation(m, d)
         mjw.fwd_acceleration(m, d, factorize=True)
         mjw.solve(m, d)
-        launch(geometry.follow_centres, patches, contacts, frames, *places, dt, d.qvel, problem.guess)
-        dynamics = own["dynamics"]
-        if dynamics.implicit == 2:
+        launch(geometry.follow_centres, patches, host, frames, problem)
+        if host.implicit == 2:
             mjw.deriv_smooth_vel(m, d, self._metric)
         for i in range(PASSES):
-            launch(
-                responses.respond,
-                *(patches, contacts, dynamics, frames, scratch, problem, int(i == 0), dt, d.qvel, d.qfrc_smooth),
-            )
+            launch(responses.respond, patches, host, frames, scratch, problem, int(i == 0))
             self.coupled.step(self._state, self._host, self._dt, results, skip=scratch.done)
-            launch(
-                responses.settle,
-                *(contacts, dynamics, frames, scratch, problem, results.wrench, results.iterations, dt),
-            )
-        launch(
-            responses.remember,
-            *(patches, self._places, frames, scratch, problem, *results[:4], results.residual, results.converged),
-            *(self._memory, d.qfrc_passive, d.qacc_warmstart),
-        )
+            launch(responses.settle, host, frames, scratch, problem, results.wrench, results.iterations)
+        found = *results[:4], results.residual, results.converged
+        launch(responses.remember, patches, self._places, host, frames, scratch, problem, *found, self._memory)
 
     # ------------------------------------------------------------------ what is made once
 
@@ -234,13 +220,10 @@ class Friction:
                 "rounds": zeros(dtype=int), "passes": zeros(dtype=int),
             },
         )  # fmt: skip
-        arrays = [zeros(k, 3), zeros(k), zeros(k, 3), zeros(3 * k, 3 * k), zeros(k, 3 * k), zeros(k, 2)]
-        names = "twist", "load", "guess", "response", "load_response", "moments"
-        self._problem, self._host = (
-            _filled(responses.Problem(), dict(zip(names, arrays, strict=True))),
-            HostStep(*arrays),
-        )
         self._state, self._results = self.coupled.rest(), self.coupled.results()
+        arrays = [zeros(k, 3), zeros(k), zeros(k, 3), zeros(3 * k, 3 * k), zeros(k, 3 * k), zeros(k, 2)]
+        names, self._host = ("twist", "load", "guess", "response", "load_response", "moments"), HostStep(*arrays)
+        self._problem = _filled(geometry.Problem(), {"state": self._state, **dict(zip(names, arrays, strict=True))})
         self._metric = zeros(self.model.nC)
         damped = bool(m.dof_damping.any()) and not m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
         self._implicit = int(damped) if m.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER else 2
@@ -263,27 +246,25 @@ class Friction:
         sizes = {"count": len(self.patches), "states": self.coupled.state_shape[0]}
         return _filled(geometry.Patches(), found | sizes)
 
-    def _bound(self, m: Any, d: Any) -> dict[str, Any]:
-        """Return the arrays of model and data in the structs of kernels."""
+    def _bound(self, m: Any, d: Any) -> Any:
+        """Return the arrays of model and data for kernels."""
         if m is not self.model or d is not self.data:
             raise InvalidValueError("model, data", "be those of the friction", "others")
-        if not hasattr(self, "_own"):
-            efc, c = d.efc, d.contact
-            contacts = {"nefc": d.nefc, "type": efc.type, "id": efc.id, "force": efc.force}
-            contacts |= {"geom": c.geom, "frame": c.frame, "pos": c.pos}
-            dynamics = {
+        if not hasattr(self, "_arrays"):
+            efc, c, own = d.efc, d.contact, ("time", "site_xpos", "site_xmat", "geom_xpos", "geom_xmat", "qvel")
+            arrays = {name: getattr(d, name) for name in own}
+            arrays |= {"passive": d.qfrc_passive, "smooth": d.qfrc_smooth, "warmstart": d.qacc_warmstart}
+            arrays |= {"nefc": d.nefc, "type": efc.type, "id": efc.id, "force": efc.force}
+            arrays |= {"geom": c.geom, "frame": c.frame, "pos": c.pos}
+            arrays |= {
                 "sparse": int(m.is_sparse), "nnz": efc.J_rownnz, "first": efc.J_rowadr, "column": efc.J_colind,
                 "jacobian": efc.J, "stiffness": efc.D, "aref": efc.aref, "loss": efc.frictionloss, "inertia": d.M,
                 "metric": self._metric, "inertia_nnz": m.M_rownnz, "inertia_first": m.M_rowadr,
                 "inertia_column": m.M_colind, "damping": m.dof_damping, "implicit": self._implicit,
             }  # fmt: skip
-            tree = {"root": m.body_rootid, "ancestor": m.body_isdofancestor, "centre": d.subtree_com, "axis": d.cdof}
-            self._own = {
-                "contacts": _filled(geometry.Contacts(), contacts),
-                "dynamics": _filled(responses.Dynamics(), dynamics),
-                "tree": _filled(geometry.Tree(), tree),
-            }
-        return self._own
+            arrays |= {"root": m.body_rootid, "ancestor": m.body_isdofancestor, "centre": d.subtree_com, "axis": d.cdof}
+            self._arrays = _filled(geometry.Host(), arrays)
+        return self._arrays
 
 
 def _parameters(m: Any, placed: Sequence[Placed], worlds: int) -> dict[str, np.ndarray]:

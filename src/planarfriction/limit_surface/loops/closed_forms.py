@@ -26,7 +26,7 @@ import numpy as np
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
-from planarfriction.kernels.vectors import accumulate, plus, put_all
+from planarfriction.kernels.vectors import accumulate, clear, plus, put_all
 
 POINTS, SEGMENTS, QUADS = 1, 2, 4
 """Kinds of elements by their number of corners; a triangle is a quad with two corners in one place."""
@@ -206,8 +206,7 @@ def element_sum(elements, x, y, s, block, held, sums):
     number, count = corners.shape[0], corners.shape[1]
     for tier in range(tiers):
         held[tier] = 0
-    for k in range(9):
-        sums[k] = 0.0
+    clear(sums, 9)
     for i in range(number):
         ux, uy = x - s * shape[i, 1], y + s * shape[i, 0]
         speed = math.sqrt(ux * ux + uy * uy)
@@ -359,8 +358,7 @@ def ring_sum(rings, x, y, s, sums):
     v = math.sqrt(x * x + y * y)
     # where the rim runs as fast as the ring slides, the sum over the radii has a kink
     kink = rings.outer if v >= abs(s) * rings.outer else xp.maximum(v / abs(s), rings.inner)
-    for k in range(5):
-        sums[k] = 0.0
+    clear(sums, 5)
     _rings(rings, rings.inner, kink, s, v, sums)
     _rings(rings, kink, rings.outer, s, v, sums)
     per = 1.0 / sums[0]

@@ -17,6 +17,7 @@ import numpy as np
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
+from planarfriction.kernels.vectors import clear
 from planarfriction.online.loops.filter_state import (
     BACK,
     BIAS,
@@ -225,8 +226,7 @@ def _learn(settings, s, h, column, jacobian):
         by_speed = settings.sigma_2 - mu * (ratio - 1.0) * fade * settings.gamma * power / speed
         along = (u[0] if row == 0 else (u[1] if row == 1 else u[2])) / speed
         factor = load * (scale if row == 2 else 1.0)
-        for i in range(N):
-            h[i] = 0.0
+        clear(h, N)
         for j in range(3):
             unit = (x if j == 0 else (y if j == 1 else z)) / speed
             slope = g * (jacobian[3 * row + j] - along * unit) / speed + by_speed * along * unit

@@ -9,7 +9,7 @@ import numpy as np
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
 from planarfriction.formulas import LARGEST
-from planarfriction.online.loops.friction_filter import NO_SIGN
+from planarfriction.online.loops.friction_filter import NO_SIGN, SEEN_TIME
 
 EARLY = 32
 """Number of samples whose medians are the first grip and the load: the last ones before the filters have settled."""
@@ -19,7 +19,8 @@ STATE = np.dtype(
         *((name, float) for name in ("age", "span", "since", "start", "load", "grip")),
         *((name, float, 3) for name in ("slid", "velocity")),
         *((name, float) for name in ("found", "goal", "began", "balance", "caught", "eased", "force", "torque")),
-        *((name, float) for name in ("blind", "weight", "lately", "count")),
+        *((name, float) for name in ("blind", "weight", "lately", "pressed", "count")),
+        *((name, float) for name in ("broke", "dipped", "before")),
         *((name, float, EARLY) for name in ("forces", "loads")),
     ]
 )
@@ -27,10 +28,12 @@ STATE = np.dtype(
 from which it falls, largest holding load of late at mu = 1 and grip [N], displacement and velocity; then of some
 controllers: 1 once friction is found, goal, time since the slip began [s], the grip that balances the load [N], 1 once
 caught, share of the grip that is left, and filtered force and torque; of all: time for which the part falls while the
-slip sensor does not say so [s], largest holding load before that, filtered holding load, and number, grips and holding
-loads of the first samples."""
+slip sensor does not say so [s], largest holding load before that, filtered holding load and grip force, and number,
+grips and holding loads of the first samples; of slips on purpose: holding load over grip at which the part breaks
+loose, time since a dip of the grip began [s], and displacement then."""
 
-FRESH = (-math.inf, -math.inf, 0.0, math.inf, *[0.0] * 6, -math.inf, 0.0, 0.0, 1.0, *[0.0] * 6, math.inf, math.inf)
+_FAR = math.inf
+FRESH = (-_FAR, -_FAR, 0.0, _FAR, *[0.0] * 6, -_FAR, 0.0, 0.0, 1.0, *[0.0] * 8, _FAR, 0.0, _FAR, _FAR)
 """State before the first sample; what has not begun is infinitely far."""
 
 LOAD_TIME = 0.3
@@ -74,6 +77,26 @@ FORCE_TIME = 0.05
 CAUGHT = 1.5
 """Grip after a slip on purpose, over the one that balances the load [-]."""
 
+REACTS = 0.03
+"""Time in which a part goes on before a catch acts, beyond the delay that is stated [s]."""
+
+NEAR, ENOUGH = 8.0, 0.7
+"""Distances from the goal, over the tolerance, from which a part that sticks is let slip in dips, and at which it is
+left [-]."""
+
+APPROACH, DIP, LONGER, WAIT = 0.03, 0.015, 0.015, 0.13
+"""Time near the grip of a break before a dip, time of a dip, what it gains with the root of the distance over the
+tolerance, and the pause in which its slip is seen [s]."""
+
+ABOVE, DEEPER = 1.06, 0.03
+"""Grip before a dip over the one in it, and the change of the next dip after one that was too small [-]."""
+
+LITTLE, MUCH = 0.3, 0.7
+"""Shares of the distance from the goal below and above which the slip of a dip is too small and too large [-]."""
+
+FADES = 0.1
+"""Rate at which the largest friction while a part is let slip is forgotten [1/s]."""
+
 SPEED_GAIN, PLACE_GAIN = 8.0, 16.0
 """Accelerations per error of the speed [1/s] and of the place [1/s^2] of a slip on purpose."""
 
@@ -110,7 +133,9 @@ def _follow(c, e, least_load):
         return 0.0, 0.0  # nothing begins before the hand grips
     dt = min(e.dt, PAUSE) if c.age >= 0.0 else 0.0  # the first sample has none
     force = e.normal_force
-    needed = e.gauge * force if xp.in_range(force) and force > 0.0 else 0.0
+    if xp.in_range(force) and force > 0.0:  # filtered as the gauge is, else a grip that falls fast seems to lose load
+        c.pressed += (force - c.pressed) * (1.0 - math.exp(-dt / SEEN_TIME)) if c.pressed > 0.0 else force
+    needed = e.gauge * c.pressed if xp.in_range(force) and force > 0.0 else 0.0
     c.load, c.age = max(needed, c.load * math.exp(-dt / LOAD_TIME)), max(c.age, 0.0) + dt
     c.span += dt
     v = e.velocity
@@ -199,8 +224,13 @@ def slip(states, found, least_load, most, least_mu, axis, tolerance, duration, a
         c.since = 0.0 if slips else c.since + dt
         stuck = c.since > STICKS  # then the wrench is that of the load, and says which grip balances it
         braking = 0.5 * acceleration
-        if 0.5 * v * v / braking >= left - AIM * tolerance or (stuck and left < tolerance):
-            c.caught = 1.0
+        if c.caught == 0.0 and c.pressed > 0.0:
+            c.broke = max(c.broke * math.exp(-FADES * dt), c.lately / c.pressed)
+        near = stuck and (left < NEAR * tolerance or c.began > duration)
+        span = DIP + LONGER * math.sqrt(max(left / tolerance, 0.0))
+        far = left - AIM * tolerance - v * REACTS - 0.5 * v * v / braking
+        if c.began >= 0.0 and c.caught == 0.0 and (near or far <= 0.0):
+            c.caught, c.dipped = 1.0, APPROACH + span  # it may be on its way already: no dip before this is seen
         if slips:
             c.balance = min(c.balance * math.exp(adapt * (v - speed - 2.0 * (place - there)) * dt), LARGEST)
         if stuck and c.began >= 0.0:
@@ -208,8 +238,15 @@ def slip(states, found, least_load, most, least_mu, axis, tolerance, duration, a
         a = push + SPEED_GAIN * (speed - v) + PLACE_GAIN * (place - there)
         lead = min(max(a / acceleration, -0.6), 0.25)
         start = _begin(c, 2.5 * c.load / e.mu_c, most)
+        c.dipped += dt
         if c.caught > 0.0:
-            asked = CAUGHT * max(c.balance, c.load / e.mu_c)
+            if stuck and c.dipped > span + WAIT and left > ENOUGH * tolerance:
+                share = (x - c.before) / (goal - c.before)  # before the first dip, of all: it is less deep
+                c.broke *= 1.0 + (DEEPER if share < LITTLE else (-0.5 * DEEPER if share > MUCH else 0.0))
+                c.dipped, c.before = 0.0, x
+            dips = c.dipped < APPROACH + span and not unsure
+            level = c.lately / max(c.broke, 1e-9) * (ABOVE if c.dipped < APPROACH else 1.0)
+            asked = level if dips else CAUGHT * max(c.balance, c.load / e.mu_c)
         elif c.began < 0.0:
             asked = min(start, c.grip) * math.exp(-RELEASE * dt)
         else:

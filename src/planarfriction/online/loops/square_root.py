@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from planarfriction.compiler import kernel
+from planarfriction.kernels.vectors import clear
 
 N = 12
 """Number of unknowns."""
@@ -17,8 +18,7 @@ ROOT = N
 def measure(s, h, innovation, variance, column):
     """Update with a scalar `innovation` of slope `h [N]` and variance: rotate `[[sqrt(variance), h'S], [0, S]]`."""
     corner = math.sqrt(variance)
-    for i in range(N):
-        column[i] = 0.0
+    clear(column, N)
     for j in range(N - 1, -1, -1):
         v = 0.0
         for i in range(j, N):
@@ -48,8 +48,7 @@ def _take_in(s, first, column):
 @kernel
 def spread(s, i, variance, column):
     """Add a variance to unknown i."""
-    for k in range(N):
-        column[k] = 0.0
+    clear(column, N)
     column[i] = math.sqrt(variance)
     _take_in(s, i, column)
 

@@ -32,11 +32,12 @@ int loop(int n, double *state, const double *twists, double *wrench)
 
 int body_loop(int n, double *state, const double *pushes, double *wrench)
 {
-    const friction_body body = { 0.2, 1e-5, 0.0, 0.0 };
+    const friction_body body = { 0.2, 1e-5, { { 0.0, 0.0, 0.0 } } };
+    const double load = 1.0;
     double twist[3] = { 0.0, 0.0, 0.0 };
     int i, code = 0;
     for (i = 0; i < n; ++i) {
-        code |= friction_body_step(&friction_default, &body, state, twist, 1.0, 1e-3, pushes + 3 * i, wrench);
+        code |= friction_body_step(&friction_default, &body, state, twist, &load, 1e-3, pushes + 3 * i, wrench);
     }
     return code;
 }

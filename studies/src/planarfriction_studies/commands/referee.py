@@ -93,7 +93,7 @@ def _judged(
 ) -> tuple[list[Any], int]:
     """Judge with progress; return verdicts, those of the file among them, and the exit code."""
     from planarfriction.cli import INTERRUPTED
-    from planarfriction.cli.console import count_progress, note
+    from planarfriction.cli.console import note, work_progress
     from planarfriction.writing import check_writable
     from planarfriction_studies.referee.run import Apart, Kept, run
 
@@ -101,7 +101,8 @@ def _judged(
         check_writable(file)
     kept, code = Kept(file), 0
     try:
-        with Apart() as apart, count_progress("referee") as progress:
+        with Apart() as apart, work_progress("referee") as report:
+            progress = lambda done, of, words: report(words, done, of)  # noqa: E731
             run(cases, engines, kept, steps=steps, judged=apart.judge, progress=progress)
     except KeyboardInterrupt:
         code = INTERRUPTED

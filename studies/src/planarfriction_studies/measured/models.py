@@ -266,10 +266,10 @@ class BristleModel(SlideFit):
 
 def _slide(model: Any, question: SlideQuestion) -> np.ndarray:
     """Simulate a slide from the start that fits the first poses best."""
-    from planarfriction.identify import Slide, SlidingBody
+    from planarfriction.identify import MassProperties, Slide
     from planarfriction.identify.slides import improve_start, slide_poses
 
-    body = SlidingBody(question.mass, question.inertia)
+    body = MassProperties(question.mass, question.inertia)
     first = len(question.first)
     begun = parabolas([question])[0]
     part = Slide(question.time[:first], question.first, begun[3:])

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planarfriction.identify import Slide, SlidingBody
+from planarfriction.identify import MassProperties, Slide
 from planarfriction.identify.slides import contradictions
 from planarfriction.patch import ContactPatch
 from planarfriction_studies.measured.questions import FIRST_POSES, Case, SlideQuestion
@@ -58,7 +58,7 @@ def refused(cases: Sequence[Case]) -> dict[int, str]:
     Returns reasons by index.
     """
     measured = [Slide(case.question.time, case.answer, name=case.name) for case in cases]
-    return contradictions(measured, SlidingBody(MASS, INERTIA))
+    return contradictions(measured, MassProperties(MASS, INERTIA))
 
 
 def errors(case: Case, answer: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call_c
 from planarfriction.compiler.memory import at, doubles, integers, integers32
 from planarfriction.kernels.coupling_rows import ALONG, FLAT
-from planarfriction.kernels.vectors import dot, norm, plus, square, three, times
+from planarfriction.kernels.vectors import clear, dot, norm, plus, square, three, times
 
 
 @kernel
@@ -164,8 +164,7 @@ def _rows(own, m, d, s, nefc, p, kept):
     if own.model.geom_surfacevel >= 0:
         _add_drift(own, m, d, s, p, integers(own.own)[p], 1.0)
         _add_drift(own, m, d, s, p, integers(own.other)[p], -1.0)
-    for i in range(3 * nv):
-        rows[i] = 0.0
+    clear(rows, 3 * nv)
     moves, turns, velocity, roll, rock = s.moves, s.turns, doubles(integers(d + own.data.qvel)[0]), 0.0, 0.0
     for side in range(2):
         body = integers(own.own_bodies)[p] if side == 0 else integers(own.other_bodies)[p]

@@ -10,6 +10,7 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import at, doubles, integers
 from planarfriction.formulas import PARAMETERS, LawNumbers
+from planarfriction.kernels.vectors import copy
 
 COUNT = len(PARAMETERS)
 
@@ -60,8 +61,7 @@ def write_laws(own, m, patches, problem, place):
         if integers(own.laws)[p] == 0:
             continue
         words, record, copied = integers(own.record_words)[p], integers(problem.records[p]), integers(place)
-        for i in range(words):
-            copied[i] = record[i]
+        copy(record, copied, words)
         law, q = doubles(place), parameters_of(own, m, p)
         for i in range(len(_PLACES)):
             law[_PLACES[i]] = q[i]

@@ -13,6 +13,7 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call_c
 from planarfriction.compiler.memory import at, doubles, integers, integers32
+from planarfriction.kernels.vectors import copy
 
 MISFIT = 3e-9
 """Speed [m/s] by which a constraint may leave its range without a new solution."""
@@ -97,8 +98,7 @@ def _stiff(own, m, d, s, sparse, nefc):
     else:
         call_c(own.functions.mj_fullM, (m, d, s.inertia))
     h, inertia, cones = s.stiff, s.inertia, False
-    for i in range(own.nv * own.nv):
-        h[i] = inertia[i]
+    copy(inertia, h, own.nv * own.nv)
     _update(own, m, d, s, sparse, nefc)
     states, weights = integers32(integers(d + own.data.efc_state)[0]), doubles(integers(d + own.data.efc_D)[0])
     for r in range(nefc):
@@ -137,8 +137,7 @@ def _free_metric(own, m, d, s, metric, dt):
 def _metric(own, m, d, s):
     """Write the metric of the integrator in the place of H."""
     nv, metric, dt = own.nv, s.stiff, doubles(m + own.model.timestep)[0]
-    for i in range(nv * nv):
-        metric[i] = s.inertia[i]
+    copy(s.inertia, metric, nv * nv)
     integrator = integers32(m + own.model.integrator)[0]
     if integrator == own.constants.EULER:
         for i in range(nv):

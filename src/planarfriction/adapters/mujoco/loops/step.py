@@ -24,6 +24,7 @@ from planarfriction.kernels.coupling import shortening_of, step_all, too_far
 from planarfriction.kernels.coupling_rows import Problem
 from planarfriction.kernels.coupling_rows import read as read_patches
 from planarfriction.kernels.following import hold
+from planarfriction.kernels.vectors import clear, copy
 
 PASSES = 10
 """Largest number of solutions of a step, again after it has activated other constraints."""
@@ -46,18 +47,6 @@ class _Own(NamedTuple):
 
 
 @kernel
-def _copy(source, target, count):
-    for i in range(count):
-        target[i] = source[i]
-
-
-@kernel
-def _clear(target, count):
-    for i in range(count):
-        target[i] = 0.0
-
-
-@kernel
 def _recall(host, kept, d):
     """Bring state, guess and start of the solver to the time of the data; return True if the step is planned anew."""
     now, warmstart = doubles(d + host.data.time)[0], doubles(integers(d + host.data.qacc_warmstart)[0])
@@ -65,20 +54,20 @@ def _recall(host, kept, d):
     for i in range(host.nv):
         started = started or warmstart[i] != 0.0
     if again and started:
-        _copy(kept.warmstart, warmstart, host.nv)
+        copy(kept.warmstart, warmstart, host.nv)
         return again
     if now == kept.next[0] and started:
-        _copy(kept.new, kept.state, host.states)
-        _copy(kept.wrench, kept.guess, 3 * host.count)
-        _copy(kept.centre, kept.held, 3 * host.count)
-        _copy(kept.axis, kept.before, 3 * host.count)
+        copy(kept.new, kept.state, host.states)
+        copy(kept.wrench, kept.guess, 3 * host.count)
+        copy(kept.centre, kept.held, 3 * host.count)
+        copy(kept.axis, kept.before, 3 * host.count)
     else:
         # other times than those of the last step, or a rollout, which clears where the solver starts but not this
-        _clear(kept.state, host.states)
-        _clear(kept.guess, 3 * host.count)
-        _clear(kept.held, 3 * host.count)
-        _clear(kept.before, 3 * host.count)
-    _copy(warmstart, kept.warmstart, host.nv)
+        clear(kept.state, host.states)
+        clear(kept.guess, 3 * host.count)
+        clear(kept.held, 3 * host.count)
+        clear(kept.before, 3 * host.count)
+    copy(warmstart, kept.warmstart, host.nv)
     kept.time[0] = now
     return again
 
@@ -90,21 +79,21 @@ def _take_off(host, kept, d, again):
     for i in range(host.nv):
         same = same and passive[i] == kept.total[i]
     if same:
-        _copy(kept.passive, passive, host.nv)
+        copy(kept.passive, passive, host.nv)
     else:
-        _copy(passive, kept.passive, host.nv)
+        copy(passive, kept.passive, host.nv)
 
 
 @kernel
 def _apply(own, d, w):
     """Add wrenches to the passive forces."""
     nv, kept, passive = own.host.nv, own.kept, doubles(integers(d + own.host.data.qfrc_passive)[0])
-    _copy(kept.passive, passive, nv)
+    copy(kept.passive, passive, nv)
     for r in range(3 * own.host.count):
         if w[r] != 0.0:
             for i in range(nv):
                 passive[i] += w[r] * own.scratch.jacobian[nv * r + i]
-    _copy(passive, kept.total, nv)
+    copy(passive, kept.total, nv)
 
 
 @kernel
@@ -130,8 +119,8 @@ def _add(own, d):
 def _slope(own, patches):
     """Return `move . (w(V, N) - W)` at the host's twists, loads and wrenches: positive before the root only."""
     problem, n = own.problem, 3 * own.host.count
-    _copy(problem.free_twist, problem.twist, n)
-    _copy(problem.free_load, problem.load, own.host.count)
+    copy(problem.free_twist, problem.twist, n)
+    copy(problem.free_load, problem.load, own.host.count)
     step_all(patches, problem, patches.steps)
     total = 0.0
     for i in range(n):
@@ -178,7 +167,7 @@ def _solve(own, patches, m, d, nefc):
         hold(patches, problem)
         passes += 1
         if problem.iterations[0] < 0.0:
-            _clear(problem.wrench, 3 * host.count)
+            clear(problem.wrench, 3 * host.count)
             _apply(own, d, problem.wrench)
             return problem.iterations[0], passes
         iterations += problem.iterations[0]
@@ -196,12 +185,12 @@ def _solve(own, patches, m, d, nefc):
 @kernel
 def _forget(host, kept, d):
     """Clear the memory: no patch is in contact, or none can have friction."""
-    _clear(kept.new, host.states)
-    _clear(kept.wrench, 3 * host.count)
-    _clear(kept.twist, 3 * host.count)
-    _clear(kept.load, host.count)
-    _clear(kept.centre, 3 * host.count)
-    _copy(doubles(integers(d + host.data.qfrc_passive)[0]), kept.total, host.nv)
+    clear(kept.new, host.states)
+    clear(kept.wrench, 3 * host.count)
+    clear(kept.twist, 3 * host.count)
+    clear(kept.load, host.count)
+    clear(kept.centre, 3 * host.count)
+    copy(doubles(integers(d + host.data.qfrc_passive)[0]), kept.total, host.nv)
     kept.iterations[0], kept.passes[0], kept.residual[0], kept.converged[0] = 0.0, 0.0, 0.0, 1.0
     kept.misplaced[0] = 0.0
 
@@ -210,17 +199,17 @@ def _forget(host, kept, d):
 def _remember(own, m, iterations, passes):
     """Store the result of the step in the user data."""
     host, kept, problem, valid = own.host, own.kept, own.problem, iterations >= 0.0
-    _copy(problem.wrench, kept.wrench, 3 * host.count)
+    copy(problem.wrench, kept.wrench, 3 * host.count)
     for p in range(host.count):
         kept.wrench[3 * p + 2] *= scale_of(host, m, p)
     if valid:
-        _copy(problem.new, kept.new, host.states)
-        _copy(problem.twist, kept.twist, 3 * host.count)
-        _copy(problem.load, kept.load, host.count)
+        copy(problem.new, kept.new, host.states)
+        copy(problem.twist, kept.twist, 3 * host.count)
+        copy(problem.load, kept.load, host.count)
         for p in range(host.count):
             kept.twist[3 * p + 2] /= scale_of(host, m, p)
     else:
-        _clear(kept.new, host.states)
+        clear(kept.new, host.states)
     kept.iterations[0], kept.passes[0] = iterations, passes
     kept.residual[0], kept.converged[0] = problem.residual[0], problem.converged[0] if valid else 0.0
 
@@ -263,20 +252,20 @@ def plan(place_of_host: Place, m: Place, d: Place) -> None:
     else:
         problem = arrays_at(patches.row, s.problem)
         own = _Own(host, problem, s, kept)
-        _copy(doubles(host.problem), s.problem, host.words)
+        copy(doubles(host.problem), s.problem, host.words)
         problem.dt[0] = dt
-        _copy(kept.state, problem.state, host.states)
+        copy(kept.state, problem.state, host.states)
         write_laws(host, m, patches, problem, at(taken, host.scratch.records))
         for p in range(host.count):
             first = patches.firsts[p]
             _carry(s, p, at(problem.state, first), (patches.firsts[p + 1] - first) // patches.bristle[p])
             _put_guess(host, m, p, s, at(kept.guess, 3 * p), at(problem.guess, 3 * p))
-        _copy(problem.guess, problem.wrench, 3 * host.count)
+        copy(problem.guess, problem.wrench, 3 * host.count)
         _apply(own, d, problem.guess)
         call_c(host.functions.mj_fwdActuation, (m, d))
         _accelerate(host, m, d)
         follow_centres(host, m, d, s, nefc, patches.radius, problem, kept)
-        _copy(problem.guess, problem.wrench, 3 * host.count)
+        copy(problem.guess, problem.wrench, 3 * host.count)
         iterations, passes = _solve(own, patches, m, d, nefc)
         _remember(own, m, iterations, passes)
     call_c(host.functions.mj_freeStack, (d,))
@@ -311,11 +300,6 @@ def is_served(host, m):
     return serves(read(host), m)
 
 
-def plan_address() -> int:
-    """Return the address of `plan` in this process."""
-    return address_of(plan)
-
-
 def control_address() -> int:
     """Return the address at which C code calls `control`."""
     return c_address_of(control, 2)
@@ -323,6 +307,6 @@ def control_address() -> int:
 
 def compile_ahead() -> None:
     """Compile what steps inside MuJoCo take."""
-    plan_address(), control_address()
+    address_of(plan), control_address()
     plan_step.compile((types.float64[::1], types.int64, types.int64))
     is_served.compile((types.float64[::1], types.int64))

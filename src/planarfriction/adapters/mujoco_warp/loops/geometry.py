@@ -39,19 +39,23 @@ class Patches:
 
 
 @wp.struct
-class Tree:
-    """Arrays of a model and its data that Jacobians of points depend on."""
+class Host:
+    """Arrays of the model and the data of MuJoCo Warp: bodies, contacts and constraints of all worlds."""
 
+    time: wp.array(dtype=float)
+    timestep: wp.array(dtype=float)
+    site_xpos: wp.array2d(dtype=wp.vec3)
+    site_xmat: wp.array2d(dtype=wp.mat33)
+    geom_xpos: wp.array2d(dtype=wp.vec3)
+    geom_xmat: wp.array2d(dtype=wp.mat33)
+    qvel: wp.array2d(dtype=float)
+    passive: wp.array2d(dtype=float)
+    smooth: wp.array2d(dtype=float)
+    warmstart: wp.array2d(dtype=float)
     root: wp.array(dtype=int)
     ancestor: wp.array2d(dtype=int)
     centre: wp.array2d(dtype=wp.vec3)
     axis: wp.array2d(dtype=wp.spatial_vector)
-
-
-@wp.struct
-class Contacts:
-    """Contacts and constraints of all worlds."""
-
     nefc: wp.array(dtype=int)
     type: wp.array2d(dtype=int)
     id: wp.array2d(dtype=int)
@@ -59,6 +63,37 @@ class Contacts:
     frame: wp.array(dtype=wp.mat33)
     pos: wp.array(dtype=wp.vec3)
     force: wp.array2d(dtype=float)
+    sparse: int
+    """1 if the Jacobian of the constraints is sparse."""
+    nnz: wp.array2d(dtype=int)
+    first: wp.array2d(dtype=int)
+    column: wp.array3d(dtype=int)
+    jacobian: wp.array3d(dtype=float)
+    stiffness: wp.array2d(dtype=float)
+    aref: wp.array2d(dtype=float)
+    loss: wp.array2d(dtype=float)
+    inertia: wp.array2d(dtype=float)
+    """M, and the metric of the integrator, below the diagonal, row by row."""
+    metric: wp.array2d(dtype=float)
+    inertia_nnz: wp.array(dtype=int)
+    inertia_first: wp.array(dtype=int)
+    inertia_column: wp.array(dtype=int)
+    damping: wp.array2d(dtype=float)
+    implicit: int
+    """0: Euler, 1: Euler with damping, 2: `metric`."""
+
+
+@wp.struct
+class Problem:
+    """Problem in contact space of all worlds (see `coupling.HostStep`), with the state at the start of the step."""
+
+    state: wp.array2d(dtype=float)
+    twist: wp.array3d(dtype=float)
+    load: wp.array2d(dtype=float)
+    guess: wp.array3d(dtype=float)
+    response: wp.array3d(dtype=float)
+    load_response: wp.array3d(dtype=float)
+    moments: wp.array3d(dtype=float)
 
 
 @wp.struct
@@ -103,20 +138,10 @@ Places = _places()
 
 
 @wp.kernel(enable_backward=False)
-def recall(
-    patches: Patches,
-    at: Places,
-    now: wp.array(dtype=float),
-    timestep: wp.array(dtype=float),
-    memory: wp.array2d(dtype=float),
-    state: wp.array2d(dtype=float),
-    guess: wp.array3d(dtype=float),
-    held: wp.array2d(dtype=wp.vec3),
-    before: wp.array2d(dtype=wp.vec3),
-):
+def recall(patches: Patches, at: Places, host: Host, frames: Frames, problem: Problem, memory: wp.array2d(dtype=float)):
     """Bring states, guesses and origins to the times of the worlds: those of the last step's end, or of its start."""
     w = wp.tid()
-    time = now[w]
+    time = host.time[w]
     if time == memory[w, at.next]:
         for i in range(patches.states):
             memory[w, at.state + i] = memory[w, at.after + i]
@@ -132,26 +157,26 @@ def recall(
             memory[w, at.held + i] = 0.0
             memory[w, at.before + i] = 0.0
     memory[w, at.time] = time
-    memory[w, at.next] = time + timestep[w % timestep.shape[0]]
+    memory[w, at.next] = time + host.timestep[w % host.timestep.shape[0]]
     for i in range(patches.states):
-        state[w, i] = memory[w, at.state + i]
+        problem.state[w, i] = memory[w, at.state + i]
     for p in range(patches.count):
         first = at.held + 3 * p
-        held[w, p] = wp.vec3(memory[w, first], memory[w, first + 1], memory[w, first + 2])
+        frames.held[w, p] = wp.vec3(memory[w, first], memory[w, first + 1], memory[w, first + 2])
         first = at.before + 3 * p
-        before[w, p] = wp.vec3(memory[w, first], memory[w, first + 1], memory[w, first + 2])
+        frames.before[w, p] = wp.vec3(memory[w, first], memory[w, first + 1], memory[w, first + 2])
         for i in range(3):
-            guess[w, p, i] = memory[w, at.guess + 3 * p + i]
+            problem.guess[w, p, i] = memory[w, at.guess + 3 * p + i]
 
 
 @wp.func
-def jacobian_of(tree: Tree, w: int, point: wp.vec3, body: int, dof: int) -> wp.spatial_vector:
+def jacobian_of(host: Host, w: int, point: wp.vec3, body: int, dof: int) -> wp.spatial_vector:
     """Return the velocity of a point of a body, and its spin, by a degree of freedom."""
-    if tree.ancestor[body, dof] == 0:
+    if host.ancestor[body, dof] == 0:
         return wp.spatial_vector()
-    axis = tree.axis[w, dof]
+    axis = host.axis[w, dof]
     turn = wp.spatial_top(axis)
-    move = wp.spatial_bottom(axis) + wp.cross(turn, point - tree.centre[w, tree.root[body]])
+    move = wp.spatial_bottom(axis) + wp.cross(turn, point - host.centre[w, host.root[body]])
     return wp.spatial_vector(move, turn)
 
 
@@ -193,15 +218,15 @@ def drift_of(frame: wp.mat33, away: wp.vec3, surface: wp.spatial_vector, axes: w
 
 
 @wp.func
-def touch(patches: Patches, contacts: Contacts, frames: Frames, w: int, p: int, nefc: int):
+def touch(patches: Patches, host: Host, frames: Frames, w: int, p: int, nefc: int):
     """Mark the rows of a patch's contacts; return the sums of their normals and places, and their number."""
     normal = wp.vec3()
     middle = wp.vec3()
     count = int(0)
     for r in range(nefc):
-        if contacts.type[w, r] == FRICTIONLESS:
-            c = contacts.id[w, r]
-            geoms = contacts.geom[c]
+        if host.type[w, r] == FRICTIONLESS:
+            c = host.id[w, r]
+            geoms = host.geom[c]
             sign = float(0.0)
             if geoms[0] == patches.other[p] and geoms[1] == patches.own[p]:
                 sign = 1.0
@@ -209,114 +234,86 @@ def touch(patches: Patches, contacts: Contacts, frames: Frames, w: int, p: int, 
                 sign = -1.0
             if sign != 0.0:
                 frames.owner[w, r] = p
-                frame = contacts.frame[c]
+                frame = host.frame[c]
                 normal += sign * wp.vec3(frame[0, 0], frame[0, 1], frame[0, 2])
-                middle += contacts.pos[c]
+                middle += host.pos[c]
                 count += 1
     return normal, middle, count
 
 
 @wp.func
-def carry(
-    patches: Patches,
-    state: wp.array2d(dtype=float),
-    guess: wp.array3d(dtype=float),
-    w: int,
-    p: int,
-    last: wp.vec3,
-    x: wp.vec3,
-    normal: wp.vec3,
-):
+def carry(patches: Patches, problem: Problem, w: int, p: int, last: wp.vec3, x: wp.vec3, normal: wp.vec3):
     """Write bristles and guess of a patch in its axes of this step instead of the last ones, if there are any."""
     if wp.dot(last, last) > 0.0:
         cosine = wp.dot(last, x)
         sine = wp.dot(normal, wp.cross(last, x))
-        fx = guess[w, p, 0]
-        fy = guess[w, p, 1]
-        guess[w, p, 0] = cosine * fx + sine * fy
-        guess[w, p, 1] = cosine * fy - sine * fx
+        fx = problem.guess[w, p, 0]
+        fy = problem.guess[w, p, 1]
+        problem.guess[w, p, 0] = cosine * fx + sine * fy
+        problem.guess[w, p, 1] = cosine * fy - sine * fx
         for i in range(patches.bristles[p]):
             one = patches.first[p] + i
             two = one + patches.bristles[p]
-            zx = state[w, one]
-            zy = state[w, two]
-            state[w, one] = cosine * zx + sine * zy
-            state[w, two] = cosine * zy - sine * zx
+            zx = problem.state[w, one]
+            zy = problem.state[w, two]
+            problem.state[w, one] = cosine * zx + sine * zy
+            problem.state[w, two] = cosine * zy - sine * zx
 
 
 @wp.func
 def write_rows(
-    patches: Patches,
-    tree: Tree,
-    frames: Frames,
-    qvel: wp.array2d(dtype=float),
-    guess: wp.array3d(dtype=float),
-    passive: wp.array2d(dtype=float),
-    w: int,
-    p: int,
-    origin: wp.vec3,
-    axes: wp.mat33,
+    patches: Patches, host: Host, frames: Frames, problem: Problem, w: int, p: int, origin: wp.vec3, axes: wp.mat33
 ) -> wp.vec3:
     """Write the Jacobian of a patch, add its guess to the passive forces, and return the spin in its axes."""
     tilt = wp.vec3()
+    w_x = problem.guess[w, p, 0]
+    w_y = problem.guess[w, p, 1]
+    w_spin = problem.guess[w, p, 2]
     for i in range(frames.jacobian.shape[2]):
-        both = jacobian_of(tree, w, origin, patches.owner[p], i)
-        both -= jacobian_of(tree, w, origin, patches.support[p], i)
+        both = jacobian_of(host, w, origin, patches.owner[p], i)
+        both -= jacobian_of(host, w, origin, patches.support[p], i)
         move = axes * wp.spatial_top(both)
         turn = axes * wp.spatial_bottom(both)
         frames.jacobian[w, 3 * p, i] = move[0]
         frames.jacobian[w, 3 * p + 1, i] = move[1]
         frames.jacobian[w, 3 * p + 2, i] = turn[2]
-        tilt += qvel[w, i] * turn
-        passive[w, i] = passive[w, i] + move[0] * guess[w, p, 0] + move[1] * guess[w, p, 1] + turn[2] * guess[w, p, 2]
+        tilt += host.qvel[w, i] * turn
+        host.passive[w, i] = host.passive[w, i] + move[0] * w_x + move[1] * w_y + turn[2] * w_spin
     return tilt
 
 
 @wp.kernel(enable_backward=False)
-def place(
-    patches: Patches,
-    tree: Tree,
-    contacts: Contacts,
-    frames: Frames,
-    site_xpos: wp.array2d(dtype=wp.vec3),
-    site_xmat: wp.array2d(dtype=wp.mat33),
-    geom_xpos: wp.array2d(dtype=wp.vec3),
-    geom_xmat: wp.array2d(dtype=wp.mat33),
-    qvel: wp.array2d(dtype=float),
-    state: wp.array2d(dtype=float),
-    guess: wp.array3d(dtype=float),
-    passive: wp.array2d(dtype=float),
-):
+def place(patches: Patches, host: Host, frames: Frames, problem: Problem):
     """Write the frames of the patches, the Jacobian of their twists, and add the guesses to the passive forces.
 
     Bristles and guesses are carried into the axes of the step.
     """
     w = wp.tid()
     nv = frames.jacobian.shape[2]
-    nefc = wp.min(contacts.nefc[w], frames.owner.shape[1])
+    nefc = wp.min(host.nefc[w], frames.owner.shape[1])
     for r in range(nefc):
         frames.owner[w, r] = -1
     for p in range(patches.count):
-        normal, middle, count = touch(patches, contacts, frames, w, p, nefc)
+        normal, middle, count = touch(patches, host, frames, w, p, nefc)
         frames.touching[w, p] = count
         frames.axis[w, p] = frames.before[w, p]
         frames.drift[w, p] = wp.vec3()
         if count == 0:
             for j in range(3):
-                guess[w, p, j] = 0.0
+                problem.guess[w, p, j] = 0.0
                 for i in range(nv):
                     frames.jacobian[w, 3 * p + j, i] = 0.0
             continue
         normal = wp.normalize(normal)
         middle = middle / float(count)
         site = patches.site[p]
-        turned = site_xmat[w, site]
+        turned = host.site_xmat[w, site]
         last = carried(turned, normal, frames.before[w, p])
         axes = axes_of(turned, normal, last)
         x = wp.vec3(axes[0, 0], axes[0, 1], axes[0, 2])
         frames.axis[w, p] = wp.transpose(turned) * x
-        carry(patches, state, guess, w, p, last, x, normal)
-        origin = site_xpos[w, site]
+        carry(patches, problem, w, p, last, x, normal)
+        origin = host.site_xpos[w, site]
         held = frames.held[w, p]
         if patches.at_contact[p] != 0:
             if held[0] == 0.0 and held[1] == 0.0 and held[2] == 0.0:
@@ -326,42 +323,33 @@ def place(
                 origin += wp.dot(normal, middle - origin) * normal
         own = patches.own[p]
         other = patches.other[p]
-        drift = drift_of(geom_xmat[w, own], origin - geom_xpos[w, own], patches.surface[p, 0], axes)
-        drift -= drift_of(geom_xmat[w, other], origin - geom_xpos[w, other], patches.surface[p, 1], axes)
+        drift = drift_of(host.geom_xmat[w, own], origin - host.geom_xpos[w, own], patches.surface[p, 0], axes)
+        drift -= drift_of(host.geom_xmat[w, other], origin - host.geom_xpos[w, other], patches.surface[p, 1], axes)
         frames.drift[w, p] = drift
-        tilt = write_rows(patches, tree, frames, qvel, guess, passive, w, p, origin, axes)
+        tilt = write_rows(patches, host, frames, problem, w, p, origin, axes)
         frames.rolling[w, p] = wp.sqrt(tilt[0] * tilt[0] + tilt[1] * tilt[1])
         frames.axes[w, p] = axes
         frames.origin[w, p] = origin
         for r in range(nefc):
             if frames.owner[w, r] == p:
-                away = axes * (contacts.pos[contacts.id[w, r]] - origin)
+                away = axes * (host.pos[host.id[w, r]] - origin)
                 frames.lever[w, r] = wp.vec2(away[0], away[1])
 
 
 @wp.func
-def speed_of(frames: Frames, qvel: wp.array2d(dtype=float), w: int, p: int) -> float:
+def speed_of(host: Host, frames: Frames, w: int, p: int) -> float:
     """Return the speed at which a patch slides [m/s]."""
     v = wp.vec2(frames.drift[w, p][0], frames.drift[w, p][1])
     for i in range(frames.jacobian.shape[2]):
-        v += qvel[w, i] * wp.vec2(frames.jacobian[w, 3 * p, i], frames.jacobian[w, 3 * p + 1, i])
+        v += host.qvel[w, i] * wp.vec2(frames.jacobian[w, 3 * p, i], frames.jacobian[w, 3 * p + 1, i])
     return wp.length(v)
 
 
 @wp.kernel(enable_backward=False)
-def follow_centres(
-    patches: Patches,
-    contacts: Contacts,
-    frames: Frames,
-    site_xpos: wp.array2d(dtype=wp.vec3),
-    site_xmat: wp.array2d(dtype=wp.mat33),
-    timestep: wp.array(dtype=float),
-    qvel: wp.array2d(dtype=float),
-    guess: wp.array3d(dtype=float),
-):
+def follow_centres(patches: Patches, host: Host, frames: Frames, problem: Problem):
     """Move origins towards the centres of the contact forces, as far as bodies move on each other, and note them."""
     w = wp.tid()
-    nefc = wp.min(contacts.nefc[w], frames.owner.shape[1])
+    nefc = wp.min(host.nefc[w], frames.owner.shape[1])
     for p in range(patches.count):
         frames.centre[w, p] = wp.vec3()
         if frames.touching[w, p] == 0 or patches.at_contact[p] == 0:
@@ -370,16 +358,16 @@ def follow_centres(
         sum = wp.vec2()
         for r in range(nefc):
             if frames.owner[w, r] == p:
-                total += contacts.force[w, r]
-                sum += contacts.force[w, r] * frames.lever[w, r]
+                total += host.force[w, r]
+                sum += host.force[w, r] * frames.lever[w, r]
         if total > 0.0:
             held = frames.held[w, p]
             share = float(1.0)
             if held[0] != 0.0 or held[1] != 0.0 or held[2] != 0.0:
                 rate = frames.rolling[w, p]
                 if patches.radius[p] > 0.0:
-                    rate += speed_of(frames, qvel, w, p) / patches.radius[p]
-                share = wp.min(1.0, timestep[w % timestep.shape[0]] * rate / wp.static(FOLLOWS))
+                    rate += speed_of(host, frames, w, p) / patches.radius[p]
+                share = wp.min(1.0, host.timestep[w % host.timestep.shape[0]] * rate / wp.static(FOLLOWS))
             move = (share / total) * sum
             for i in range(frames.jacobian.shape[2]):
                 spin = frames.jacobian[w, 3 * p + 2, i]
@@ -387,11 +375,12 @@ def follow_centres(
                 frames.jacobian[w, 3 * p + 1, i] = frames.jacobian[w, 3 * p + 1, i] + move[0] * spin
             drift = frames.drift[w, p]
             frames.drift[w, p] = drift + drift[2] * wp.vec3(-move[1], move[0], 0.0)
-            guess[w, p, 2] = guess[w, p, 2] - move[0] * guess[w, p, 1] + move[1] * guess[w, p, 0]
+            guess = problem.guess[w, p, 2] - move[0] * problem.guess[w, p, 1] + move[1] * problem.guess[w, p, 0]
+            problem.guess[w, p, 2] = guess
             for r in range(nefc):
                 if frames.owner[w, r] == p:
                     frames.lever[w, r] = frames.lever[w, r] - move
             axes = frames.axes[w, p]
             frames.origin[w, p] = frames.origin[w, p] + wp.transpose(axes) * wp.vec3(move[0], move[1], 0.0)
         site = patches.site[p]
-        frames.centre[w, p] = wp.transpose(site_xmat[w, site]) * (frames.origin[w, p] - site_xpos[w, site])
+        frames.centre[w, p] = wp.transpose(host.site_xmat[w, site]) * (frames.origin[w, p] - host.site_xpos[w, site])

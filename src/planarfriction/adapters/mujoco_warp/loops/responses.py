@@ -9,7 +9,7 @@ exact for these constraints: `H a = f + Jp' W_0 + Jc' (D a_ref + c)`. One thread
 import mujoco
 import warp as wp
 
-from planarfriction.adapters.mujoco_warp.loops.geometry import Contacts, Frames, Patches, Places
+from planarfriction.adapters.mujoco_warp.loops.geometry import Frames, Host, Patches, Places, Problem
 
 EQUALITY = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_EQUALITY))
 DOF_LOSS = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF))
@@ -17,30 +17,6 @@ TENDON_LOSS = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON))
 
 SLACK = wp.constant(1e-6)
 """Speed [m/s] by which a constraint may leave its range without a new solution: single precision knows no less."""
-
-
-@wp.struct
-class Dynamics:
-    """Inertia and constraints of all worlds."""
-
-    sparse: int
-    """1 if the Jacobian of the constraints is sparse."""
-    nnz: wp.array2d(dtype=int)
-    first: wp.array2d(dtype=int)
-    column: wp.array3d(dtype=int)
-    jacobian: wp.array3d(dtype=float)
-    stiffness: wp.array2d(dtype=float)
-    aref: wp.array2d(dtype=float)
-    loss: wp.array2d(dtype=float)
-    inertia: wp.array2d(dtype=float)
-    """M, and the metric of the integrator, below the diagonal, row by row."""
-    metric: wp.array2d(dtype=float)
-    inertia_nnz: wp.array(dtype=int)
-    inertia_first: wp.array(dtype=int)
-    inertia_column: wp.array(dtype=int)
-    damping: wp.array2d(dtype=float)
-    implicit: int
-    """0: Euler, 1: Euler with damping, 2: `metric`."""
 
 
 @wp.struct
@@ -62,48 +38,36 @@ class Scratch:
     passes: wp.array(dtype=int)
 
 
-@wp.struct
-class Problem:
-    """Problem in contact space of all worlds (see `coupling.HostStep`)."""
-
-    twist: wp.array3d(dtype=float)
-    load: wp.array2d(dtype=float)
-    guess: wp.array3d(dtype=float)
-    response: wp.array3d(dtype=float)
-    load_response: wp.array3d(dtype=float)
-    moments: wp.array3d(dtype=float)
-
-
 @wp.func
-def count_of(own: Dynamics, w: int, r: int, nv: int) -> int:
+def count_of(host: Host, w: int, r: int, nv: int) -> int:
     """Return the count of numbers in a row of the constraints' Jacobian."""
-    if own.sparse != 0:
-        return own.nnz[w, r]
+    if host.sparse != 0:
+        return host.nnz[w, r]
     return nv
 
 
 @wp.func
-def column_of(own: Dynamics, w: int, r: int, i: int) -> int:
+def column_of(host: Host, w: int, r: int, i: int) -> int:
     """Return the column of a number in a row."""
-    if own.sparse != 0:
-        return own.column[w, 0, own.first[w, r] + i]
+    if host.sparse != 0:
+        return host.column[w, 0, host.first[w, r] + i]
     return i
 
 
 @wp.func
-def number_of(own: Dynamics, w: int, r: int, i: int) -> wp.float64:
+def number_of(host: Host, w: int, r: int, i: int) -> wp.float64:
     """Return a number in a row."""
-    if own.sparse != 0:
-        return wp.float64(own.jacobian[w, 0, own.first[w, r] + i])
-    return wp.float64(own.jacobian[w, r, i])
+    if host.sparse != 0:
+        return wp.float64(host.jacobian[w, 0, host.first[w, r] + i])
+    return wp.float64(host.jacobian[w, r, i])
 
 
 @wp.func
-def gap_of(own: Dynamics, acceleration: wp.array2d(dtype=wp.float64), w: int, r: int) -> wp.float64:
+def gap_of(host: Host, acceleration: wp.array2d(dtype=wp.float64), w: int, r: int) -> wp.float64:
     """Return the excess of the acceleration of a row over the one at which it has no force."""
-    total = -wp.float64(own.aref[w, r])
-    for i in range(count_of(own, w, r, acceleration.shape[1])):
-        total += number_of(own, w, r, i) * acceleration[w, column_of(own, w, r, i)]
+    total = -wp.float64(host.aref[w, r])
+    for i in range(count_of(host, w, r, acceleration.shape[1])):
+        total += number_of(host, w, r, i) * acceleration[w, column_of(host, w, r, i)]
     return total
 
 
@@ -124,15 +88,15 @@ def range_of(kind: int, force: wp.float64, loss: wp.float64) -> int:
 
 
 @wp.func
-def write_inertia(own: Dynamics, numbers: wp.array2d(dtype=float), w: int, out: wp.array3d(dtype=wp.float64)):
+def write_inertia(host: Host, numbers: wp.array2d(dtype=float), w: int, out: wp.array3d(dtype=wp.float64)):
     nv = out.shape[1]
     for i in range(nv):
         for j in range(nv):
             out[w, i, j] = wp.float64(0.0)
     for i in range(nv):
-        for n in range(own.inertia_nnz[i]):
-            at = own.inertia_first[i] + n
-            j = own.inertia_column[at]
+        for n in range(host.inertia_nnz[i]):
+            at = host.inertia_first[i] + n
+            j = host.inertia_column[at]
             out[w, i, j] = wp.float64(numbers[w, at])
             out[w, j, i] = wp.float64(numbers[w, at])
 
@@ -171,65 +135,63 @@ def solve(h: wp.array3d(dtype=wp.float64), w: int, x: wp.array3d(dtype=wp.float6
 
 
 @wp.func
-def accelerate(own: Dynamics, frames: Frames, s: Scratch, w: int, nefc: int, smooth: wp.array2d(dtype=float)):
+def accelerate(host: Host, frames: Frames, s: Scratch, w: int, nefc: int):
     """Write the answers of accelerations to wrenches, and the acceleration under the guess."""
     nv = s.stiff.shape[1]
     last = s.answers.shape[2] - 1
-    write_inertia(own, own.inertia, w, s.stiff)
+    write_inertia(host, host.inertia, w, s.stiff)
     for i in range(nv):
         for c in range(last):
             s.answers[w, i, c] = wp.float64(frames.jacobian[w, c, i])
-        s.answers[w, i, last] = wp.float64(smooth[w, i])
+        s.answers[w, i, last] = wp.float64(host.smooth[w, i])
     for r in range(nefc):
         kind = s.active[w, r]
         if kind == 0:
             continue
-        count = count_of(own, w, r, nv)
-        weight = wp.float64(own.stiffness[w, r])
-        pushed = weight * wp.float64(own.aref[w, r])
+        count = count_of(host, w, r, nv)
+        weight = wp.float64(host.stiffness[w, r])
+        pushed = weight * wp.float64(host.aref[w, r])
         if kind == 2:
-            pushed = wp.float64(own.loss[w, r])
+            pushed = wp.float64(host.loss[w, r])
         if kind == 3:
-            pushed = -wp.float64(own.loss[w, r])
+            pushed = -wp.float64(host.loss[w, r])
         for n in range(count):
-            i = column_of(own, w, r, n)
-            one = number_of(own, w, r, n)
+            i = column_of(host, w, r, n)
+            one = number_of(host, w, r, n)
             s.answers[w, i, last] = s.answers[w, i, last] + one * pushed
             if kind == 1 and one != wp.float64(0.0):
                 for m in range(count):
-                    j = column_of(own, w, r, m)
-                    s.stiff[w, i, j] = s.stiff[w, i, j] + weight * one * number_of(own, w, r, m)
+                    j = column_of(host, w, r, m)
+                    s.stiff[w, i, j] = s.stiff[w, i, j] + weight * one * number_of(host, w, r, m)
     solve(s.stiff, w, s.answers)
 
 
 @wp.func
-def gain(own: Dynamics, s: Scratch, w: int, dt: wp.float64):
+def gain(host: Host, s: Scratch, w: int, dt: wp.float64):
     """Write what the integrator makes of these accelerations: `Mh^-1 M a` with its own metric."""
     nv = s.stiff.shape[1]
     for i in range(nv):
         for c in range(s.answers.shape[2]):
             s.gains[w, i, c] = s.answers[w, i, c]
-    if own.implicit == 0:
+    if host.implicit == 0:
         return
-    write_inertia(own, own.inertia, w, s.stiff)
+    write_inertia(host, host.inertia, w, s.stiff)
     for c in range(s.answers.shape[2]):
         for i in range(nv):
             total = wp.float64(0.0)
             for j in range(nv):
                 total += s.stiff[w, i, j] * s.answers[w, j, c]
             s.gains[w, i, c] = total
-    if own.implicit == 2:
-        write_inertia(own, own.metric, w, s.stiff)
+    if host.implicit == 2:
+        write_inertia(host, host.metric, w, s.stiff)
     else:
         for i in range(nv):
-            s.stiff[w, i, i] = s.stiff[w, i, i] + dt * wp.float64(own.damping[w % own.damping.shape[0], i])
+            s.stiff[w, i, i] = s.stiff[w, i, i] + dt * wp.float64(host.damping[w % host.damping.shape[0], i])
     solve(s.stiff, w, s.gains)
 
 
 @wp.func
-def write_twists(
-    frames: Frames, s: Scratch, out: Problem, w: int, n: int, dt: wp.float64, qvel: wp.array2d(dtype=float)
-):
+def write_twists(host: Host, frames: Frames, s: Scratch, out: Problem, w: int, n: int, dt: wp.float64):
     """Write the twists at the end of the step and their response."""
     for c in range(n):
         v = wp.float64(frames.drift[w, c / 3][c % 3])
@@ -238,7 +200,7 @@ def write_twists(
         for i in range(s.stiff.shape[1]):
             share = wp.float64(frames.jacobian[w, c, i])
             if share != wp.float64(0.0):
-                v += share * (wp.float64(qvel[w, i]) + dt * s.gains[w, i, n])
+                v += share * (wp.float64(host.qvel[w, i]) + dt * s.gains[w, i, n])
                 for e in range(n):
                     out.response[w, c, e] = out.response[w, c, e] + float(dt * share * s.gains[w, i, e])
         out.twist[w, c / 3, c % 3] = float(v)
@@ -246,7 +208,7 @@ def write_twists(
 
 @wp.func
 def write_loads(
-    patches: Patches, own: Dynamics, frames: Frames, s: Scratch, out: Problem, w: int, nefc: int, first_pass: int
+    patches: Patches, host: Host, frames: Frames, s: Scratch, out: Problem, w: int, nefc: int, first_pass: int
 ):
     """Write the loads at the end of the step, their response, and their moments as the first pass finds them."""
     n = 3 * patches.count
@@ -256,13 +218,13 @@ def write_loads(
             out.load_response[w, p, e] = 0.0
         for r in range(nefc):
             if frames.owner[w, r] == p and s.active[w, r] == 1:
-                weight = wp.float64(own.stiffness[w, r])
-                force = -weight * gap_of(own, s.acceleration, w, r)
+                weight = wp.float64(host.stiffness[w, r])
+                force = -weight * gap_of(host, s.acceleration, w, r)
                 load, moments = load + force, moments + float(force) * frames.lever[w, r]
-                for i in range(count_of(own, w, r, s.stiff.shape[1])):
-                    share = weight * number_of(own, w, r, i)
+                for i in range(count_of(host, w, r, s.stiff.shape[1])):
+                    share = weight * number_of(host, w, r, i)
                     if share != wp.float64(0.0):
-                        j = column_of(own, w, r, i)
+                        j = column_of(host, w, r, i)
                         for e in range(n):
                             out.load_response[w, p, e] = out.load_response[w, p, e] - float(share * s.answers[w, j, e])
         out.load[w, p] = wp.max(float(load), 0.0)
@@ -275,21 +237,10 @@ def write_loads(
 
 
 @wp.kernel(enable_backward=False)
-def respond(
-    patches: Patches,
-    contacts: Contacts,
-    own: Dynamics,
-    frames: Frames,
-    s: Scratch,
-    out: Problem,
-    first_pass: int,
-    timestep: wp.array(dtype=float),
-    qvel: wp.array2d(dtype=float),
-    smooth: wp.array2d(dtype=float),
-):
+def respond(patches: Patches, host: Host, frames: Frames, s: Scratch, out: Problem, first_pass: int):
     """Write twists, loads and their responses; first with the constraints that MuJoCo's solver has found."""
     w = wp.tid()
-    nefc = wp.min(contacts.nefc[w], frames.owner.shape[1])
+    nefc = wp.min(host.nefc[w], frames.owner.shape[1])
     if first_pass != 0:
         touching = int(0)
         for p in range(patches.count):
@@ -298,29 +249,27 @@ def respond(
         s.passes[w] = 0
         s.rounds[w] = 0
         for r in range(nefc):
-            s.active[w, r] = range_of(contacts.type[w, r], wp.float64(contacts.force[w, r]), wp.float64(own.loss[w, r]))
+            s.active[w, r] = range_of(host.type[w, r], wp.float64(host.force[w, r]), wp.float64(host.loss[w, r]))
     if s.done[w] != 0:
         return
-    dt = wp.float64(timestep[w % timestep.shape[0]])
-    accelerate(own, frames, s, w, nefc, smooth)
-    gain(own, s, w, dt)
+    dt = wp.float64(host.timestep[w % host.timestep.shape[0]])
+    accelerate(host, frames, s, w, nefc)
+    gain(host, s, w, dt)
     n = 3 * patches.count
     for i in range(s.stiff.shape[1]):
         s.acceleration[w, i] = s.answers[w, i, n]
-    write_twists(frames, s, out, w, n, dt, qvel)
-    write_loads(patches, own, frames, s, out, w, nefc, first_pass)
+    write_twists(host, frames, s, out, w, n, dt)
+    write_loads(patches, host, frames, s, out, w, nefc, first_pass)
 
 
 @wp.kernel(enable_backward=False)
 def settle(
-    contacts: Contacts,
-    own: Dynamics,
+    host: Host,
     frames: Frames,
     s: Scratch,
     problem: Problem,
     wrench: wp.array3d(dtype=float),
     rounds: wp.array(dtype=int),
-    timestep: wp.array(dtype=float),
 ):
     """Find the acceleration under the wrenches; a world is done if no constraint leaves its range by it."""
     w = wp.tid()
@@ -336,12 +285,12 @@ def settle(
             total += s.answers[w, i, c] * wp.float64(change)
         s.acceleration[w, i] = total
     s.done[w] = 1
-    dt = wp.float64(timestep[w % timestep.shape[0]])
-    for r in range(wp.min(contacts.nefc[w], frames.owner.shape[1])):
-        gap = gap_of(own, s.acceleration, w, r)
-        loss = wp.float64(own.loss[w, r])
-        weight = wp.float64(own.stiffness[w, r])
-        now = range_of(contacts.type[w, r], -weight * gap, loss)
+    dt = wp.float64(host.timestep[w % host.timestep.shape[0]])
+    for r in range(wp.min(host.nefc[w], frames.owner.shape[1])):
+        gap = gap_of(host, s.acceleration, w, r)
+        loss = wp.float64(host.loss[w, r])
+        weight = wp.float64(host.stiffness[w, r])
+        now = range_of(host.type[w, r], -weight * gap, loss)
         if now != s.active[w, r]:
             s.active[w, r] = now
             if dt * wp.abs(wp.abs(gap) - loss / weight) > wp.float64(SLACK):
@@ -352,6 +301,7 @@ def settle(
 def remember(
     patches: Patches,
     at: Places,
+    host: Host,
     frames: Frames,
     s: Scratch,
     problem: Problem,
@@ -362,8 +312,6 @@ def remember(
     residual: wp.array(dtype=float),
     converged: wp.array(dtype=int),
     memory: wp.array2d(dtype=float),
-    passive: wp.array2d(dtype=float),
-    warmstart: wp.array2d(dtype=float),
 ):
     """Write the result of the step into the memory, the passive forces and the start of the solver."""
     w = wp.tid()
@@ -380,11 +328,11 @@ def remember(
             memory[w, at.twist + place] = wp.where(touches, twist[w, p, i], 0.0)
             if touches:
                 change = wrench[w, p, i] - problem.guess[w, p, i]
-                for j in range(passive.shape[1]):
-                    passive[w, j] = passive[w, j] + frames.jacobian[w, place, j] * change
+                for j in range(host.passive.shape[1]):
+                    host.passive[w, j] = host.passive[w, j] + frames.jacobian[w, place, j] * change
     if touches:
-        for j in range(passive.shape[1]):
-            warmstart[w, j] = float(s.acceleration[w, j])
+        for j in range(host.passive.shape[1]):
+            host.warmstart[w, j] = float(s.acceleration[w, j])
     memory[w, at.iterations] = float(s.rounds[w])
     memory[w, at.passes] = float(s.passes[w])
     memory[w, at.residual] = wp.where(touches, residual[w], 0.0)

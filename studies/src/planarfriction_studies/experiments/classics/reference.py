@@ -50,6 +50,19 @@ def moved(
     return {"time": time, "x": x, "vx": v, "friction": friction(z, v)[1]}
 
 
+def hunting(gains: Sequence[float], goal: float, t_end: float, dt: float) -> Arrays:
+    """Integrate a mass of 1 kg from rest under a PID controller of `gains` [N/m, N/(m s), N s/m] towards `goal` [m]."""
+    stiffness, integral, damping = gains
+
+    def rates(t: float, y: np.ndarray) -> list[float]:
+        x, v, z, error = y
+        rate, against = friction(z, v)
+        return [v, stiffness * (goal - x) + integral * error - damping * v - against, rate, goal - x]
+
+    time, (x, v, _, error) = _integrated(rates, (0.0, t_end), np.zeros(4), dt)
+    return {"time": time, "x": x, "force": stiffness * (goal - x) + integral * error - damping * v}
+
+
 def driven(t_end: float, speed: Callable[[Any], Any], dt: float) -> Arrays:
     """Integrate a bristle from rest, driven at a `speed` [m/s] > 0; columns as in `moved`."""
 

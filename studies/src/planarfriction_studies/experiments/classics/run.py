@@ -25,6 +25,11 @@ PULL, LONG, SHORT = 0.1, 30.0, 10.0
 PUSH = ((0.0, 10.0, 15.0, 35.0, 40.0), (0.0, 1.425, 1.425, -1.425, -1.425))
 """Corners [s], [N] of the force of presliding."""
 
+GAINS, GOAL, HUNTED, SETTLED = (3.0, 4.0, 6.0), 1.0, 100.0, 30.0
+"""Gains of the controller [N/m, N/(m s), N s/m], its goal [m], duration, and when numbers are taken [s]."""
+
+_HALVED = "Extrapolated from two time steps; what is left is of second order in the step."
+
 _SAME = "The same equations, solved by two methods: what is left is our error, and that of samples around a maximum."
 
 
@@ -40,11 +45,16 @@ def run(work: Work) -> Result:
     found = {name: runs.simulated(scene, rtol=RTOL, atol=ATOL) for name, scene in every.items()}
     converged = work.pieces({name: lambda name=name: _converged(name, t_end) for name in every}, str)
     ours, theirs = _numbers(found, -1.0, "fx"), _numbers(converged, 1.0, "friction")
+    dt = 2e-3 if work.quick else 1e-3
+    coarse, fine = (scenes.hunting(gains=GAINS, goal=GOAL, t_end=HUNTED, dt=each) for each in (2.0 * dt, dt))
+    one, other = _hunting(coarse), _hunting(fine)
+    ours |= {name: 2.0 * other[name] - one[name] for name in one}
+    theirs |= _hunting(work.pieces({"hunting": lambda: reference.hunting(GAINS, GOAL, HUNTED, dt)}, str)["hunting"])
     columns = {"ours": entry(0, digits=6), "integrated without the library": entry(1, digits=6)}
     rows = {name: (value, theirs[name]) for name, value in ours.items()}
     return report(
         "classics",
-        {"classics": _figure(found)},
+        {"classics": _figure(found, fine)},
         {"found": ours, "converged": theirs, "end": t_end},
         comparisons=_comparisons(ours, theirs),
         tables=(experiment.table("Numbers of the experiments, SI units", rows, columns, "number"),),
@@ -76,18 +86,31 @@ def _numbers(found: dict[str, Arrays], sign: float, friction: str) -> dict[str, 
     return {name: float(value) for name, value in numbers.items()}
 
 
+def _hunting(run: Arrays) -> dict[str, float]:
+    """Return the period by all passages of the goal, and the largest error, once the first swings are over."""
+    time, off = run["time"], run["x"] - GOAL
+    rows = np.flatnonzero((off[:-1] < 0.0) != (off[1:] < 0.0))
+    passed = time[rows] - off[rows] * (time[rows + 1] - time[rows]) / (off[rows + 1] - off[rows])
+    period = 2.0 * np.diff(passed[passed > SETTLED]).mean()
+    return {
+        "hunting, period [s]": float(period),
+        f"hunting, largest error after {SETTLED:g} s [m]": float(np.abs(off[time >= SETTLED]).max()),
+    }
+
+
 def _comparisons(ours: dict[str, float], theirs: dict[str, float]) -> list[Comparison]:
     """Compare every number with that of the integration without the library."""
     rows = []
     for name, value in theirs.items():
         words, unit = name.removesuffix("]").split(" [")
-        rows.append(compare(words, ours[name], value, "converged", 2e-6 * abs(value), unit, _SAME))
+        share, why = (1e-3, _HALVED) if words.startswith("hunting") else (2e-6, _SAME)
+        rows.append(compare(words, ours[name], value, "converged", share * abs(value), unit, why))
     return rows
 
 
-def _figure(found: dict[str, Arrays]) -> PlotFigure:
-    """Draw stick-slip, the presliding loop, break-away and lag."""
-    figure, ((slip, loop), (away, lag)) = looks.panels(9.6, 6.4, 2, 2)
+def _figure(found: dict[str, Arrays], hunted: Arrays) -> PlotFigure:
+    """Draw stick-slip, the presliding loop, break-away, lag and hunting."""
+    figure, ((slip, loop), (away, lag), (hunting, force)) = looks.panels(9.6, 9.4, 3, 2)
     run, colour = found["stick-slip"], looks.DISTRIBUTED
     slip.plot(run["time"], run["x"], color=colour, label="mass")
     slip.plot(run["time"], PULL * run["time"], ":", color="0.4", label="end of the spring")
@@ -103,6 +126,11 @@ def _figure(found: dict[str, Arrays]) -> PlotFigure:
         last = run["time"] >= 0.5 * run["time"][-1]
         lag.plot(1e3 * run["vx"][last], -run["fx"][last], color=shade, label=f"{frequency:g} rad/s")
     lag.set(title="friction lag", xlabel="speed [mm/s]", ylabel="friction [N]")
-    for axes in (slip, lag):
+    hunting.plot(hunted["time"], hunted["x"], color=colour, label="mass")
+    hunting.plot([0.0, HUNTED], [GOAL, GOAL], ":", color="0.4", label="goal")
+    hunting.set(title="hunting", xlabel="time [s]", ylabel="$x$ [m]")
+    force.plot(hunted["time"], hunted["force"], color=colour)
+    force.set(title="force of the controller", xlabel="time [s]", ylabel="force [N]")
+    for axes in (slip, lag, hunting):
         axes.legend(frameon=False)
     return figure

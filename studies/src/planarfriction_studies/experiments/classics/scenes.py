@@ -1,7 +1,7 @@
 """The experiments of the LuGre paper as ready scenes: one mass, one line of motion.
 
 Each takes a model; without one a single point with the law of the paper, `mu_c = 1`, `mu_s = 1.5` under 1 N. Hunting
-under a PID controller is not among them: its integral is a state that no part of a scene has.
+under a PID controller is a loop around `pf.SlidingBody`: the integral is a state that no part of a scene has.
 
 Source: Canudas de Wit, Olsson, Astrom, Lischinsky 1995, "A new model for control of systems with friction".
 """
@@ -18,6 +18,7 @@ from planarfriction.models import DistributedModel
 from planarfriction.patch import ContactPatch
 from planarfriction.scenes import Body, Contact, Scene, Signal, Spring
 from planarfriction.scenes.ready import FINE
+from planarfriction.sliding_body import SlidingBody
 
 BODY = Body(1.0, 1.0, gravity=(0.0, 0.0))
 """The mass of 1 kg of every experiment; it does not turn."""
@@ -48,6 +49,40 @@ def stick_slip(
     t_end, way = validation.positive("t_end", t_end), validation.number("speed", speed) * t_end
     end = Signal([0.0, t_end], [[0.0, 0.0, 0.0], [way, 0.0, 0.0]], "linear")
     return Scene(BODY, _contact(model, normal_force), t_end, springs=Spring(stiffness, 0.0, end), name="stick-slip")
+
+
+def hunting(
+    model: Any = None,
+    *,
+    gains: tuple[float, float, float] = (3.0, 4.0, 6.0),
+    goal: float = 1.0,
+    normal_force: float = 1.0,
+    t_end: float = 100.0,
+    dt: float = 1e-3,
+) -> dict[str, np.ndarray]:
+    """Simulate a mass under a PID controller of `gains` [N/m, N/(m s), N s/m] that is to bring it to `goal` [m].
+
+    It overshoots, sticks until the integral has grown enough, and overshoots on the other side, for ever. The
+    controller acts by its mean over each step, at a speed linear in time, so that its part at the new speed is added to
+    the mass. Returns columns time, x and force. The error falls with `dt`.
+
+    Raises InvalidValueError for a parameter that breaks its rule.
+    """
+    (stiffness, integral, damping), half = gains, 0.5 * dt
+    model = point() if model is None else model
+    body = SlidingBody(1.0 + half * (damping + half * (stiffness + half * integral)), 1.0, model)
+    state, twist, error = body.rest(), np.zeros(3), 0.0
+    rows = np.zeros((round(validation.positive("t_end", t_end) / validation.positive("dt", dt)) + 1, 3))
+    for i in range(len(rows) - 1):
+        x, v = rows[i, 1], twist[0]
+        off = goal - x - half * v
+        force = stiffness * off + integral * (error + half * off) - damping * v
+        state, twist, _ = body.step(state, twist, normal_force, dt, (force, 0.0, 0.0))
+        moved = half * (v + twist[0])
+        error += dt * (goal - x - 0.5 * moved)
+        x += moved
+        rows[i + 1] = (i + 1) * dt, x, stiffness * (goal - x) + integral * error - damping * twist[0]
+    return dict(zip(("time", "x", "force"), rows.T, strict=True))
 
 
 def presliding(model: Any = None, *, force: float = 1.425, normal_force: Any = 1.0) -> Scene:

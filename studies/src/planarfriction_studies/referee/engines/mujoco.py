@@ -91,20 +91,20 @@ class MujocoWorld:
 
 
 ELLIPTIC = 'cone="elliptic" impratio="10"'
-"""Options of MuJoCo that are advised against slip."""
+"""Options of MuJoCo that its documentation advises against slip."""
+
+NOSLIP = f'{ELLIPTIC} noslip_iterations="10"'
+STIFF = 'cone="elliptic" impratio="100" noslip_iterations="10"', 'condim="3" solref="0.004 1"', "implicitfast"
+"""Options, attributes of pairs and integrator of the stiffest contacts."""
 
 ENGINES = [
     Mujoco("MuJoCo", "as it comes: pyramidal cone, impratio 1, condim 3, Euler"),
     Mujoco("MuJoCo, elliptic", "elliptic cone, impratio 10, condim 3, implicitfast", ELLIPTIC,
            integrator="implicitfast"),
-    Mujoco(
-        "MuJoCo, noslip", "elliptic cone, impratio 10, condim 3, implicitfast, noslip_iterations 10",
-        f'{ELLIPTIC} noslip_iterations="10"', integrator="implicitfast",
-    ),
-    Mujoco(
-        "MuJoCo, stiff", "elliptic cone, impratio 100, noslip_iterations 10, solref 0.004 1, condim 3, implicitfast",
-        'cone="elliptic" impratio="100" noslip_iterations="10"', 'condim="3" solref="0.004 1"', "implicitfast",
-    ),
+    Mujoco("MuJoCo, noslip", "elliptic cone, impratio 10, condim 3, implicitfast, noslip_iterations 10", NOSLIP,
+           integrator="implicitfast"),
+    Mujoco("MuJoCo, stiff",
+           "elliptic cone, impratio 100, noslip_iterations 10, solref 0.004 1, condim 3, implicitfast", *STIFF),
     Mujoco(
         "MuJoCo, patches", "planarfriction: ReducedModel, 21 cells across, implicitfast",
         integrator="implicitfast", kind="reduced",

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction_studies.referee.case import Case
-from planarfriction_studies.referee.engines.mujoco import ELLIPTIC, Mujoco, MujocoWorld
+from planarfriction_studies.referee.engines.mujoco import ELLIPTIC, NOSLIP, STIFF, Mujoco, MujocoWorld
 
 ROOM = 400
 """Room for the contacts and for the constraints of a case."""
@@ -64,6 +64,11 @@ ENGINES = [
     MujocoWarp("MuJoCo Warp", f"as it comes: pyramidal cone, impratio 1, condim 3, Euler; {_CPU}"),
     MujocoWarp("MuJoCo Warp, elliptic", f"elliptic cone, impratio 10, condim 3, implicitfast; {_CPU}", ELLIPTIC,
                integrator="implicitfast"),
+    MujocoWarp("MuJoCo Warp, noslip",
+               f"elliptic cone, impratio 10, condim 3, implicitfast, noslip_iterations 10; {_CPU}", NOSLIP,
+               integrator="implicitfast"),
+    MujocoWarp("MuJoCo Warp, stiff", "elliptic cone, impratio 100, noslip_iterations 10, solref 0.004 1, condim 3, "
+               f"implicitfast; {_CPU}", *STIFF),
     MujocoWarp("MuJoCo Warp, patches", f"planarfriction: ReducedModel, 21 cells across, implicitfast; {_CPU}",
                integrator="implicitfast", kind="reduced"),
 ]  # fmt: skip

@@ -106,16 +106,19 @@ class NewtonWorld:
     """A case in Newton."""
 
     def __init__(self, case: Case, model: Any, bodies: list[int], solver: Any, dt: float) -> None:
+        import newton
+
         self.case, self.bodies, self._model, self._solver, self._dt = case, bodies, model, solver, dt
         self._now, self._next, self._control = model.state(), model.state(), model.control()
-        self._contacts = model.contacts()
+        self._collisions = newton.CollisionPipeline(model)
+        self._contacts = self._collisions.contacts()
 
     def step(self, wrenches: np.ndarray) -> None:
         """Make a step; forces are forgotten after it."""
         forces = np.zeros((self._model.body_count, 6), np.float32)
         forces[self.bodies] = wrenches
         self._now.body_f.assign(forces)
-        self._model.collide(self._now, self._contacts)
+        self._collisions.collide(self._now, self._contacts)
         self._solver.step(self._now, self._next, self._control, self._contacts, self._dt)
         self._now, self._next = self._next, self._now
 

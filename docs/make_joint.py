@@ -1,0 +1,104 @@
+"""Make the pictures of the page on joints: `python docs/make_joint.py [FOLDER]`, by default in `docs/images`.
+
+`joint.png` is the fit of the servo's logs. `joint-holds.png` is a joint that should hold at half its Coulomb level,
+under a load that swings at 5 Hz: MuJoCo's `frictionloss` and the bristles of its dcmotor, and elasto-plastic bristles.
+Angles are taken once in each swing, so that what bends back does not count.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from make_moving import check_size
+
+import planarfriction as pf
+from planarfriction.plots import style
+
+INERTIA, COULOMB, LOAD, SWING, FREQUENCY = 0.01, 0.8, 0.4, 0.1, 5.0
+"""kg m^2, N m, and the load and its swing [N m], [Hz]."""
+
+DT, RAMP, T_END = 1e-3, 1.0, 10.0
+"""Step of all three, time in which the load comes, and duration [s]."""
+
+LUGRE = "400 2 0.8 1.2 0.05"
+"""Stiffness, damping, Coulomb and static friction, and Stribeck speed of the dcmotor's bristles."""
+
+MODEL = """<mujoco><option timestep="{dt}" gravity="0 0 0" integrator="implicitfast"/><worldbody><body>
+<inertial pos="0 0 0" mass="1" diaginertia="{inertia} {inertia} {inertia}"/><joint name="j" axis="0 0 1" {joint}/>
+</body></worldbody><actuator>{motor}<motor name="load" joint="j"/></actuator></mujoco>"""
+
+WAYS = {
+    "MuJoCo, frictionloss": (f'frictionloss="{COULOMB}"', ""),
+    "MuJoCo, dcmotor lugre": ("", f'<dcmotor joint="j" motorconst="1" resistance="1e9" lugre="{LUGRE}"/>'),
+}
+"""Attributes of the joint, and its motor."""
+
+OURS = "elasto-plastic bristles"
+
+
+def load(t: float) -> float:
+    """Return the torque [N m] on the joint."""
+    return min(t / RAMP, 1.0) * LOAD + SWING * math.sin(2.0 * math.pi * FREQUENCY * t)
+
+
+def in_mujoco(joint: str, motor: str) -> np.ndarray:
+    """Return the angle [rad] after each step in MuJoCo."""
+    model = mujoco.MjModel.from_xml_string(MODEL.format(dt=DT, inertia=INERTIA, joint=joint, motor=motor))
+    data, angle = mujoco.MjData(model), np.empty(round(T_END / DT))
+    for i in range(len(angle)):
+        data.ctrl[-1] = load(data.time)
+        mujoco.mj_step(model, data)
+        angle[i] = data.qpos[0]
+    return angle
+
+
+def elasto_plastic() -> np.ndarray:
+    """Return the angle [rad] after each step of one elasto-plastic bristle in N m and rad, under the load 1."""
+    stiffness, damping, mu_c, mu_s, v_s = map(float, LUGRE.split())
+    law = pf.LuGre(mu_c, mu_s, v_s, stiffness, damping, 0.0, elasto_plastic=0.9)
+    body = pf.SlidingBody(INERTIA, 1.0, pf.DistributedModel(pf.ContactPatch.points([[0.0, 0.0]]), law))
+    state, twist, angle = body.rest(), np.zeros(3), np.zeros(round(T_END / DT) + 1)
+    for i in range(len(angle) - 1):
+        state, twist, _ = body.step(state, twist, 1.0, DT, (load(i * DT), 0.0, 0.0))
+        angle[i + 1] = angle[i] + DT * twist[0]
+    return angle[1:]
+
+
+def holds() -> style.PlotFigure:
+    """Draw the three angles over time, and print their rates."""
+    runs = {name: in_mujoco(*way) for name, way in WAYS.items()} | {OURS: elasto_plastic()}
+    each = round(1.0 / (FREQUENCY * DT))
+    figure = style.new_figure(6.4, 3.9)
+    axes = figure.subplots()
+    colours = dict(zip(runs, (style.PUBLISHED, style.OTHER, style.DISTRIBUTED), strict=True))
+    for (name, run), line in zip(runs.items(), style.LINE_STYLES, strict=False):
+        swings = run[each - 1 :: each]
+        rate = (swings[-1] - swings[len(swings) // 2]) / (T_END / 2.0)
+        words = f"{1e3 * rate:.1f} mrad/s" if rate > 1e-5 else f"below {1e6 * max(abs(rate), 1e-6):.0f} µrad/s"
+        print(f"{name}: {rate:.3g} rad/s")
+        axes.plot(DT * each * np.arange(1, len(swings) + 1), 1e3 * swings, ls=line, color=colours[name], lw=2.2,
+                  label=f"{name}: {words}")  # fmt: skip
+    axes.set(xlim=(0.0, T_END), ylim=(-3.0, 60.0))
+    axes.set_xlabel("time [s]", fontsize=13)
+    axes.set_ylabel("angle [mrad]", fontsize=13)
+    axes.tick_params(labelsize=12)
+    axes.legend(loc="upper right", fontsize=12.5, frameon=False)
+    return figure
+
+
+def main(folder: Path) -> None:
+    """Write the pictures and say how large they are."""
+    from planarfriction_studies.measured.joints import fit_joints
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, figure in {"joint-holds": holds(), "joint": fit_joints(progress=print).plot()}.items():
+        figure.savefig(path := folder / f"{name}.png")
+        check_size(path)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "images")
