@@ -30,7 +30,9 @@ class Distribution(NamedTuple):
 
 
 DISTRIBUTIONS = {
-    "planarfriction": Distribution(".", PLAIN | {"CHANGELOG.md", "CITATION.cff"}, {"LICENSE"}, 1.0e6),
+    "planarfriction": Distribution(
+        ".", PLAIN | {"CHANGELOG.md", "CITATION.cff", "build_backend.py"}, {"LICENSE"}, 1.0e6
+    ),
     "planarfriction_studies": Distribution("studies", PLAIN, {"LICENSE", "LICENSE-APACHE-2.0.txt", "NOTICE"}, 2.0e6),
 }
 """Distributions by the name with which their files begin."""

@@ -38,10 +38,10 @@ def words() -> dict[str, str]:
 def draw() -> plt.Figure:
     """Draw the library's floors as boxes, and the two packages that stand on it."""
     found, said = floors(), words()
-    figure, axes = plt.subplots(figsize=(10.0, 0.36 * (len(found) + 3)), layout="constrained")
+    figure, axes = plt.subplots(figsize=(7.6, 0.36 * (len(found) + 3)), layout="constrained")
     axes.set(xlim=(0.0, 10.0), ylim=(-len(found) - 0.1, 2.2))
     axes.axis("off")
-    uppers = [("planarfriction_studies", "a distribution of its own: experiments, measured data, benchmarks"),
+    uppers = [("planarfriction_studies", "on its own: experiments, measured data, benchmarks"),
               ("planarfriction_explorer", "the interactive page in the browser")]  # fmt: skip
     for i, (package, text) in enumerate(uppers):
         box(axes, 5.0 * i, 1.0, 4.9, "#ffffff", package, text, stacked=True)
@@ -61,13 +61,13 @@ def box(axes: plt.Axes, x: float, y: float, width: float, colour: str, title: st
     axes.add_patch(plt.Rectangle((x, y), width, height, facecolor=colour, edgecolor="#777777", linewidth=0.6))
     if stacked:
         axes.text(x + 0.1, y + 0.75, title, fontsize=8.5, weight="bold", va="center")
-        axes.text(x + 0.1, y + 0.32, text, fontsize=8, va="center")
+        axes.text(x + 0.1, y + 0.32, text, fontsize=7.5, va="center")
     else:
-        axes.text(x + 0.1, y + 0.43, title, fontsize=8.5, weight="bold", va="center")
-        axes.text(x + 3.4, y + 0.43, textwrap.fill(text, 116), fontsize=7.2 if len(text) < 117 else 5.6, va="center")
+        axes.text(x + 0.1, y + 0.43, textwrap.fill(title, 27), fontsize=8.5, weight="bold", va="center", linespacing=1)
+        axes.text(x + 3.0, y + 0.43, textwrap.fill(text, 84), fontsize=8, va="center", linespacing=1.05)
 
 
 if __name__ == "__main__":
     target = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs" / "images" / "house.png"
-    draw().savefig(target, dpi=130)
+    draw().savefig(target, dpi=115)
     print(target)

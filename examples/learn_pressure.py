@@ -2,7 +2,7 @@
 
 A pad of 24 x 24 mm slides and spins on a plane; a sensor measures force and torque, with noise. How the load is
 distributed over the pad is unknown: the weights of its 8 x 8 cells start out equal and follow the gradient of the
-misfit. Run it:
+misfit. Run it, with PyTorch (`pip install torch --index-url https://download.pytorch.org/whl/cpu`):
 
     python examples/learn_pressure.py --out out/
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import io
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -24,10 +25,11 @@ from typing import Any, ClassVar
 import gymnasium
 import mujoco
 import numpy as np
-from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import planarfriction as pf
 from planarfriction.adapters.mujoco import Friction, PatchContact, prepare
+from planarfriction.plots.film_files import write_frames
 from planarfriction.plots.style import new_figure
 
 WORLDS, CANDIDATES, ELITE, ROUNDS = 64, 16, 4, 12  # each candidate is tried in several worlds
@@ -170,29 +172,36 @@ def draw(rewards: dict[str, list[float]], history: np.ndarray, missed: dict[str,
 
 
 def film(angles: np.ndarray, targets: np.ndarray, path: Path) -> None:
-    """Write an animation of all plates at `angles` `[T, worlds]` [rad]; lines show where they should end."""
+    """Write an animation of all plates at `angles` `[T, worlds]` [rad] at half speed, with the angles to turn by."""
     side = int(np.sqrt(len(targets)))
-    figure = new_figure(4.4, 4.4)
+    figure = new_figure(5.4, 5.6)
     axes = figure.subplots()
-    axes.set(xlim=(-0.6, side - 0.1), ylim=(-0.9, side - 0.4), aspect="equal")
+    axes.set(xlim=(-0.4, side), ylim=(-0.9, side - 0.7), aspect="equal")
     axes.axis("off")
     x, y = np.divmod(np.arange(side**2), side)
     plates = []
     for e in range(side**2):
-        axes.plot(*_line(x[e], y[e], targets[e]), color="C1", linewidth=1.0)
-        plates.append(axes.plot([], [], color="C0", linewidth=5.0, solid_capstyle="butt", alpha=0.7)[0])
-    axes.plot(x, y, "o", color="black", markersize=3.0)
+        plates.append(axes.plot([], [], color="C0", linewidth=7.0, solid_capstyle="butt", alpha=0.6)[0])
+        axes.plot(*_line(x[e], y[e], targets[e], 0.0, 0.92), color="C3", linewidth=1.8, zorder=3)
+    pads = axes.plot(x, y, "o", color="black", markersize=5.0, zorder=4)[0]
+    shown = {"plate": plates[0], "angle to turn by": axes.lines[1], "fingers": pads}
+    figure.legend(shown.values(), shown.keys(), loc="outside upper center", ncols=3, fontsize=13, frameon=False)
 
-    def show(k: int) -> None:
+    canvas, file = FigureCanvasAgg(figure), io.BytesIO()
+
+    def frame(k: int) -> np.ndarray:
         for e, plate in enumerate(plates):
-            plate.set_data(*_line(x[e], y[e], angles[min(k, len(angles) - 1), e]))
+            plate.set_data(*_line(x[e], y[e], angles[k, e]))
+        canvas.draw()
+        return np.array(canvas.buffer_rgba())[:, :, :3]
 
-    FuncAnimation(figure, show, frames=len(angles) + 15).save(path, PillowWriter(fps=25), dpi=62)
+    write_frames(path, file, frame, len(angles), fps=25.0)
+    path.write_bytes(file.getvalue())
 
 
-def _line(x: float, y: float, angle: float) -> np.ndarray:
-    """Return the ends of a plate that has turned downwards about a point, `[2, 2]`."""
-    reach = np.array([-0.14, 0.75])
+def _line(x: float, y: float, angle: float, begin: float = -0.14, end: float = 0.75) -> np.ndarray:
+    """Return the ends of a line that has turned downwards about a point, `[2, 2]`."""
+    reach = np.array([begin, end])
     return np.array([x + reach * np.cos(angle), y - reach * np.sin(angle)])
 
 

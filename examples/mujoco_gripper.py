@@ -22,9 +22,11 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+from matplotlib.lines import Line2D
 
 import planarfriction as pf
 from planarfriction.adapters.mujoco import Friction, PatchContact, prepare
+from planarfriction.adapters.mujoco.draw import CENTRE, FRICTION, OUTLINE
 from planarfriction.plots.style import new_figure
 
 MU, RADIUS, MASS, ARM = 1.0, 0.012, 0.1, 0.04  # [-], pads [m], plate [kg], from the pads to its centre of mass [m]
@@ -48,7 +50,7 @@ FINGERS = "".join(
 )
 HAND = f"""<mujoco><option timestep="0.002" integrator="implicitfast"/>
 <default><geom solref="0.004 1" solimp="0.99 0.99 0.001"/></default>
-<visual><headlight ambient=".5 .5 .5" diffuse=".3 .3 .3" specular="0 0 0"/><map force="0.012" znear="0.01"/></visual>
+<visual><headlight ambient=".5 .5 .5" diffuse=".3 .3 .3" specular="0 0 0"/><map force="0.035" znear="0.01"/></visual>
 <asset><texture name="sky" type="skybox" builtin="flat" rgb1="1 1 1" width="8" height="8"/></asset>
 <worldbody>
   <body name="hand"><joint name="turn" axis="1 0 0" damping="1"/>
@@ -98,9 +100,9 @@ def run(draw: bool = True) -> tuple[np.ndarray, list[np.ndarray]]:
     The offset of the centre of mass is measured to the side of the pads and downwards.
     """
     m, d, friction = hand(soft_pad())
-    renderer = mujoco.Renderer(m, 360, 360) if draw else None
+    renderer = mujoco.Renderer(m, 400, 440) if draw else None
     camera = mujoco.MjvCamera()
-    camera.lookat[:], camera.distance, camera.azimuth, camera.elevation = (0.0, 0.028, -0.02), 0.21, 194.0, -12.0
+    camera.lookat[:], camera.distance, camera.azimuth, camera.elevation = (0.0, 0.034, -0.02), 0.17, 187.0, -8.0
     gravity, m.opt.gravity[:] = m.opt.gravity.copy(), 0.0
     rows, pictures = [], []
     for k in range(-100, round(END / m.opt.timestep)):
@@ -114,7 +116,11 @@ def run(draw: bool = True) -> tuple[np.ndarray, list[np.ndarray]]:
         rows.append([t, -np.arctan2(held[2, 1], held[1, 1]), at[1], -at[2]])
         if renderer is not None and any(abs(t - shown + m.opt.timestep) < 1e-9 for shown in SHOWN):
             renderer.update_scene(d, camera)
+            first = renderer.scene.ngeom
             friction.draw(renderer.scene, d)
+            for geom in renderer.scene.geoms[first : renderer.scene.ngeom]:
+                if geom.type == mujoco.mjtGeom.mjGEOM_ARROW:  # on the pads; on the plate it is opposite
+                    geom.mat[:] = geom.mat @ np.diag([1.0, -1.0, -1.0])
             pictures.append(renderer.render())
     return np.array(rows), pictures
 
@@ -136,11 +142,18 @@ def main() -> None:
     creep = np.hypot(np.ptp(beside[last]), np.ptp(below[last])) / 0.2
     print(f"at rest: it creeps at {1e6 * creep:.4f} um/s")
     folder.mkdir(parents=True, exist_ok=True)
-    figure = new_figure(9.0, 2.6)
+    figure = new_figure(9.0, 2.8)
     for axes, shown, picture in zip(figure.subplots(1, len(SHOWN)), SHOWN, pictures, strict=True):
         axes.imshow(picture)
-        axes.set_title(f"{shown} s, grip {controls(shown)[0]:.1f} N", fontsize="medium")
+        axes.set_title(f"{shown} s, grip {controls(shown)[0]:.1f} N", fontsize="x-large")
         axes.axis("off")
+    marks = {"patch of a pad": ("o", OUTLINE, "none"), "friction on the plate": ("^", FRICTION, "full"),
+             "centre of rotation": (".", CENTRE, "full")}  # fmt: skip
+    handles = [
+        Line2D([], [], linestyle="", marker=marker, color=colour, fillstyle=fill, markersize=11, label=name)
+        for name, (marker, colour, fill) in marks.items()
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize="x-large")
     figure.savefig(folder / "mujoco-gripper.png")
     print(f"wrote {folder / 'mujoco-gripper.png'}")
 

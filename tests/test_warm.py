@@ -19,7 +19,6 @@ import planarfriction as pf
 from planarfriction import warm
 from planarfriction.compiler import notice, threads
 from planarfriction.families import MODELS
-from planarfriction.scenes import simulation
 
 COUNTING = """
 import numba.core.event as events
@@ -98,46 +97,24 @@ class Terminal(io.StringIO):
         return True
 
 
-@pytest.fixture
-def compiled_anew(monkeypatch):
-    """In every simulation, a function of Numba's that nothing has compiled yet."""
-    whole = simulation.integrate
-
-    def integrate(*args, **options):
-        numba.njit(lambda x: x + 1.0)(1.0)
-        return whole(*args, **options)
-
-    monkeypatch.setattr(simulation, "integrate", integrate)
-    monkeypatch.setattr(notice._Said, "done", False)
-
-
 @pytest.mark.parametrize(
-    ("stream", "options", "lines"), [(Terminal, {}, 1), (io.StringIO, {}, 0), (Terminal, {"progress": print}, 0)]
+    ("stream", "module", "lines"),
+    [
+        (Terminal, "planarfriction.kernels.steps", 1),
+        (io.StringIO, "planarfriction.kernels.steps", 0),
+        (Terminal, "mine", 0),
+    ],
 )
-def test_the_first_simulation_says_that_it_compiles(compiled_anew, monkeypatch, stream, options, lines):
-    """Once, to somebody who waits and is told nothing else."""
+def test_the_first_function_that_is_compiled_says_so(monkeypatch, stream, module, lines):
+    """Once, to somebody who waits; functions of users say nothing."""
     monkeypatch.setattr(sys, "stderr", stream())
-    scene = pf.scenes.in_hand(pf.ReducedModelPublished(pf.ContactPatch.disc(radius=0.01, cells=5), pf.LuGre()))
-    for _ in range(2):
-        pf.simulate(scene, t_end=1e-3, **options)
-    said = sys.stderr.getvalue().splitlines()
-    assert len(said) == lines and all("compiles its solver, once after installation" in line for line in said)
-
-
-def test_rollouts_say_that_they_compile(monkeypatch):
     monkeypatch.setattr(notice._Said, "done", False)
-    monkeypatch.setattr(sys, "stderr", Terminal())
-    model = pf.ReducedModelPublished(pf.ContactPatch.disc(radius=0.01, cells=5), pf.LuGre())
-    whole = threads.share
-
-    def share(*args):
-        numba.njit(lambda x: x + 1.0)(1.0)
-        return whole(*args)
-
-    monkeypatch.setattr(threads, "share", share)
     for _ in range(2):
-        pf.rollout(model, None, [[1.0] * 3] * 2, 1.0, 1e-4)
-    assert sys.stderr.getvalue().count("compiles its solver, once after installation") == 1
+        function = lambda x: x + 1.0  # noqa: E731
+        function.__module__ = module
+        numba.njit(function)(1.0)
+    said = sys.stderr.getvalue().splitlines()
+    assert len(said) == lines and all("compiles its loops, once after installation" in line for line in said)
 
 
 @pytest.mark.parametrize("processors", [1, 3])

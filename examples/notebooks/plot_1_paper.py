@@ -19,7 +19,15 @@ from planarfriction.patch import PUBLISHED_PATCHES
 # A contact is full of bristles, which bend like springs until they slip: the LuGre law. Pushed from rest, the force
 # grows over a few micrometres, peaks a little above the static coefficient and falls to that of sliding as the motion
 # gets faster.
-law = pf.LuGre(mu_c=1.0, mu_s=1.2, v_s=1e-3, sigma_0=1e6, sigma_1=8e2, sigma_2=0.2, elasto_plastic=0.9)
+law = pf.LuGre(
+    mu_c=1.0,
+    mu_s=1.2,
+    v_s=1e-3,
+    sigma_0=1e6,
+    sigma_1=8e2,
+    sigma_2=0.2,
+    elasto_plastic=0.9,
+)
 bristle = pf.DistributedModel(pf.ContactPatch.points([[0.0, 0.0]]), law)
 
 dt, steps = 1e-4, 5000
@@ -60,19 +68,30 @@ surfaces = pf.plots.plot_limit_surface(pf.LimitSurfaceTablePublished(pads))
 # has an error of its own. `ReducedModel` has three bristles on each of a few discs: one disc resembles the paper's
 # model, without a table, and 24, its default, err less than points in all cells and let go where these do.
 reduced = {
-    "published, ellipsoid": pf.ReducedModelPublished(disc, law, surface=pf.LimitSurfaceEllipsoid(disc)),
+    "published, ellipsoid": pf.ReducedModelPublished(
+        disc, law, surface=pf.LimitSurfaceEllipsoid(disc)
+    ),
     "published": pf.ReducedModelPublished(disc, law),
     "one disc": pf.ReducedModel(disc, law, cells=1),
     "24 discs": pf.ReducedModel(disc, law),
 }
-fine = pf.simulate(pf.scenes.driven(pf.DistributedModel(disc.refined(3), law)), t_end=5.0)
+fine = pf.simulate(
+    pf.scenes.driven(pf.DistributedModel(disc.refined(3), law)), t_end=5.0
+)
 errors = {}
 for name, model in {"distributed": distributed, **reduced}.items():
     run = pf.simulate(pf.scenes.driven(model), t_end=5.0)
     off = np.hypot(run.data.fx - fine.data.fx, run.data.fy - fine.data.fy)
     errors[name] = float(off.quantile(0.75))
-    print(f"{name:21} third quartile of the error of the force {1e3 * errors[name]:6.2f} mN")
-assert max(errors["published"], errors["24 discs"]) < errors["distributed"] < 10e-3 < errors["published, ellipsoid"]
+    print(
+        f"{name:21} third quartile of the error of the force {1e3 * errors[name]:6.2f} mN"
+    )
+assert (
+    max(errors["published"], errors["24 discs"])
+    < errors["distributed"]
+    < 10e-3
+    < errors["published, ellipsoid"]
+)
 
 # %%
 # A plate in a gripper
@@ -83,7 +102,9 @@ assert max(errors["published"], errors["24 discs"]) < errors["distributed"] < 10
 held = pf.simulate(pf.scenes.in_hand(pf.ReducedModel(disc, law)))
 motion = pf.plots.plot_motion(held)
 end = held.data.isel(time=-1)
-print(f"down by {-1e3 * float(end.y):.1f} mm, turned by {np.degrees(float(end.theta)):.1f} deg")
+print(
+    f"down by {-1e3 * float(end.y):.1f} mm, turned by {np.degrees(float(end.theta)):.1f} deg"
+)
 
 # %%
 # All experiments of the paper, with its numbers beside ours: `planarfriction reproduce`.

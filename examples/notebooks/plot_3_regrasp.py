@@ -17,7 +17,9 @@ from planarfriction.planning import holding_load, plan_grip
 #
 # The pads press 8 mm beside the centre of mass. Each of the two fingers carries half of the weight and of its torque.
 pad = pf.ContactPatch.rectangle(0.018, cells=11)
-law = pf.LuGre(mu_c=0.6, mu_s=0.6, sigma_0=1e5, sigma_1=3e2, sigma_2=0.1, elasto_plastic=0.9)
+law = pf.LuGre(
+    mu_c=0.6, mu_s=0.6, sigma_0=1e5, sigma_1=3e2, sigma_2=0.1, elasto_plastic=0.9
+)
 model = pf.ReducedModel(pad, law)
 weight, lever = 0.2 * 9.81, 0.008
 needed = holding_load((0.0, -0.5 * weight, -0.5 * weight * lever), pad, mu=0.6)
@@ -29,7 +31,9 @@ print(f"slips below {needed:.2f} N a finger")
 #
 # The plate shall turn by 30 degrees about the fingers. `plan_grip` searches the grip over time; a body that hangs
 # beside the fingers turns by itself when they loosen.
-plate = pf.scenes.in_hand(model, centre_of_mass=(lever, 0.0), normal_force=2.0 * needed, t_end=1.0)
+plate = pf.scenes.in_hand(
+    model, centre_of_mass=(lever, 0.0), normal_force=2.0 * needed, t_end=1.0
+)
 plan = plan_grip(plate, goal={"angle": np.radians(-30.0)}, knots=12)
 print(plan)
 figure = plan.plot()

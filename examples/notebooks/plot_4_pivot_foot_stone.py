@@ -34,7 +34,9 @@ for length in (0.06, 0.09, 0.12, 0.15):
     swings[length] = pf.simulate(pf.scenes.pivot(pads, normal_force=grip))
     end = swings[length].data.isel(time=-1)
     slide = np.hypot(end.x - 0.06 * np.cos(end.theta), end.y - 0.06 * np.sin(end.theta))
-    print(f"{1e3 * length:.0f} ms: {np.degrees(float(end.theta)):.1f} deg, slides {1e3 * float(slide):.1f} mm")
+    print(
+        f"{1e3 * length:.0f} ms: {np.degrees(float(end.theta)):.1f} deg, slides {1e3 * float(slide):.1f} mm"
+    )
 swing = pf.plots.plot_motion(swings[0.09])
 
 # %%
@@ -44,7 +46,18 @@ swing = pf.plots.plot_motion(swings[0.09])
 # How much yaw torque can a sole resist without a side force? A sole slips about the point where turning costs the
 # least power, which is not its centre of pressure. `LimitSurfaceExact` finds that point as the normal of the limit
 # surface.
-outline = 1e-3 * np.array([(0, -25), (0, 25), (90, 33), (200, 48), (260, 20), (265, -10), (210, -47), (100, -32)])
+outline = 1e-3 * np.array(
+    [
+        (0, -25),
+        (0, 25),
+        (90, 33),
+        (200, 48),
+        (260, 20),
+        (265, -10),
+        (210, -47),
+        (100, -32),
+    ]
+)
 
 
 def standing(x, y):
@@ -56,8 +69,12 @@ def standing(x, y):
 
 sole = pf.ContactPatch.polygon(outline, cells=30, pressure=standing)
 turn = pf.LimitSurfaceExact(sole).twist((0.0, 0.0, -1.0))
-print(f"centre of pressure at {1e3 * sole.centre_of_pressure()[0]:.0f} mm, r = {1e3 * sole.contact_radius():.1f} mm")
-print(f"turns about {-1e3 * turn[1] / turn[2]:.0f} mm, at {1e3 / turn[2]:.1f} mm times mu f_N")
+print(
+    f"centre of pressure at {1e3 * sole.centre_of_pressure()[0]:.0f} mm, r = {1e3 * sole.contact_radius():.1f} mm"
+)
+print(
+    f"turns about {-1e3 * turn[1] / turn[2]:.0f} mm, at {1e3 / turn[2]:.1f} mm times mu f_N"
+)
 shoe = sole.plot(normal_force=400.0)
 assert 1.0 / turn[2] < sole.contact_radius()
 
@@ -67,7 +84,9 @@ assert 1.0 / turn[2] < sole.contact_radius()
 # of HRP-4C on its toes"). The loads are given, because a planar scene has no equation for tipping.
 step = pf.simulate(pf.scenes.foot(pf.ReducedModel(pf.ContactPatch.disc(0.03), law)))
 end = step.data.isel(time=-1)
-print(f"turned by {np.degrees(float(step.data.theta.max())):.1f} deg and back, {1e3 * float(end.y):.0f} mm aside")
+print(
+    f"turned by {np.degrees(float(step.data.theta.max())):.1f} deg and back, {1e3 * float(end.y):.0f} mm aside"
+)
 walk = pf.plots.plot_motion(step)
 
 # %%
@@ -79,9 +98,13 @@ walk = pf.plots.plot_motion(step)
 coulomb = pf.LuGre(mu_c=0.2, sigma_0=1e5, sigma_1=10.0, sigma_2=0.0)
 puck = pf.ReducedModel(pf.ContactPatch.disc(0.04), coulomb, cells=64)
 for spin in (20.0, 30.0, 60.0):
-    data = pf.simulate(pf.scenes.free_slide(puck, twist=(1.0, 0.0, spin), save_every=1e-3)).data
+    data = pf.simulate(
+        pf.scenes.free_slide(puck, twist=(1.0, 0.0, spin), save_every=1e-3)
+    ).data
     slow = data.sel(time=data.time[data.vx > 0.02]).isel(time=-1)
-    ratios = [float(each.vx / (0.04 * each.omega)) for each in (data.isel(time=0), slow)]
+    ratios = [
+        float(each.vx / (0.04 * each.omega)) for each in (data.isel(time=0), slow)
+    ]
     print(f"v/(omega R) = {ratios[0]:.2f} at the start, {ratios[1]:.2f} at 2 cm/s")
 
 # %%
@@ -89,7 +112,11 @@ for spin in (20.0, 30.0, 60.0):
 # spinning on the spot. It does not curl, because friction that is the same in all directions on an evenly loaded
 # ring opposes the velocity. Why real stones curl is a question about ice.
 ice = pf.LuGre(mu_c=0.01, sigma_0=1e5, sigma_1=10.0, sigma_2=0.0)
-stone = pf.simulate(pf.scenes.curling(pf.ReducedModel(pf.ContactPatch.ring(0.0585, 0.0645), ice)))
+stone = pf.simulate(
+    pf.scenes.curling(pf.ReducedModel(pf.ContactPatch.ring(0.0585, 0.0645), ice))
+)
 end = stone.data.isel(time=-1)
-print(f"{float(end.x):.2f} m in {float(end.time):.1f} s, {float(end.theta) / (2 * np.pi):.2f} turns")
+print(
+    f"{float(end.x):.2f} m in {float(end.time):.1f} s, {float(end.theta) / (2 * np.pi):.2f} turns"
+)
 histories = pf.plots.plot_histories(stone)

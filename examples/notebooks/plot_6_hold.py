@@ -68,7 +68,9 @@ below.set(xlabel="time [s]", ylabel="grip force [N]", ylim=(0.0, 10.0))
 for i, mu in enumerate(mu_c):
     low, high = bounds[-1, i]
     slip = 1e3 * np.hypot(*gripper.slip[i, :2])
-    print(f"mu_c {mu}: found {low:.2f} to {high:.2f}, slipped by {slip:.2f} mm, grip {grip[-1, i]:.1f} N")
+    print(
+        f"mu_c {mu}: found {low:.2f} to {high:.2f}, slipped by {slip:.2f} mm, grip {grip[-1, i]:.1f} N"
+    )
 assert ((bounds[-1, :, 0] < mu_c) & (mu_c < bounds[-1, :, 1])).all()
 
 # %%
@@ -87,7 +89,10 @@ print("grip of the rule", np.round(rule, 1), "N")
 # A part that hangs 30 mm beside the grip turns by its own weight when the grip loosens. `TurnBy` lets it turn by 45
 # degrees in 2 s and catches it there.
 one = Parts([0.2], [3e-4], [(0.03, 0.0)], [0.7], delay=0.01)
-gripper, turn = Gripper(one, 40.0), TurnBy(FrictionObserver(known, batch=1), np.radians(-45.0), duration=2.0)
+gripper, turn = (
+    Gripper(one, 40.0),
+    TurnBy(FrictionObserver(known, batch=1), np.radians(-45.0), duration=2.0),
+)
 sample = gripper.measurement
 for _ in range(4000):
     sample = gripper.step(turn.update(sample))

@@ -91,7 +91,9 @@ class MissingExtraError(FrictionError, ImportError):
 
     def __init__(self, package: str, extra: str):
         self.package, self.extra = package, extra
-        super().__init__(f"{package} is not installed: run pip install 'planarfriction[{extra}]'")
+        alone = "; for the processor alone, first pip install torch --index-url https://download.pytorch.org/whl/cpu"
+        more = alone if extra == "torch" else ""
+        super().__init__(f"{package} is not installed: run pip install 'planarfriction[{extra}]'{more}")
 
 
 @contextlib.contextmanager

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from typing import Any
 
 from planarfriction import validation
-from planarfriction.compiler.notice import said_when_compiling
 from planarfriction.errors import FrictionError, InvalidValueError, MissingExtraError
 
 LOOPBACK = "127.0.0.1"
@@ -29,8 +28,7 @@ def serve(port: int = 0, *, browser: bool = True, ready: Callable[[str], None] |
     server = open_server(port)
     from planarfriction_explorer.page import Page
 
-    with said_when_compiling():
-        Page()  # one that nobody sees, so that what has to be compiled is so before the first visitor comes
+    Page()  # one that nobody sees, so that what has to be compiled is so before the first visitor comes
     server.start()
     if browser:
         server.io_loop.add_callback(server.show, "/")

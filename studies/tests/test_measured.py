@@ -356,7 +356,10 @@ def test_regions_of_ends_are_drawn_and_hold_them():
 
     benchmark = Benchmark({"sure": Sure()}, ["slides"])
     benchmark.run()
-    axes = draw(benchmark, "slides").subfigs[1].axes
+    above, below = draw(benchmark, "slides").subfigs
+    labels = [each.get_xlabel() for each in above.axes]
+    assert labels == ["rms error [mm]", "rms error [deg]", "rms error [mm]", "rms error [deg]"]
+    axes = below.axes
     assert len(axes) == 7
     off = np.column_stack(axes[-1].lines[0].get_data())
     answers = [case.answer[-1] - case.question.first[-1] for case in benchmark.test("slides")]

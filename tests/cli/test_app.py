@@ -384,8 +384,8 @@ def test_limit_surface_writes_samples_that_are_on_it(capsys, tmp_path):
     assert rows["centre of pressure [mm]"] == "0, 3.175"
     patch = PUBLISHED_PATCHES["LineGrad"]()
     assert rows["second moment <rho^2> [mm^2]"] == "23.18"
-    assert rows["errors of a sum over its cells"] == str(patch.grid_error())
-    assert rows["the same of refined(3)"] == str(patch.grid_error(refined=3))
+    assert rows["errors of these cells"] == str(patch.grid_error())
+    assert rows["errors of refined(3)"] == str(patch.grid_error(refined=3))
     columns = read_csv(path)
     assert list(columns) == ["vx", "vy", "omega", "fx", "fy", "tau"]
     twists, wrenches = np.stack(list(columns.values()), -1).reshape(-1, 2, 3).swapaxes(0, 1)

@@ -101,3 +101,15 @@ def test_this_repository_has_what_a_release_needs():
         assert all((ROOT / kind.folder / name).is_file() for name in kind.beside)
     assert check.tracked(ROOT) >= CODE
     assert (ROOT / "LICENSE").read_bytes() == (ROOT / "studies" / "LICENSE").read_bytes()
+
+
+@pytest.mark.parametrize("version", [(3, 9, 18), (3, 10, 13), (3, 11, 0)])
+def test_an_old_python_is_told_before_anything_is_downloaded(version, monkeypatch):
+    monkeypatch.setattr("sys.version_info", version)
+    if version >= (3, 11):
+        assert script("build_backend.py").get_requires_for_build_wheel() == ["setuptools>=77"]
+    else:
+        with pytest.raises(SystemExit, match=r"needs Python 3\.11 or later"):
+            script("build_backend.py")
+    built = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["build-system"]
+    assert built["requires"] == [] and built["build-backend"] == "build_backend"

@@ -140,11 +140,11 @@ def test_a_fit_says_what_it_holds_and_where_it_would_go(slide):
     start = {name: getattr(LAW, name) for name in ("gamma", "sigma_1", "sigma_2")}
     names = ("mu_c", "mu_s", "v_s", "sigma_0")
     fine = fitted(slide, PATCH, parameters=names, start=start, **QUICK).table().replace("\n", " ")
-    assert "Sigma_2 is held at 0.75 s/m; the residuals agree" in fine and "deny" not in fine
+    assert "Sigma_2 is held at 0.75 s/m; the residuals agree" in fine and "contradict" not in fine
     start["sigma_2"] = 0.5
     off = fitted(slide, PATCH, parameters=names, start=start, **QUICK)
     text = off.table().replace("\n", " ")
-    assert "Sigma_2 is held at 0.5 s/m; the residuals deny it: 0.7" in text
+    assert "Sigma_2 is held at 0.5 s/m; the residuals contradict it: 0.7" in text
     assert not off.identifiable("mu_c")
 
 

@@ -231,8 +231,10 @@ def test_a_load_cell_that_only_the_fit_needs_rejects_it():
 def test_a_table_fits_eighty_columns_and_a_repl(chosen):
     lines = chosen.table().splitlines()
     assert max(map(len, lines)) <= 80
-    assert lines[0].startswith("parameter") and lines[1].startswith("mu_c") and "+/-" in lines[1]
-    assert lines[9].startswith("reduced chi-square") and lines[11].startswith("Identified: mu_c")
+    assert lines[0].startswith("parameter") and lines[1].startswith("mu_c") and " to " in lines[1]
+    assert lines[9].startswith("reduced chi-square")
+    strongest = np.abs(chosen.correlations - np.eye(len(chosen.names))).max()
+    assert lines[11] == "correlations of 0.5 and more" and lines[12].endswith(f"{strongest:.3f}")
     assert repr(chosen) == str(chosen) == chosen.table()
     assert chosen._repr_html_().startswith("<pre>parameter")
 

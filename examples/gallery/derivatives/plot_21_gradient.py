@@ -1,9 +1,9 @@
 """
-The slope of a rollout
-=======================
+The gradient of a rollout
+=========================
 
-How does the work of friction depend on each twist of a motion? One pass back through the steps (the adjoint) says so
-for all of them; differences need a rollout for each.
+How does the work of friction depend on each twist of a motion? One pass back through
+the steps (the adjoint) says so for all of them; differences need a rollout for each.
 """
 
 import matplotlib.pyplot as plt
@@ -14,12 +14,22 @@ from planarfriction import derivatives
 
 patch = pf.ContactPatch.disc(0.01, cells=11)
 model = pf.ReducedModel(patch, pf.LuGre(mu_c=1.0, mu_s=1.2, elasto_plastic=0.9))
+
+# %%
+# A motion to and fro, the forces of its steps, and one pass back through them:
 dt, steps = 1e-3, 400
 twists = np.outer(np.sin(np.linspace(0.0, 9.0, steps)), (0.01, 0.0, 1.0))
 wrenches = pf.rollout(model, None, twists, 2.0, dt).wrenches
-gradient = derivatives.rollout_vjp(model, model.rest(), twists, 2.0, dt, np.tile([1.0, 0.0, 0.0], (steps, 1)))
+gradient = derivatives.rollout_vjp(
+    model, model.rest(), twists, 2.0, dt, np.tile([1.0, 0.0, 0.0], (steps, 1))
+)
 
-figure, (upper, lower) = plt.subplots(2, 1, figsize=(6.4, 4.6), layout="constrained", sharex=True)
+# %%
+# Above, the friction force over time. Below, how much the sum of all forces changes
+# with the velocity at each instant:
+figure, (upper, lower) = plt.subplots(
+    2, 1, figsize=(6.4, 4.6), layout="constrained", sharex=True
+)
 upper.plot(dt * np.arange(steps), wrenches[:, 0])
 upper.set(ylabel="fx [N]")
 lower.plot(dt * np.arange(steps), gradient.twist[:, 0])

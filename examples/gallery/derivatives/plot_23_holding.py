@@ -2,8 +2,9 @@
 How hard to grip off the centre
 ===============================
 
-The further from its centre of mass a plate is held, the harder two fingers must grip, since they hold a torque too.
-The ellipsoid asks for less grip than is needed in between.
+The further from its centre of mass a plate is held, the harder two fingers must grip,
+since they hold a torque too. The ellipsoid asks for less grip than is needed in
+between.
 """
 
 import matplotlib.pyplot as plt
@@ -14,8 +15,14 @@ from planarfriction.planning import holding_load
 
 pad = pf.ContactPatch.rectangle(0.018)
 weight = 0.5 * 0.2 * 9.81  # of a plate of 0.2 kg, on each of two fingers
+
+# %%
+# The grip for each lever: by the exact surface, by an ellipse of force and torque, and
+# for the force alone.
 levers = np.linspace(0.0, 0.02, 21)
-exact = np.array([holding_load((0.0, -weight, -weight * lever), pad, mu=0.6) for lever in levers])
+exact = np.array(
+    [holding_load((0.0, -weight, -weight * lever), pad, mu=0.6) for lever in levers]
+)
 ellipsoid = weight / 0.6 * np.hypot(1.0, levers / pad.contact_radius())
 figure, ax = plt.subplots(figsize=(6.0, 3.6), layout="constrained")
 ax.plot(1e3 * levers, exact, label="exact")

@@ -2,8 +2,8 @@
 A thousand contacts at once
 ===========================
 
-Leading axes are batches: a thousand random twists from one state are one call. Their wrenches lie on the limit
-surface, seen from the side here.
+Leading axes are batches: a thousand random twists from one state are one call. Their
+wrenches lie on the limit surface, seen from the side here.
 """
 
 import matplotlib.pyplot as plt
@@ -17,6 +17,8 @@ model = pf.ReducedModel(patch, law)
 twists = np.random.default_rng(0).normal(size=(1000, 3)) * (0.02, 0.02, 3.0)
 _, wrenches = model.step(model.rest(), twists, 2.0, 0.1)
 
+# %%
+# Force against torque of all of them; dotted, the ellipsoid:
 r = patch.contact_radius()
 force = np.hypot(wrenches[:, 0], wrenches[:, 1])
 figure, ax = plt.subplots(figsize=(4.6, 4.4), layout="constrained")

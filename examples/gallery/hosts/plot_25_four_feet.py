@@ -2,8 +2,9 @@
 A box on four feet, in a loop of your own
 =========================================
 
-A host that steps bodies finds the wrenches of all its patches in one implicit call, stable at any time step. A box on
-four feet is pushed and turned, at time steps from 1 to 20 ms.
+A host that steps bodies finds the wrenches of all its patches in one implicit call,
+stable at any time step. A box on four feet is pushed and turned, at time steps from 1
+to 20 ms.
 """
 
 import matplotlib.pyplot as plt
@@ -15,20 +16,28 @@ from planarfriction.coupling import CoupledPatches, HostStep
 feet = [(0.05, 0.03), (0.05, -0.03), (-0.05, 0.03), (-0.05, -0.03)]
 mass = np.array([0.2, 0.2, 2e-4])
 J = np.concatenate([[[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]] for x, y in feet])
-foot = pf.ReducedModel(pf.ContactPatch.disc(0.005, cells=11), pf.LuGre(mu_c=0.5, mu_s=0.5, elasto_plastic=0.9))
+foot = pf.ReducedModel(
+    pf.ContactPatch.disc(0.005, cells=11),
+    pf.LuGre(mu_c=0.5, mu_s=0.5, elasto_plastic=0.9),
+)
 patches = CoupledPatches([foot] * 4)
 
 
+# %%
+# A step of the host: the velocity without friction, the response of the box to wrenches
+# on its feet, and one call for all four feet.
 def path(dt):
     """Positions of the box `[T, 2]` over 0.4 s."""
-    bristles, wrench, velocity, pose = patches.rest(), np.zeros((4, 3)), np.zeros(3), np.zeros(3)
+    bristles, wrench = patches.rest(), np.zeros((4, 3))
+    velocity, pose = np.zeros(3), np.zeros(3)
     response, places = dt * J @ np.diag(1.0 / mass) @ J.T, [pose[:2].copy()]
     for k in range(round(0.4 / dt)):
         angle = pose[2] + 0.5 * dt * velocity[2]
         push = np.array([1.5, 0.2, 0.05]) if k * dt < 0.2 else np.zeros(3)
         pushed = pf.geometry.rotate(velocity + dt * push / mass, -angle)
         free = pushed + dt * J.T @ wrench.ravel() / mass
-        step = patches.step(bristles, HostStep((J @ free).reshape(4, 3), np.full(4, 0.5), wrench, response), dt)
+        host = HostStep((J @ free).reshape(4, 3), np.full(4, 0.5), wrench, response)
+        step = patches.step(bristles, host, dt)
         bristles, wrench, before = step.state, step.wrench, velocity
         velocity = pf.geometry.rotate(pushed + dt * J.T @ wrench.ravel() / mass, angle)
         pose = pose + 0.5 * dt * (before + velocity)
@@ -36,6 +45,8 @@ def path(dt):
     return np.array(places)
 
 
+# %%
+# The same push at three time steps:
 figure, ax = plt.subplots(figsize=(6.4, 3.2), layout="constrained")
 ends = []
 for dt in (1e-3, 5e-3, 2e-2):

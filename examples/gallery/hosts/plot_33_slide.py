@@ -2,8 +2,9 @@
 Let a part slide by 20 mm, and catch it
 =======================================
 
-A gripper lets three parts of different friction slide down by 20 mm in two seconds. It does not know their friction: it
-opens until they slip, then follows the speed that it wants, with force, torque and slip velocity that come 20 ms late.
+A gripper lets three parts of different friction slide down by 20 mm in two seconds. It
+does not know their friction: it opens until they slip, then follows the speed that it
+wants, with force, torque and slip velocity that come 20 ms late.
 """
 
 import numpy as np
@@ -20,7 +21,13 @@ finger = pf.ContactPatch.disc(0.02, pressure=pf.SoftFinger(c=6e-3, n=0.25, k=4.0
 known = pf.ReducedModel(finger, pf.LuGre(mu_c=0.6, mu_s=0.65, v_s=2e-3))
 count = len(mu_c)
 slide = SlideBy(FrictionObserver(known, batch=count), GOAL, duration=2.0)
-parts = Parts(np.full(count, 0.2), np.full(count, 3e-4), np.tile((0.0, -0.01), (count, 1)), mu_c, delay=0.02)
+parts = Parts(
+    np.full(count, 0.2),
+    np.full(count, 3e-4),
+    np.tile((0.0, -0.01), (count, 1)),
+    mu_c,
+    delay=0.02,
+)
 gripper = Gripper(parts, 25.0)
 
 sample, slid, grip = gripper.measurement, [], []
@@ -30,8 +37,8 @@ for _ in range(STEPS):
     grip.append(gripper.normal_force.copy())
 
 # %%
-# Samples come late, so a part that breaks loose slides some millimetres before it is caught: it goes in hops. The
-# smoother a part, the firmer the grip that it needs.
+# Samples come late, so a part that breaks loose slides some millimetres before it is
+# caught: it goes in hops. The smoother a part, the firmer the grip that it needs.
 time = DT * np.arange(STEPS)
 figure = new_figure(8.0, 5.0)
 above, below = figure.subplots(2, 1, sharex=True)

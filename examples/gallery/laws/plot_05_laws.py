@@ -2,8 +2,9 @@
 Friction laws: force over speed
 ===============================
 
-Three laws in steady sliding. LuGre falls from static to sliding friction (Stribeck) and rises again with viscous
-friction; Dahl does not depend on the speed; the regularised Coulomb law has no friction at rest.
+Three laws in steady sliding. LuGre falls from static to sliding friction (Stribeck) and
+rises again with viscous friction; Dahl does not depend on the speed; the regularised
+Coulomb law has no friction at rest.
 """
 
 import matplotlib.pyplot as plt
@@ -14,8 +15,13 @@ import planarfriction as pf
 laws = {
     "LuGre": pf.LuGre(mu_c=0.5, mu_s=0.7, v_s=2e-3, sigma_2=0.6),
     "Dahl": pf.Dahl(mu_c=0.5),
-    "CoulombStribeck": pf.CoulombStribeck(mu_c=0.5, mu_s=0.7, v_s=2e-3, sigma_2=0.6, creep_speed=1e-4),
+    "CoulombStribeck": pf.CoulombStribeck(
+        mu_c=0.5, mu_s=0.7, v_s=2e-3, sigma_2=0.6, creep_speed=1e-4
+    ),
 }
+
+# %%
+# Friction over the speed, on a logarithmic axis:
 speed = np.geomspace(1e-5, 0.3, 400)
 figure, ax = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
 for name, law in laws.items():

@@ -1,9 +1,10 @@
 """
-Before sliding: a loop of force and way
-=======================================
+Before sliding: a loop of force and displacement
+================================================
 
-A contact that is pushed to and fro by less than it takes to slide acts as a spring. With elasto-plastic bristles
-small loops close on a line; larger ones open as bristles begin to slip.
+A contact that is pushed to and fro by less than it takes to slide acts as a spring.
+With elasto-plastic bristles small loops close on a line; larger ones open as bristles
+begin to slip.
 """
 
 import matplotlib.pyplot as plt
@@ -11,19 +12,24 @@ import numpy as np
 
 import planarfriction as pf
 
-law = pf.LuGre(mu_c=0.5, mu_s=0.5, sigma_0=1e5, sigma_1=1.0, sigma_2=0.0, elasto_plastic=0.6)
+law = pf.LuGre(
+    mu_c=0.5, mu_s=0.5, sigma_0=1e5, sigma_1=1.0, sigma_2=0.0, elasto_plastic=0.6
+)
 model = pf.DistributedModel(pf.ContactPatch.points([[0.0, 0.0]]), law)
 time = np.linspace(0.0, 3.0, 3001)
+
+# %%
+# Three amplitudes of the displacement; the slope of the smallest is kept.
 figure, ax = plt.subplots(figsize=(6.0, 4.0), layout="constrained")
 for amplitude in (2e-6, 5e-6, 12e-6):
-    way = amplitude * np.sin(2 * np.pi * time)
+    displacement = amplitude * np.sin(2 * np.pi * time)
     twists = np.zeros((3000, 3))
-    twists[:, 0] = np.diff(way) / 1e-3
+    twists[:, 0] = np.diff(displacement) / 1e-3
     _, wrenches = pf.rollout(model, None, twists, 1.0, 1e-3)
-    ax.plot(1e6 * way[1:], -wrenches[:, 0], label=f"{1e6 * amplitude:.0f} um")
+    ax.plot(1e6 * displacement[1:], -wrenches[:, 0], label=f"{1e6 * amplitude:.0f} µm")
     if amplitude == 2e-6:
-        stiffness = -wrenches[249, 0] / way[250]
-ax.set(xlabel="way [um]", ylabel="friction against the motion per load [-]")
+        stiffness = -wrenches[249, 0] / displacement[250]
+ax.set(xlabel="displacement [µm]", ylabel="friction against the motion per load [-]")
 ax.legend()
 
 # %%

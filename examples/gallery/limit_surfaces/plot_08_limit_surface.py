@@ -2,8 +2,9 @@
 A limit surface beside its ellipsoid
 ====================================
 
-All wrenches with which two pads can slide, in force and torque over contact radius, and the ellipsoid that is often
-put in its place. The surface of two separate pads is far from round.
+All wrenches with which two pads can slide, in force and torque over contact radius, and
+the ellipsoid that is often put in its place. The surface of two separate pads is far
+from round.
 """
 
 import planarfriction as pf

@@ -2,8 +2,9 @@
 The staircase of a sum over cells
 =================================
 
-Sum the friction over points, and each point that the centre of rotation crosses turns its force round: the wrench moves
-in steps. Integrated exactly, it is smooth; over cells that are small discs nearly so.
+Sum the friction over points, and each point that the centre of rotation crosses turns
+its force round: the wrench moves in steps. Integrated exactly, it is smooth; over cells
+that are small discs nearly so.
 """
 
 import dataclasses
@@ -14,11 +15,16 @@ import numpy as np
 import planarfriction as pf
 
 line = pf.ContactPatch.line(0.02, cells=9)
+points = dataclasses.replace(line, radii=None)
 centres = np.linspace(-0.012, 0.012, 601)  # of rotation, along the line
-twists = np.stack([centres, np.zeros_like(centres), np.ones_like(centres)], axis=1)  # about (0, y): vx = y omega
+# about (0, y): vx = y omega
+twists = np.stack([centres, np.zeros_like(centres), np.ones_like(centres)], axis=1)
+
+# %%
+# Four ways to the same wrench:
 figure, ax = plt.subplots(figsize=(6.0, 3.6), layout="constrained")
 for name, style, surface in (
-    ("sum over 9 points", "-", pf.LimitSurfaceCells(dataclasses.replace(line, radii=None))),
+    ("sum over 9 points", "-", pf.LimitSurfaceCells(points)),
     ("sum over 9 discs", "-", pf.LimitSurfaceCells(line)),
     ("exact", "-", pf.LimitSurfaceExact(line)),
     ("table of the exact surface", "k:", pf.LimitSurfaceTable(line)),

@@ -2,8 +2,9 @@
 A limit surface to turn with the mouse
 ======================================
 
-The surface of a strip in 3-D: force in x and y, torque over contact radius, with the ellipsoid that is often put in
-its place. Below, the same as a plotly figure: drag it, zoom, read values off it.
+The surface of a strip in 3-D: force in x and y, torque over contact radius, with the
+ellipsoid that is often put in its place. Below, the same as a plotly figure: drag it,
+zoom, read values off it.
 """
 
 import planarfriction as pf
@@ -13,6 +14,7 @@ exact, ellipsoid = pf.LimitSurfaceExact(strip), pf.LimitSurfaceEllipsoid(strip)
 figure = pf.plots.plot_limit_surface(exact, beside=ellipsoid)
 
 # %%
+# The same as a figure of plotly:
 interactive = pf.plots.interactive_limit_surface(exact, beside=None)
 
 # %%

@@ -2,8 +2,9 @@
 Breakaway in a spin
 ===================
 
-Two pads at rest are turned together at a constant rate; of each the outer cells slip first. One threshold for all is
-the approximation of three states; each of a few discs has its own.
+Two pads at rest are turned together at a constant rate; of each the outer cells slip
+first. One threshold for all is the approximation of three states; each of a few discs
+has its own.
 """
 
 import matplotlib.pyplot as plt
@@ -20,6 +21,9 @@ models = {
     "reduced": pf.ReducedModel(patch, law),
     "published reduced": pf.ReducedModelPublished(patch, law),
 }
+
+# %%
+# The same spin for all four:
 dt, twists = 2e-5, np.tile([0.0, 0.0, 0.02], (1500, 1))
 time = dt * np.arange(1, 1501)
 figure, ax = plt.subplots(figsize=(6.4, 3.8), layout="constrained")
@@ -27,11 +31,15 @@ torque = {}
 for name, model in models.items():
     torque[name] = -1e3 * pf.rollout(model, None, twists, 1.0, dt).wrenches[:, 2]
     ax.plot(1e3 * time, torque[name], label=name)
-ax.set(xlim=(5.0, 9.0), ylim=(8.5, 10.8), xlabel="time [ms]", ylabel="torque [N mm] at 1 N")
+ax.set(
+    xlim=(5.0, 9.0), ylim=(8.5, 10.8), xlabel="time [ms]", ylabel="torque [N mm] at 1 N"
+)
 ax.legend(fontsize=8)
 
 # %%
 # Largest distance from the distributed model:
-error = {name: np.abs(each - torque["distributed"]).max() for name, each in torque.items()}
+error = {
+    name: np.abs(each - torque["distributed"]).max() for name, each in torque.items()
+}
 print({name: f"{value:.2f} N mm" for name, value in error.items()})
 assert error["reduced"] < error["reduced, 8 discs"] < 0.5 * error["published reduced"]

@@ -2,8 +2,8 @@
 A sweep over grip and mass
 ==========================
 
-One function makes a scene of two numbers; a sweep simulates every combination and returns a labelled dataset. Where
-does a plate that is held off its centre of mass slip?
+One function makes a scene of two numbers; a sweep simulates every combination and
+returns a labelled dataset. Where does a plate that is held off its centre of mass slip?
 """
 
 import matplotlib.pyplot as plt
@@ -16,17 +16,29 @@ model = pf.ReducedModel(pf.ContactPatch.disc(0.01, cells=11), law)
 
 
 def make_scene(grip, mass):
-    return pf.scenes.in_hand(model, normal_force=grip, mass=mass, centre_of_mass=(0.02, 0.0), t_end=0.15)
+    return pf.scenes.in_hand(
+        model, normal_force=grip, mass=mass, centre_of_mass=(0.02, 0.0), t_end=0.15
+    )
 
 
 def turned(solution):
     return {"turned": -np.degrees(solution.histories["theta"].values[-1])}
 
 
-data = pf.sweep(make_scene, {"grip": np.linspace(1.0, 6.0, 21), "mass": np.linspace(0.1, 0.3, 11)}, measure=turned)
+# %%
+# All 231 combinations in one call:
+data = pf.sweep(
+    make_scene,
+    {"grip": np.linspace(1.0, 6.0, 21), "mass": np.linspace(0.1, 0.3, 11)},
+    measure=turned,
+)
 
+# %%
+# Bright: the plate turns, as the grip is too weak for it.
 figure, ax = plt.subplots(figsize=(6.2, 3.8), layout="constrained")
-picture = ax.pcolormesh(data.grip, data.mass, data.turned.T, cmap="viridis", shading="nearest")
+picture = ax.pcolormesh(
+    data.grip, data.mass, data.turned.T, cmap="viridis", shading="nearest"
+)
 ax.set(xlabel="grip [N]", ylabel="mass [kg]")
 figure.colorbar(picture, label="turned within 0.15 s [deg]")
 

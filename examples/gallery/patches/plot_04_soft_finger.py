@@ -2,8 +2,8 @@
 A fingertip that grows with the load
 ====================================
 
-A soft fingertip pressed harder spreads: its radius grows with a power of the load, and with it the torque that the
-contact can hold, faster than the load itself.
+A soft fingertip pressed harder spreads: its radius grows with a power of the load, and
+with it the torque that the contact can hold, faster than the load itself.
 """
 
 import matplotlib.pyplot as plt
@@ -16,10 +16,16 @@ patch = pf.ContactPatch.disc(0.012, cells=61, pressure=finger)
 loads = np.geomspace(0.5, 8.0, 25)
 radii = np.array([patch.contact_radius(load) for load in loads])
 
+# %%
+# Pressure along the middle at three loads, and the torque of a spin over the load:
 figure, (left, right) = plt.subplots(1, 2, figsize=(8.5, 3.4), layout="constrained")
 for load in (1.0, 3.0, 8.0):
     middle = np.abs(patch.positions[:, 1]) < 1e-5
-    left.plot(1e3 * patch.positions[middle, 0], 1e-3 * patch.pressure_values(load)[middle], label=f"{load:g} N")
+    left.plot(
+        1e3 * patch.positions[middle, 0],
+        1e-3 * patch.pressure_values(load)[middle],
+        label=f"{load:g} N",
+    )
 left.set(xlabel="x [mm]", ylabel="pressure [kPa]")
 left.legend()
 right.plot(loads, 1e3 * loads * radii, ".-", label="torque of a spin, mu = 1")

@@ -2,8 +2,9 @@
 More discs, smaller errors
 ==========================
 
-`cells` is the number of discs of a reduced model. An L slides while it turns about points inside: the largest error of
-the force falls with the number of discs, until each cell has its own, which is far better than as many points.
+`cells` is the number of discs of a reduced model. An L slides while it turns about
+points inside: the largest error of the force falls with the number of discs, until each
+cell has its own, which is far better than as many points.
 """
 
 import matplotlib.pyplot as plt
@@ -13,12 +14,16 @@ import planarfriction as pf
 
 shape = np.zeros((20, 20))
 shape[:, :5] = shape[15:, :] = 1.0
-patch, law = pf.ContactPatch.from_pressure(shape, cell_size=1e-3), pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
+patch = pf.ContactPatch.from_pressure(shape, cell_size=1e-3)
+law = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 rng = np.random.default_rng(0)
-centres = patch.positions[rng.choice(patch.cells, 300)] + rng.uniform(-5e-4, 5e-4, (300, 2))
+centres = patch.positions[rng.choice(patch.cells, 300)]
+centres += rng.uniform(-5e-4, 5e-4, (300, 2))
 twists = np.column_stack([centres[:, 1], -centres[:, 0], np.ones(300)])
 
 
+# %%
+# Errors are those of the force in a steady turn about each of 300 centres of rotation.
 def steady_force(model):
     """Force [N] of a steady turn about each centre, at 1 N."""
     _, wrench = model.step(model.rest(), twists, 1.0, 1.0)
@@ -30,6 +35,8 @@ def largest_error(model):
     return 100 * np.linalg.norm(steady_force(model) - exact, axis=1).max()
 
 
+# %%
+# The reference is a distributed model with nine times as many cells:
 exact = steady_force(pf.DistributedModel(patch.refined(3), law))
 cells = [1, 2, 4, 8, 16, 24, 32, 64, 128, patch.cells]
 errors = [largest_error(pf.ReducedModel(patch, law, cells=n)) for n in cells]
@@ -43,6 +50,10 @@ ax.minorticks_off()
 ax.legend()
 
 # %%
-print({n: f"{error:.2f} %" for n, error in zip(cells, errors, strict=True)}, f"points {points:.2f} %")
+# In numbers:
+print(
+    {n: f"{error:.2f} %" for n, error in zip(cells, errors, strict=True)},
+    f"points {points:.2f} %",
+)
 error = dict(zip(cells, errors, strict=True))
 assert error[patch.cells] < 0.3 * points < error[24] < 0.5 * error[8] < 0.1 * error[1]

@@ -126,17 +126,17 @@ def limit_surface(patch: str | None, pressure: Path | None, size: dict[str, Any]
 @click.argument("file", type=FILE, shell_complete=complete_scene)
 @click.option("--out", type=FILE, required=True, help="Folder for the files.")
 @click.option(
-    "--name", default="friction", show_default=True, help="Name of the files, and what names in them begin with."
+    "--name", default="friction", show_default=True, help="Name of the files, and prefix of the names in them."
 )
 @click.option("--precision", default="double", show_default=True, help="double or float.")
 @click.option("--patches", default=1, show_default=True, help="Patches of this model below a body.")
-@click.option("--contact", metavar="NAME", help="Contact of the scene whose model it is, if they have different ones.")
+@click.option("--contact", metavar="NAME", help="Contact whose model is exported, if a scene has different ones.")
 def export(file: Path, **options: Any) -> None:
     """Write the friction model of a file as C source for a controller: NAME.h and NAME.c, C99 and C++17.
 
     NAME_test.c compares the library with numbers of the model; NAME.cmake has targets for both.
 
-    FILE (.toml, .json) is a scene, or a model alone: the tables patch and law, and model, as of a contact of a scene.
+    FILE (.toml, .json) is a scene, or a model alone: patch, law and model, written as for a contact of a scene.
 
     \b
     Examples:

@@ -43,6 +43,9 @@ def work_progress(label: str) -> Iterator[Callable[..., None]]:
 
 @contextmanager
 def _bar() -> Iterator[Any]:
+    from planarfriction.compiler.notice import expect_compilation
+
+    expect_compilation()  # the bar says it
     console = Console(stderr=True)
     words = TextColumn("{task.description}", markup=False)
     columns = SpinnerColumn(), words, BarColumn(bar_width=30), TimeElapsedColumn()

@@ -19,7 +19,7 @@ SHORT_HELP = "Friction of a joint, from a torque, a voltage or the goal of a ser
 @click.option("--mass", type=float, default=0.0, help="Mass at the end of a pendulum in kg.")
 @click.option("--length", type=float, default=0.0, help="Length of the pendulum in m.")
 @click.option("--arm-mass", type=float, help="Mass of its arm in kg.")
-@click.option("--inertia", type=float, help="Moment of inertia besides in kg m^2. Default: estimated.")
+@click.option("--inertia", type=float, help="Moment of inertia, without the pendulum, in kg m^2. Default: estimated.")
 @click.option("--torque-gain", type=float, help="kt/R in N m/V. Default: estimated.")
 @click.option("--kp", type=float, multiple=True, help="Gain of the servo; once for each log, or once for all.")
 @click.option("--gain", type=float, default=1.0, show_default=True, help="Duty per rad at a gain of 1.")
@@ -41,11 +41,11 @@ def joint(
     terms: str,
     out: Path | None,
 ) -> int:
-    """Estimate the friction of a joint from logs of its motion; say what the logs do not tell.
+    """Estimate the friction of a joint from logs of its motion; say what the logs leave open.
 
     Each LOG is a CSV file with a heading and the columns t, q and one of torque, voltage (or duty and supply) and goal
     in s, rad, N m and V; enabled, dq and external are read too. A goal needs --kp and --supply. Terms of the friction
-    are kept only if logs that were left out are predicted better.
+    are kept only if they predict left-out logs better.
 
     \b
     Examples:

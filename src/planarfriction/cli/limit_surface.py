@@ -75,9 +75,9 @@ def _grid_errors(patch: pf.ContactPatch) -> list[list[str]]:
     """Return rows on what the cells cost against the continuous patch, and on what finer ones would; none of points."""
     if not patch.cell_extents().any():
         return []
-    rows = [["errors of a sum over its cells", f"{patch.grid_error()}"]]
+    rows = [["errors of these cells", f"{patch.grid_error()}"]]
     if patch.cells * FINER**2 <= MOST_FINER:
-        rows.append([f"the same of refined({FINER})", f"{patch.grid_error(refined=FINER)}"])
+        rows.append([f"errors of refined({FINER})", f"{patch.grid_error(refined=FINER)}"])
     return rows
 
 

@@ -12,6 +12,7 @@ from numba.core.compiler import Compiler
 from numba.extending import register_jitable
 
 from planarfriction import formulas
+from planarfriction.compiler import notice  # noqa: F401 (says when the first function is compiled)
 from planarfriction.compiler.internals import part
 from planarfriction.compiler.sources import Sources
 

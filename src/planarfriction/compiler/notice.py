@@ -1,19 +1,17 @@
-"""One line that explains why the first simulation after an installation takes so long."""
+"""One line that explains why the first call after an installation takes so long."""
 
 from __future__ import annotations
 
-import contextlib
 import multiprocessing
 import sys
-from collections.abc import Iterator
 from typing import Any
 
 from planarfriction.compiler.internals import part
 
 Listener: Any = part("numba.core.event", "Listener", object)
-listening: Any = part("numba.core.event", "install_listener", lambda kind, listener: contextlib.nullcontext())
+register: Any = part("numba.core.event", "register", lambda kind, listener: None)
 
-_LINE = "planarfriction compiles its solver, once after installation (planarfriction.warm_up() does all of it ahead)"
+_LINE = "planarfriction compiles its loops, once after installation (planarfriction.warm_up() does all of it ahead)"
 
 
 def watched() -> bool:
@@ -28,8 +26,10 @@ class _Said(Listener):
     done = False
 
     def on_start(self, event: Any) -> None:
-        if not _Said.done:
-            _Said.done = True
+        if _Said.done or not event.data["dispatcher"].py_func.__module__.startswith("planarfriction"):
+            return
+        _Said.done = True
+        if watched():
             print(_LINE, file=sys.stderr, flush=True)
 
     def on_end(self, event: Any) -> None:
@@ -41,11 +41,4 @@ def expect_compilation() -> None:
     _Said.done = True
 
 
-@contextlib.contextmanager
-def said_when_compiling(silent: bool = False) -> Iterator[None]:
-    """Tell the user, once in a process, if something is compiled in this block and somebody is watching."""
-    if silent or _Said.done or not watched():
-        yield
-    else:
-        with listening("numba:compile", _Said()):
-            yield
+register("numba:compile", _Said())

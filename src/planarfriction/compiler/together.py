@@ -89,6 +89,9 @@ class Crew:
 
 def serve(work: Callable[[int], Any]) -> None:
     """Do the jobs whose numbers come on the standard input; answers each with the time that it took [s]."""
+    from planarfriction.compiler.notice import expect_compilation
+
+    expect_compilation()
     with contextlib.suppress(KeyboardInterrupt):
         for line in sys.stdin:
             begin = time.perf_counter()

@@ -11,7 +11,6 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.compiled.shapes_by_load import ShapesByLoad
 from planarfriction.compiler import threads
-from planarfriction.compiler.notice import said_when_compiling
 from planarfriction.derivatives.parameters import Packed, pack
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.rollouts import Inputs
@@ -137,5 +136,4 @@ def sum_to(shape: tuple[int, ...], gradient: np.ndarray) -> np.ndarray:
 
 def share(inputs: Inputs, count: int, work: Callable[[int, int], None]) -> None:
     """Run `work(first, last)` over all contacts, on several threads where that pays."""
-    with said_when_compiling():
-        threads.share(count, count * len(inputs.dt) // _WORTH_A_THREAD, work)
+    threads.share(count, count * len(inputs.dt) // _WORTH_A_THREAD, work)

@@ -9,7 +9,6 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.compiler import threads
-from planarfriction.compiler.notice import said_when_compiling
 from planarfriction.derivatives.inputs import RolloutInputs, checked, rows_of, sequences, share, sum_to
 from planarfriction.derivatives.parameters import Packed, is_compiled, pack
 from planarfriction.equality import by_parts
@@ -301,10 +300,9 @@ def _differentiate(model: Packed, inputs: Inputs, z: np.ndarray, out: Derivative
         state[..., cells] = part.reshape(1, model.inner[0], -1)
         return sums
 
-    with said_when_compiling():
-        for sums in threads.each(one, range(blocks)):
-            out.wrenches[:] += sums.wrenches
-            out.slopes[:] += sums.slopes
+    for sums in threads.each(one, range(blocks)):
+        out.wrenches[:] += sums.wrenches
+        out.slopes[:] += sums.slopes
 
 
 def _stepped(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any) -> Rollout[np.ndarray]:

@@ -43,10 +43,10 @@ class Pull:
         unit = ALL[self.name].unit.replace("-", "")
         text = f"{self.name} is held at {self.value:.3g} {unit}".rstrip()
         if not self.error < abs(self.value):
-            return f"{text}; the residuals do not show it"
+            return f"{text}; the data do not show it"
         to, low = self.value + self.step, ALL[self.name].low
         free = f"{to:.3g} +/- {self.error:.2g}" if to > low else f"below {low:g}"
-        return f"{text}; the residuals {'agree' if self.agrees else 'deny it'}: {free} if it were free"
+        return f"{text}; the residuals {'agree' if self.agrees else 'contradict it'}: {free} if it were free"
 
 
 def pulls_of_held(fit: Fit, u: Uncertainty) -> list[Pull]:

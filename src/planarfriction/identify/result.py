@@ -27,6 +27,9 @@ NUMBERS = tuple(name for name in PARAMETERS if name in LAW)
 WIDTH = 80
 """Columns of a table."""
 
+CORRELATED, PAIRS = 0.5, 5
+"""Correlation from which on a pair of estimates is printed, and the largest number of such pairs."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification(ByValue):
@@ -147,30 +150,38 @@ class Identification(ByValue):
         return "; ".join(each.reason for each in self.verdicts if each.parameter == name)
 
     def table(self) -> str:
-        """Return a table in 80 columns: estimates with errors and 95 % intervals, then the verdicts and the rig."""
+        """Return text in 80 columns: estimates, goodness of fit, correlations, then the verdicts and the rig."""
         lines, remarks, intervals = [], [], self.intervals()
         for name, value, error in zip(self.names, self.values, self.standard_errors, strict=True):
-            low, high = intervals[name]
-            shown = f"{low:.4g} .. {high:.4g}" if self.identifiable(name) else "not identifiable"
-            spread = f"{error:.2g}" if error < 1e3 * max(abs(value), 1e-12) else "unknown"
-            lines.append(f"{name:<15}{value:>10.5g} +/- {spread:<10}{shown:<25}{ALL[name].unit}".rstrip())
+            shown = " to ".join(_digits(end, 4) for end in intervals[name])
+            spread = _digits(error, 2) if error < 1e3 * max(abs(value), 1e-12) else "unknown"
+            between = shown if self.identifiable(name) else "not identifiable"
+            lines.append(f"{name:<15}{_digits(value, 5):>12}{spread:>12}  {between:<25}{ALL[name].unit}".rstrip())
             if reasons := self._remark(name):
                 remarks.append(textwrap.fill(f"{name}: {reasons}", WIDTH, subsequent_indent="  "))
-        heading = f"{'parameter':<15}{'estimate':>10} +/- {'error':<10}{'95 % interval':<25}unit"
+        heading = f"{'parameter':<15}{'value':>12}{'std. error':>12}  {'95 % interval':<25}unit"
         if self.scores:
             samples = f"{self.samples[0]:,} samples, {len(self.names)} parameters"
-            lines.append(f"reduced chi-square {self.scores[0].reduced_chi2:.4g} ({samples})")
+            lines.append(f"reduced chi-square {_digits(self.scores[0].reduced_chi2, 4)} ({samples})")
         rig = [
-            f"{_short(each):<27}{each.value:>11.3g}   {each.interval[0]:.3g} .. {each.interval[1]:.3g} {each.unit}"
+            f"{_short(each):<27}{each.value:>11.3g}  {' to '.join(f'{end:.3g}' for end in each.interval)} {each.unit}"
             for each in self.rig
         ]
         blocks = [
-            "\n".join([heading, *lines]),
-            self.summary(),
-            "\n".join(remarks),
-            "\n".join(["Disturbances of the rig:", *rig]),
+            ["\n".join([heading, *lines])],
+            self._pairs(),
+            [self.summary()],
+            remarks,
+            [f"{'disturbance of the rig':<27}{'value':>11}  95 % interval, unit", *rig] if rig else [],
         ]
-        return "\n\n".join(block for block in blocks if block and block != "Disturbances of the rig:")
+        return "\n\n".join("\n".join(block) for block in blocks if block)
+
+    def _pairs(self) -> list[str]:
+        """Return lines on the most strongly correlated pairs of estimates, the strongest first."""
+        pairs = [(self.correlations[i, j], i, j) for j in range(len(self.names)) for i in range(j)]
+        pairs = sorted((each for each in pairs if abs(each[0]) >= CORRELATED), key=lambda each: -abs(each[0]))[:PAIRS]
+        lines = [f"{f'{self.names[i]}, {self.names[j]}':<27}{value:+.3f}" for value, i, j in pairs]
+        return [f"correlations of {CORRELATED} and more", *lines] if lines else []
 
     def __repr__(self) -> str:
         return self.table()
@@ -215,6 +226,12 @@ class Identification(ByValue):
     def plot(self) -> Any:
         """Draw measured and fitted channels with their residuals; returns a matplotlib Figure."""
         return picture("identification", self)
+
+
+def _digits(value: float, count: int) -> str:
+    """Return a number with `count` significant digits, without an exponent where it has few zeros."""
+    text = f"{value:.{count}g}"
+    return np.format_float_positional(float(text), trim="-") if 1e-3 <= abs(value) < 1e6 else text
 
 
 def _sentence(text: str) -> str:

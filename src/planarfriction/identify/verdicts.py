@@ -232,12 +232,12 @@ def judge(
     verdicts = [Verdict("fit", not u.rejected, _on_fit(u, chosen))]
     if len(candidates) > 1:
         scores = sorted((each.score for each in candidates if each is not best), key=lambda each: each.held_out)
-        rest = ", ".join(f"{each} {each.held_out:.3g}" for each in scores)
-        text = f"it predicts held-out parts to {chosen.held_out:.3g} times the noise; {rest}"
+        rest = ", ".join(f"{each.held_out:.3g} times for {each}" for each in scores)
+        text = f"on held-out parts of the logs, its errors are {chosen.held_out:.3g} times the noise ({rest})"
         verdicts.append(Verdict("fit", True, text))
     verdicts += _on_data(evidence, u) + [Verdict("fit", each.agrees, str(each)) for each in held]
     if skipped:
-        text = f"{', '.join(skipped)}: not tried, would take minutes (choose it as model)"
+        text = f'{" and ".join(skipped)} would take minutes and was not tried: choose it by model="{skipped[0]}"'
         verdicts.append(Verdict("fit", True, text))
     for i, name in enumerate(evidence.names):
         verdict = judge_parameter(evidence, i)
@@ -245,7 +245,7 @@ def judge(
             low, high = interval(name, evidence.values[i], evidence.errors[i])
             meaningless = f"{chosen.model} does not explain the data, so this value has no meaning"
             denied = [each for each in held if not each.agrees and abs(each.moves[i]) > MOVED * evidence.errors[i]]
-            resting = f"{denied[0].name}, held, would move it by {denied[0].moves[i]:+.2g}" if denied else ""
+            resting = f"it changes by {denied[0].moves[i]:+.2g} if {denied[0].name} is not held" if denied else ""
             if reason := meaningless if u.rejected else resting or dependence(name, (low, high), others):
                 verdict = Verdict(name, False, reason)
         if verdict is not None:
@@ -260,23 +260,23 @@ def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
         return f"{chosen} explains the data: its residuals are {size:.2f} times the noise of the sensors"
     text = []
     if u.reduced_chi2 > u.limit:
-        most = f"chance explains at most {np.sqrt(u.limit):.2f}"
-        text.append(f"its residuals are {size:.2f} times the noise of the sensors, and {most}")
+        most = f"at most {np.sqrt(u.limit):.2f} times can be chance"
+        text.append(f"its residuals are {size:.2f} times the noise of the sensors ({most})")
     if u.score > HELD_OUT:
-        text.append(f"it misses parts that it did not see by {u.score:.1f} times the noise")
+        text.append(f"its errors on held-out parts of the logs are {u.score:.1f} times the noise")
     if u.strain > STRAIN:
-        text.append(f"it needs {u.strains[0][1]}, {u.strain:.1f} times the usual error of a rig")
+        text.append(f"it needs {u.strains[0][1]}, {u.strain:.1f} times the usual error of such a rig")
     if u.neighbours > CORRELATED:
         text.append(f"neighbouring residuals are correlated ({u.neighbours:.2f})")
-    cause = "the patch, the kind of bristles or the measurement is wrong"
-    return f"{chosen} is rejected: {', and '.join(text)}; {cause}, and the intervals are only a rough guide"
+    cause = "The patch, the kind of bristles or the measurement is wrong"
+    return f"{chosen} is rejected: {'; '.join(text)}. {cause}, and the intervals are only a rough guide"
 
 
 def _on_data(evidence: Evidence, u: Uncertainty) -> list[Verdict]:
     """Return cautions: disturbances that a fit leans on, channels that were not measured, spoiled samples, one load."""
     found = []
-    if leaning := [f"{words} ({size:.1f})" for size, words in u.strains if size > LEANING]:
-        text = f"the fit needs large disturbances of the rig: {', '.join(leaning)} (times the usual error)"
+    if leaning := [f"{words} ({size:.1f} times the usual)" for size, words in u.strains if size > LEANING]:
+        text = f"the fit needs large disturbances of the rig: {', '.join(leaning)}"
         found.append(Verdict("fit", True, text))
     if not evidence.measured.all():
         missing = [name for (name, _), seen in zip(CHANNELS, evidence.measured, strict=True) if not seen]

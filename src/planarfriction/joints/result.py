@@ -131,7 +131,7 @@ class JointFit:
 
     def table(self) -> str:
         """Return estimates, left-out errors and verdicts as text."""
-        lines = [f"{'parameter':14} {'value':>11} {'spread':>10}  95 % interval, unit"]
+        lines = [f"{'parameter':14} {'value':>11} {'std. error':>10}  95 % interval, unit"]
         for name, value in self.values.items():
             low, high = self.interval(name)
             lines.append(

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.compiler.notice import said_when_compiling
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
 from planarfriction.kernels.integration import Method, Output
 from planarfriction.scenes.options import MAX_STEPS, SolverOptions
@@ -64,7 +63,7 @@ def simulate(
     v_s for velocities (a hundredth with the published reduced model); for angles both are divided by the contact
     radius. So `atol` is a share of a full bristle deflection. A step during which the twist of a contact turns is also
     checked between its ends. The solver stops exactly at every break of a signal. The first run after an installation
-    compiles the solver; if there is no `progress`, a line on the terminal or in the notebook says so.
+    compiles the solver; a line on the terminal or in the notebook says so.
 
     Parameters
     ----------
@@ -104,7 +103,7 @@ def simulate(
         raise InvalidValueError("method", "be solvers.RODAS4 or solvers.RODAS3", method)
     if not (progress is None or callable(progress)):
         raise InvalidValueError("progress", "be a function of the simulated time, or None", progress)
-    with said_when_compiling(silent=progress is not None), compiled_together():
+    with compiled_together():
         batches = SegmentBatches(scene, plan.end, times=plan.times)
         output = _output(scene, plan.times, batches, bristles)
         scales = plan.atol * batches.state_scale

@@ -1,6 +1,7 @@
 """The friction models for PyTorch: modules with trainable physical parameters, and differentiable rollouts.
 
-Needs PyTorch: `pip install 'planarfriction[torch]'`.
+Needs PyTorch: `pip install 'planarfriction[torch]'`; before it, for the processor alone,
+`pip install torch --index-url https://download.pytorch.org/whl/cpu`.
 """
 
 from planarfriction.errors import needing

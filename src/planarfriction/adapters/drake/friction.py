@@ -19,7 +19,6 @@ from planarfriction import validation
 from planarfriction.adapters.drake.asking import Asking
 from planarfriction.adapters.drake.patches import PatchContact, found
 from planarfriction.adapters.drake.shadow import Shadow
-from planarfriction.compiler.notice import said_when_compiling
 from planarfriction.coupling import CoupledPatches
 from planarfriction.errors import InvalidValueError
 
@@ -71,8 +70,7 @@ class Friction(LeafSystem):
         self.patches = tuple(each.patch for each in self._placed)
         self.coupled = CoupledPatches([patch.model for patch in self.patches])
         self._shadow = Shadow(plant, scene_graph, self._placed)
-        with said_when_compiling():
-            self._asking = Asking(self._shadow, self.coupled, plant.num_velocities())
+        self._asking = Asking(self._shadow, self.coupled, plant.num_velocities())
         self._size, self._warned = plant.num_velocities(), False
         self._declare_inputs(plant)
         k, states = len(self.patches), self.coupled.state_shape[0]

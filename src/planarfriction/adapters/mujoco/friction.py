@@ -33,7 +33,6 @@ from planarfriction.adapters.mujoco.patches import (
 )
 from planarfriction.compiler.calls import address_of
 from planarfriction.compiler.memory import place_of, row_of
-from planarfriction.compiler.notice import said_when_compiling
 from planarfriction.coupling import CoupledPatches
 from planarfriction.environments import check
 from planarfriction.errors import FrictionError, InvalidValueError
@@ -251,9 +250,8 @@ class Friction:
     @functools.cached_property
     def _row(self) -> np.ndarray:
         """Record of the model for compiled steps, which are ready then."""
-        with said_when_compiling():
-            loops.compile_ahead()
-            return self._host_row()
+        loops.compile_ahead()
+        return self._host_row()
 
     def _host_row(self) -> np.ndarray:
         packed, k = self.coupled._packed, len(self.patches)

@@ -52,9 +52,9 @@ def online() -> None:
 @click.option("--seed", type=int, default=0, show_default=True, help="Random seed of parts and noise.")
 @click.option("--json", "file", type=FILE, help="File for the numbers of the table (JSON).")
 def trials(parts: int, seed: int, file: Path | None) -> None:
-    """Hold, slide, turn and hinge random parts with unknown friction, and print what came of it.
+    """Hold, slide, turn and hinge random parts with unknown friction, and print the results.
 
-    The published rules do the same beside it, with the true friction. 100 parts take about three minutes.
+    The published controllers do the same tasks, but know the true friction. 100 parts take about three minutes.
 
     \b
     Example:

@@ -14,12 +14,12 @@ ENGINE = click.option(
     "engines",
     metavar="NAME",
     multiple=True,
-    help="Only this engine, or all whose names begin so; may be repeated.",
+    help="Only this engine, or all with this prefix; may be repeated.",
 )
 CASE = click.option(
     "--case", "cases", metavar="NAME", multiple=True, help="Only this case, or a TOML file; may be repeated."
 )
-JSON = click.option("--json", "file", type=FILE, help="File for a JSON list of results; a run goes on from it.")
+JSON = click.option("--json", "file", type=FILE, help="File for a JSON list of results; a later run continues from it.")
 
 
 @click.group(
@@ -44,11 +44,11 @@ def referee(
     file: Path | None,
     folder: Path | None,
 ) -> int:
-    """Judge the contact friction of simulators by cases with exact truths: closed forms, or exact motions.
+    """Judge the contact friction of simulators by cases with exact answers: closed forms, or exact motions.
 
-    Every engine that is installed runs every case at its defaults and at good settings, this library's adapters among
-    them. Marks: ok within what is allowed, off up to ten times that, fails beyond it; - without words for the case.
-    With --json, each result is written when it is there, and the same command goes on from the file.
+    Every engine that is installed runs every case with default and with tuned settings, this library's adapters among
+    them. Marks: ok within the allowed error, off up to ten times that, fails beyond it; - where an engine cannot
+    describe the case. With --json, results are written as they come, and the same command continues from the file.
 
     \b
     Examples:
@@ -70,7 +70,11 @@ def referee(
     found = _engines(engines, left_out)[: 2 if quick else None]
     if list_only:
         print_table("Cases", ["name", "description"], [[each.name, each.title] for each in chosen.values()])
-        print_table("Engines", ["name", "settings"], [[each.name, each.settings] for each in found])
+        print_table(
+            "Engines",
+            ["name", "settings"],
+            [[each.name, each.settings.replace("as it comes", "default")] for each in found],
+        )
         return 0
     steps = None if step is None else (validation.positive("--step", step),)
     if folder is not None:
@@ -104,7 +108,7 @@ def _judged(
         code = INTERRUPTED
     verdicts = kept.of(cases, engines)
     if code:
-        goes_on = "" if file is None else ": the same command goes on from there"
+        goes_on = "" if file is None else ": the same command continues from there"
         note(f"interrupted: {len(verdicts)} of {len(cases) * len(engines)} results are finished{goes_on}")
     return verdicts, code
 
@@ -114,7 +118,7 @@ def _judged(
 @CASE
 @JSON
 def simulators(engines: tuple[str, ...], cases: tuple[str, ...], file: Path | None) -> int:
-    """Compare patch friction in simulators with their own friction, as it comes and at its best settings.
+    """Compare patch friction in simulators with their own friction, with default and with the best settings.
 
     This is a view of `planarfriction referee`, in units instead of marks. What --json has is not computed again.
 

@@ -53,7 +53,9 @@ def _dots(part: Any, benchmark: Benchmark, task: str) -> None:
         ends = np.array([[score.value - score.low, score.high - score.value] for score in scores]).T
         axes.errorbar(value, places, xerr=np.maximum(ends, 0.0), fmt="o", color="0.25", markersize=5, elinewidth=1.2)
         axes.set(xlim=(0.0, None), yticks=places, yticklabels=list(results))
-        axes.set_xlabel(measure.heading.replace(", ", "\n"), fontsize="small")
+        name, _, unit = measure.heading.partition(" [")
+        axes.set_title(name.replace(", ", "\n"), fontsize="small", loc="left")
+        axes.set_xlabel(f"{measure.total.__name__} {measure.quantity}{unit and f' [{unit}'}", fontsize="small")
         axes.tick_params(labelsize="small")
         style.tidy(axes)
 
@@ -158,7 +160,7 @@ def _draw_centres(part: Any, benchmark: Benchmark) -> None:
         axes.plot(*1e3 * corners.T, "o", color="0.2", markersize=13, fillstyle="none", label="foot")
     limit = 1.6e3 * np.abs(corners).max()
     axes.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
-    axes.set_title(f"centres of rotation, {case.question.layout}", fontsize="small", loc="left")
+    axes.set_title(f"centres of rotation, feet as in {case.question.layout}", fontsize="small", loc="left")
     _finish(part, [axes], 3)
 
 

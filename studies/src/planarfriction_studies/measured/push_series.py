@@ -35,10 +35,10 @@ WINDOW, EVERY = 0.25, 6
 """Half width of the Hann window over the force [s]; every sixth sliding row is scored: neighbours are correlated."""
 
 MEASURES = (
-    Measure("twist_named_deg", "twist, named feet [deg]", mean, "twists named"),
-    Measure("wrench_named_deg", "wrench, named feet [deg]", mean, "wrenches named"),
-    Measure("twist_other_deg", "twist, other runs [deg]", mean, "twists other"),
-    Measure("wrench_other_deg", "wrench, other runs [deg]", mean, "wrenches other"),
+    Measure("twist_named_deg", "twist, named feet [deg]", mean, "twists named", quantity="angle"),
+    Measure("wrench_named_deg", "wrench, named feet [deg]", mean, "wrenches named", quantity="angle"),
+    Measure("twist_other_deg", "twist, other runs [deg]", mean, "twists other", quantity="angle"),
+    Measure("wrench_other_deg", "wrench, other runs [deg]", mean, "wrenches other", quantity="angle"),
 )
 """Mean angle over the scored rows of all pushes."""
 

@@ -24,10 +24,13 @@ THEIRS = {
 }
 """Methods of the authors, and what they are called here."""
 
+OFF = "angle to the\nmeasured twist"
+"""Quantity of the measures."""
+
 MEASURES = (
-    Measure("hardboard_deg", "feet on hardboard [deg]", mean, "hardboard"),
-    Measure("plywood_deg", "feet on plywood [deg]", mean, "plywood"),
-    Measure("flat_deg", "flat face [deg]", mean, "flat"),
+    Measure("hardboard_deg", "feet on hardboard [deg]", mean, "hardboard", quantity=OFF),
+    Measure("plywood_deg", "feet on plywood [deg]", mean, "plywood", quantity=OFF),
+    Measure("flat_deg", "flat face [deg]", mean, "flat", quantity=OFF),
 )
 """Mean angle between the measured and the predicted twist."""
 

@@ -24,6 +24,8 @@ class Measure(NamedTuple):
     """Board whose cases count; all cases if empty."""
     column: int = 0
     """Column of the errors of a case."""
+    quantity: str = "error"
+    """Quantity of the axis of a figure."""
 
 
 def rms(values: np.ndarray, weights: np.ndarray | None = None) -> Any:

@@ -116,7 +116,7 @@ def stated(engines: Sequence[Engine]) -> dict[str, Any]:
         "date": date.today().isoformat(),
         "machine": f"{platform.system()} {platform.machine()}, {_processor()}, Python {platform.python_version()}",
         "versions": {package: metadata.version(package) for package in packages},
-        "settings": {engine.name: engine.settings for engine in engines},
+        "settings": {engine.name: engine.settings.replace("as it comes", "default") for engine in engines},
     }
 
 
