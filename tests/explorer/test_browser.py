@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
+from planarfriction.laws import LAWS
 from planarfriction_explorer import code
 from planarfriction_explorer.ladder import RUNGS
 from planarfriction_explorer.state import State
@@ -43,6 +44,23 @@ NEXT_ANSWER = """async (before) => {
     }
 }"""
 """Waits until the numbers are others than before: the time that took [ms], and the numbers."""
+
+BOXES = """(wanted) => {
+    const found = [], walk = (root, around) => {
+        for (const each of root.children || []) {
+            const style = getComputedStyle(each), inside = style.borderRadius === "8px" ? each : around;
+            if (each.matches(wanted)) {
+                const [one, card] = [each, inside].map((box) => box.getBoundingClientRect());
+                found.push([one.left, one.right, one.top, one.bottom, card.left, card.right, style.opacity]);
+            }
+            if (each.shadowRoot) walk(each.shadowRoot, inside);
+            walk(each, inside);
+        }
+    };
+    walk(document.body, document.body);
+    return found.filter((box) => box[1] > box[0]);
+}"""
+"""Finds the sides of what is wanted: left, right, top and bottom on the screen, left and right of its card; opacity."""
 
 
 @pytest.fixture(scope="module")
@@ -109,6 +127,10 @@ class Visitor:
         time, _ = self.page.evaluate(NEXT_ANSWER, before)
         assert time is not None, "nothing changed"
         return self.text()
+
+    def boxes(self, wanted: str) -> np.ndarray:
+        """Return the sides of all `wanted` on the screen and of their cards, and their opacity, `[K, 7]` [px]."""
+        return np.array(self.page.evaluate(BOXES, wanted), dtype=float)
 
     def ladder(self) -> str:
         return self.page.locator("#ladder").inner_text()
@@ -239,8 +261,9 @@ def test_every_other_control_changes_what_is_said(visitor):
 def test_a_value_that_breaks_a_rule_is_one_line_and_the_page_goes_on(visitor):
     visitor.fill("mu_s", "0.5")
     assert "mu_s must be >= mu_c" in visitor.message()
+    assert (visitor.boxes(".stale")[:, -1] == 0.3).all() and len(visitor.boxes(".stale")) == 3
     visitor.after(lambda: visitor.fill("mu_s", "1.5"))
-    assert visitor.says("mu_s=1.5")
+    assert visitor.says("mu_s=1.5") and len(visitor.boxes(".stale")) == 0
 
 
 @pytest.mark.parametrize(
@@ -398,6 +421,33 @@ def test_a_phone_shows_the_pictures_then_the_controls_then_the_code(visitor):
     visitor.page.locator(".mu_s .bk-description").hover()
     tooltip = visitor.page.get_by_text("Static (breakaway) coefficient").bounding_box()
     assert tooltip["x"] > 0.0 and tooltip["x"] + tooltip["width"] < 400.0
+
+
+def test_a_phone_sees_what_is_wrong_at_the_field_and_below(visitor):
+    visitor.page.set_viewport_size({"width": 400, "height": 800})
+    before = visitor.boxes(".mu_s")[0]
+    visitor.fill("mu_s", "0.5")
+    line, field = visitor.page.locator("#message"), visitor.page.locator(".mu_s")
+    line.wait_for()
+    line, field = line.bounding_box(), field.bounding_box()
+    assert field["height"] > before[3] - before[2] + 20.0  # for the reason
+    assert field["y"] > 0.0 and field["y"] + field["height"] < line["y"] and line["y"] + line["height"] < 800.0
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 720), (400, 800), (320, 640)])
+def test_nothing_leaves_its_card_and_sliders_come_first(visitor, width, height):
+    visitor.page.set_viewport_size({"width": width, "height": height})
+    visitor.page.wait_for_timeout(1000)
+    assert visitor.boxes(".vx, .vy, .omega")[:, 3].max() < height / 2
+    for kind in LAWS:
+        visitor.choose("law", kind)
+        visitor.page.wait_for_timeout(300)
+        marks = visitor.boxes(".bk-description, .bk-TooltipIcon")
+        assert len(marks) > 12 and (marks[:, 0] > marks[:, 4]).all() and (marks[:, 1] < marks[:, 5]).all(), kind
+    tabs = visitor.boxes(".bk-tab")
+    assert len(tabs) == 5 and (tabs[:, 1] < tabs[:, 5]).all()
+    code = visitor.page.locator(".python textarea")
+    assert code.evaluate("(each) => each.scrollWidth - each.clientWidth") <= 0
 
 
 def test_two_visitors_do_not_change_each_other(visitor, browser, address):
