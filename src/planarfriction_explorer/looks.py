@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-_NARROW = "@media (max-width: 760px)"
+_NARROW = "@media (max-width: 920px)"
 
 PAGE = f"""
 :root {{color-scheme: only light}}
@@ -32,7 +32,9 @@ OPENED = f"{_NARROW} {{:host {{display: contents !important}}}}"
 FIRST = f"{_NARROW} {{:host {{order: -1}}}}"
 """Style of what stands before all else on a small screen."""
 
-TABS = f"{CARD}\n.bk-header, .bk-headers-wrapper {{flex-wrap: wrap; min-width: 0}}"
+TABS = f"""{CARD}
+.bk-header, .bk-headers-wrapper {{flex-wrap: wrap; min-width: 0}}
+{_NARROW} {{:host {{flex: 1 0 100% !important; margin-top: 0 !important}}}}"""
 """Style of the tabs, of which a small screen needs two rows."""
 
 CODE = f"""textarea {{font-family: ui-monospace, "DejaVu Sans Mono", monospace; font-size: 13px; white-space: pre;
