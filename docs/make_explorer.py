@@ -80,9 +80,9 @@ def place(page: Page, x: float, y: float) -> tuple[float, float]:
 
 
 def save(page: Page, name: str, **options: Any) -> None:
-    """Write what is seen, each colour in 52 steps: a palette loses those of small marks."""
+    """Write what is seen, each colour in 18 steps: a palette loses those of small marks."""
     with Image.open(io.BytesIO(page.screenshot(**options))) as picture:
-        picture.convert("RGB").point(lambda value: 5 * round(value / 5)).save(
+        picture.convert("RGB").point(lambda value: 15 * round(value / 15)).save(
             DOCS / "images" / f"{name}.png", optimize=True
         )
 

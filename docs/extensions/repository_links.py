@@ -14,7 +14,7 @@ LINKS = {
     r"(?:\.\./)?README\.md(?:#[\w-]+)?": "index.md#citation",
     r"(?:\.\./)?CONTRIBUTING\.md(#[\w-]+)?": r"contributing.md\1",
     r"(?:\.\./)?CHANGELOG\.md(#[\w-]+)?": r"changelog.md\1",
-    r"docs/((?:images/)?[\w-]+\.(?:md|png)(?:#[\w-]+)?)": r"\1",
+    r"docs/((?:images/|static/)?[\w-]+\.(?:md|png|html)(?:#[\w-]+)?)": r"\1",
 }
 """Link in a file of the repository -> link to the page."""
 

@@ -76,6 +76,7 @@ class Controls:
             if "description" in widget.param:  # sliders have none: `_slider`
                 widget.description = tooltips[name]
         self._silent = False
+        self._refused: Any = None
         self.parameters: Any = pn.FlexBox(gap="0 8px", sizing_mode="stretch_width")
 
     def on(self, widget: Any, act: Callable[[Any], Any]) -> None:
@@ -83,7 +84,10 @@ class Controls:
         widget.param.watch(lambda event: None if self._silent or event.new is None else act(event.new), "value")
 
     def offer_parameters(self, law: Any, changed: Callable[[Any], Any]) -> None:
-        """Put up fields for the parameters of the law; empty ones have a default that depends on others."""
+        """Put up fields for the parameters of the law; empty ones have a default that depends on others.
+
+        `changed` is called with a field that the user changes.
+        """
         fields, docs = [], field_docs(type(law))
         for name, value in law_parameters(law).items():
             words = docs.get(name, "")
@@ -95,16 +99,24 @@ class Controls:
                     value=value,
                     css_classes=["parameter", name],
                     tags=[name],
-                    styles=looks.grows(110),
+                    styles=looks.grows(130),
                     margin=(3, 0, 5, 0),
                 )
             )
-            fields[-1].param.watch(lambda event: None if self._silent else changed(event.new), "value")
+            fields[-1].param.watch(lambda event: None if self._silent else changed(event.obj), "value")
         self.parameters.objects = fields
 
     def law_values(self) -> dict[str, float | None]:
         """Return the values in the fields of the law, by parameter; None where a field is empty."""
         return {each.tags[0]: each.value for each in self.parameters}
+
+    def refuse(self, field: Any = None, words: str = "") -> None:
+        """Say at the field why its value is refused, and nothing any more at the last one."""
+        if self._refused is not None:
+            self._refused.stylesheets = []
+        if field is not None:
+            field.stylesheets = [looks.wrong(words)]
+        self._refused = field
 
     def show(self, state: State) -> None:
         """Set the controls to the state, without taking that for a wish of the user."""
@@ -121,6 +133,7 @@ class Controls:
             self.load: state.normal_force,
             self.cell_size: _thousandfold(drawing.cell_size),
             self.patch: drawing.name if drawing.origin == "published" else OWN,
+            **{each: law_parameters(state.law)[each.tags[0]] for each in self.parameters},
         }
         self._silent = True
         try:
@@ -138,7 +151,7 @@ class Controls:
         return pn.FlexBox(*parts, gap="0 8px", align_items="flex-end", styles=looks.grows(340))
 
     def layout(self) -> Any:
-        """Return the controls, except for the tool and those of `head`, one below the other."""
+        """Return the controls, except for the tool and those of `head` and `motion`, one below the other."""
         return pn.Column(
             _heading("Contact"),
             self.patch,
@@ -152,11 +165,14 @@ class Controls:
             self.load,
             _heading("Held by two such contacts"),
             pn.Row(self.mass, pn.Spacer(width=8), self.lever, sizing_mode="stretch_width"),
-            _heading("Motion of the origin"),
-            *map(self._slider, ("vx", "vy", "omega")),
             stylesheets=[looks.SIDE],
             styles=looks.grows(270, most=320),
         )
+
+    def motion(self) -> Any:
+        """Return the sliders of the twist."""
+        rows = map(self._slider, ("vx", "vy", "omega"))
+        return pn.Column(_heading("Motion of the origin"), *rows, sizing_mode="stretch_width")
 
     def _slider(self, name: str) -> Any:
         icon = pn.widgets.TooltipIcon(value=TOOLTIPS[name], margin=(0, 0, 0, 10))

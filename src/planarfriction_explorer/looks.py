@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
-_NARROW = "@media (max-width: 760px)"
+_NARROW = "@media (max-width: 920px)"
 
 PAGE = f"""
 :root {{color-scheme: only light}}
+html {{scroll-padding: 10px 0 160px}}
 body {{margin: 0; background: #F3F5F7; font-family: system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif;
   --design-primary-color: #0072B2}}
 {_NARROW} {{.bk-Tooltip {{left: 8px !important; max-width: calc(100vw - 32px) !important;
@@ -17,8 +19,9 @@ body {{margin: 0; background: #F3F5F7; font-family: system-ui, "Segoe UI", Robot
 beside their controls on a small screen, lie below them there."""
 
 CARD = """:host {background: white; border: 1px solid #DFE3E8; border-radius: 8px; padding: 10px 14px;
-  box-sizing: border-box}"""
-"""Style of a part of the page."""
+  box-sizing: border-box}
+:host(.stale) {opacity: 0.3; filter: grayscale(1)}"""
+"""Style of a part of the page, pale where its results are not those of the fields."""
 
 SIDE = f"{CARD}\n{_NARROW} {{:host {{max-width: none !important}}}}"
 """Style of the controls, which are as wide as a small screen."""
@@ -29,12 +32,22 @@ OPENED = f"{_NARROW} {{:host {{display: contents !important}}}}"
 FIRST = f"{_NARROW} {{:host {{order: -1}}}}"
 """Style of what stands before all else on a small screen."""
 
-CODE = """textarea {font-family: ui-monospace, "DejaVu Sans Mono", monospace; font-size: 13px; white-space: pre;
-  color: #222 !important; background: #FAFAFA; opacity: 1 !important}"""
-"""Style of code to copy."""
+TABS = f"""{CARD}
+.bk-header, .bk-headers-wrapper {{flex-wrap: wrap; min-width: 0}}
+{_NARROW} {{:host {{flex: 1 0 100% !important; margin-top: 0 !important}}}}"""
+"""Style of the tabs, of which a small screen needs two rows."""
+
+CODE = f"""textarea {{font-family: ui-monospace, "DejaVu Sans Mono", monospace; font-size: 13px; white-space: pre;
+  color: #222 !important; background: #FAFAFA; opacity: 1 !important}}
+{_NARROW} {{textarea {{white-space: pre-wrap; overflow-wrap: anywhere}}}}"""
+"""Style of code to copy; a small screen breaks its lines."""
 
 ALERT = "background:#FBE3E0;border:1px solid #C0392B;border-radius:6px;padding:8px 12px;font-size:15px"
 """Style of the line that says what is wrong."""
+
+STAYS = {"position": "fixed", "bottom": "8px", "left": "8px", "right": "8px", "width": "auto", "margin": "0 auto"}
+STAYS |= {"max-width": "760px", "z-index": "20", "box-shadow": "0 2px 10px #0005", "border-radius": "6px"}
+"""Styles of a line that is seen wherever the page is scrolled to, and moves nothing."""
 
 HINT = "background:#E8F1F8;border:1px solid #0072B2;border-radius:6px;padding:8px 12px;font-size:15px"
 """Style of the line that says what to do next."""
@@ -48,6 +61,14 @@ th:first-child, td:first-child {padding-left: 0}
 p {margin: 8px 0 0}
 </style>"""
 """Style of a table, to stand before it."""
+
+
+def wrong(words: str) -> str:
+    """Return the style of a field whose value is refused, with the reason below it."""
+    reason = json.dumps(words, ensure_ascii=False)  # quotes and backslashes are escaped as in CSS
+    return f"""input, select {{border-color: #C0392B !important; background-color: #FBE3E0 !important}}
+.bk-input-group::after {{content: {reason}; color: #C0392B; font-size: 12px;
+  white-space: normal; width: 0; min-width: 100%}}"""
 
 
 def grows(least: int, *, most: int | None = None) -> dict[str, str]:

@@ -52,11 +52,11 @@ class Page:
         self.ladder = LadderTab(lambda: self.state)
         self.scenes = SceneTab(lambda: self.state, self._try)
         self.surface = pn.pane.Plotly(
-            None, config={"displaylogo": False, "responsive": True}, height=430, sizing_mode="stretch_width"
+            None, config={"displaylogo": False, "responsive": True}, aspect_ratio=0.8, sizing_mode="scale_width"
         )
         self.numbers = pn.pane.HTML("", css_classes=["numbers"], sizing_mode="stretch_width")
         self.grid = pn.pane.HTML("", sizing_mode="stretch_width")
-        self.message = pn.pane.HTML("", visible=False, sizing_mode="stretch_width")
+        self.message = pn.pane.HTML("", visible=False, sizing_mode="stretch_width", styles=looks.STAYS)
         self.python, self.toml, self.mujoco = map(_code_area, ("python", "toml", "mujoco"))
         self.tabs = pn.Tabs(
             ("Python", _copied(self.python)),
@@ -67,8 +67,10 @@ class Page:
             dynamic=True,
             margin=(10, 0, 0, 0),
             sizing_mode="stretch_width",
-            stylesheets=[looks.CARD],
+            stylesheets=[looks.TABS],
         )
+        self.cards: Any = (self.tabs,)
+        """Parts of the page with results."""
         self.tabs.param.watch(lambda _: self._follow_ladder(), "active")
         self._listen()
         self._redraw()
@@ -78,7 +80,7 @@ class Page:
         controls = self.controls
 
         def on(widget: Any, act: Callable[[Any], Any]) -> None:
-            controls.on(widget, lambda value: self._try(lambda: act(value)))
+            controls.on(widget, lambda value: self._try(lambda: act(value), field=widget))
 
         on(controls.patch, lambda name: self._draw(Drawing.published(name)) if name != OWN else None)
         on(controls.cell_size, lambda size: self._draw(self.state.drawing.scaled(1e-3 * size)))
@@ -123,7 +125,7 @@ class Page:
             self._restore(from_link(link))
 
     def _offer_parameters(self) -> None:
-        self.controls.offer_parameters(self.state.law, lambda _: self._try(self._set_law))
+        self.controls.offer_parameters(self.state.law, lambda field: self._try(self._set_law, field=field))
 
     def _choose_law(self, kind: str) -> None:
         self._laws[str(LAWS.name_of(self.state.law))] = self.state.law
@@ -203,23 +205,32 @@ class Page:
 
     # ------------------------------------------------------------------ showing
 
-    def _try(self, act: Callable[[], Any], step: Any = None) -> None:
+    def _try(self, act: Callable[[], Any], step: Any = None, field: Any = None) -> None:
         """Carry out a wish of the user, or say in one line why not; the browser gets all changes in one message.
 
-        What the same control, `step`, changes until it is released can be undone together.
+        What the same control, `step`, changes until it is released can be undone together. A `field` whose value is
+        refused says so too, and the results, which are those of the values before, are pale until the next wish.
         """
         before = self.state
         with pn.io.unlocked():
             try:
                 self.message.visible = False
+                self._refuse()
                 act()
             except FrictionError as error:
-                self._say(str(error), looks.ALERT)
+                pale = field is not None and self.answer is not None
+                self._say(f"{error}. Pale: results of the values before." if pale else str(error), looks.ALERT)
+                self._refuse(field if pale else None, str(error))
             if self.state is not before:
                 if step is None or step is not self._step:
                     self._past.append(before)
                 self._step = step
                 self.controls.undo.disabled = not self._past
+
+    def _refuse(self, field: Any = None, words: str = "") -> None:
+        self.controls.refuse(field, words)
+        for card in self.cards:
+            card.css_classes = [] if field is None else ["stale"]
 
     def _say(self, words: str, look: str = looks.HINT) -> None:
         self.message.object = f"<div id='message' style='{look}'>{html.escape(words)}</div>"
@@ -275,6 +286,7 @@ class Page:
         title = pn.pane.HTML(words, margin=(8, 12, 4, 4))
         hint = pn.pane.HTML("<b style='font-size:15px'>Drag over the map</b>", margin=(4, 0, 4, 0))
         plane = pn.Column(
+            self.controls.motion(),
             hint,
             self.controls.tool,
             pn.pane.Bokeh(self.map.figure, css_classes=["map"], sizing_mode="scale_width", aspect_ratio=1.0, margin=0),
@@ -290,6 +302,7 @@ class Page:
             stylesheets=[looks.CARD],
             styles=looks.grows(360) | {"height": "auto"},
         )
+        self.cards = (plane, space, self.tabs)
         main = pn.Column(
             pn.FlexBox(plane, space, gap="10px", align_items="stretch", stylesheets=[looks.FIRST]),
             self.tabs,
@@ -303,7 +316,7 @@ class Page:
             *hidden,
             pn.FlexBox(self.controls.layout(), main, gap="10px", align_items="flex-start"),
             sizing_mode="stretch_width",
-            styles={"padding": "0 10px 10px", "box-sizing": "border-box"},
+            styles={"padding": "0 10px 64px", "box-sizing": "border-box"},
         )
 
 

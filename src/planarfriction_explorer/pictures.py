@@ -140,6 +140,7 @@ def surface_figure(state: State, *, quick: bool = False) -> dict[str, Any]:
         "colorscale": [[0.0, "#5B9BC8"], [1.0, "#CFE3F1"]],
         "opacity": 0.45,  # the wrenches inside are seen
         "showscale": False,
+        "showlegend": True,
         "hoverinfo": "skip",
     }
     wires = {
@@ -169,11 +170,14 @@ def _coordinates(points: np.ndarray) -> dict[str, np.ndarray]:
     return {name: np.ascontiguousarray(each) for name, each in zip("xyz", np.moveaxis(points, -1, 0), strict=True)}
 
 
+_NAMES = {"friction": "friction of the law", "surface": "on the limit surface", "ellipsoid": "on the ellipsoid"}
+
+
 def _marker(name: str, point: np.ndarray) -> dict[str, Any]:
     """Return a line from the middle to the wrench with a ball at its end."""
     return {
         "type": "scatter3d",
-        "name": {"friction": "friction of the law", "surface": "on the surface", "ellipsoid": "on the ellipsoid"}[name],
+        "name": _NAMES[name],
         "mode": "lines+markers",
         **_coordinates(np.stack([np.zeros(3), point])),
         "line": {"color": COLOURS[name], "width": 6},
@@ -188,11 +192,11 @@ def _layout() -> dict[str, Any]:
         f"{name}axis": {"range": [-limit, limit], "title": {"text": text}}
         for name, text in zip("xyz", ("fx", "fy", "τ/r"), strict=True)
     }
-    camera = {"eye": {"x": 1.45, "y": -1.95, "z": 0.9}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}}
+    camera = {"eye": {"x": 1.7, "y": -2.3, "z": 1.05}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}}
     return {
         "scene": {**axes, "aspectmode": "cube", "camera": camera},
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
-        "legend": {"orientation": "h", "y": 0},
+        "legend": {"orientation": "h", "y": 0, "itemsizing": "constant"},
         "uirevision": "kept",  # the view that was turned to stays
         "autosize": True,
     }

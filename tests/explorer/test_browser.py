@@ -9,11 +9,13 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import planarfriction as pf
+from planarfriction.laws import LAWS
 from planarfriction_explorer import code
 from planarfriction_explorer.ladder import RUNGS
 from planarfriction_explorer.state import State
@@ -43,6 +45,23 @@ NEXT_ANSWER = """async (before) => {
     }
 }"""
 """Waits until the numbers are others than before: the time that took [ms], and the numbers."""
+
+BOXES = """(wanted) => {
+    const found = [], walk = (root, around) => {
+        for (const each of root.children || []) {
+            const style = getComputedStyle(each), inside = style.borderRadius === "8px" ? each : around;
+            if (each.matches(wanted)) {
+                const [one, card] = [each, inside].map((box) => box.getBoundingClientRect());
+                found.push([one.left, one.right, one.top, one.bottom, card.left, card.right, style.opacity]);
+            }
+            if (each.shadowRoot) walk(each.shadowRoot, inside);
+            walk(each, inside);
+        }
+    };
+    walk(document.body, document.body);
+    return found.filter((box) => box[1] > box[0]);
+}"""
+"""Finds the sides of what is wanted: left, right, top and bottom on the screen, left and right of its card; opacity."""
 
 
 @pytest.fixture(scope="module")
@@ -109,6 +128,10 @@ class Visitor:
         time, _ = self.page.evaluate(NEXT_ANSWER, before)
         assert time is not None, "nothing changed"
         return self.text()
+
+    def boxes(self, wanted: str) -> np.ndarray:
+        """Return the sides of all `wanted` on the screen and of their cards, and their opacity, `[K, 7]` [px]."""
+        return np.array(self.page.evaluate(BOXES, wanted), dtype=float)
 
     def ladder(self) -> str:
         return self.page.locator("#ladder").inner_text()
@@ -239,8 +262,9 @@ def test_every_other_control_changes_what_is_said(visitor):
 def test_a_value_that_breaks_a_rule_is_one_line_and_the_page_goes_on(visitor):
     visitor.fill("mu_s", "0.5")
     assert "mu_s must be >= mu_c" in visitor.message()
+    assert (visitor.boxes(".stale")[:, -1] == 0.3).all() and len(visitor.boxes(".stale")) == 3
     visitor.after(lambda: visitor.fill("mu_s", "1.5"))
-    assert visitor.says("mu_s=1.5")
+    assert visitor.says("mu_s=1.5") and len(visitor.boxes(".stale")) == 0
 
 
 @pytest.mark.parametrize(
@@ -398,6 +422,57 @@ def test_a_phone_shows_the_pictures_then_the_controls_then_the_code(visitor):
     visitor.page.locator(".mu_s .bk-description").hover()
     tooltip = visitor.page.get_by_text("Static (breakaway) coefficient").bounding_box()
     assert tooltip["x"] > 0.0 and tooltip["x"] + tooltip["width"] < 400.0
+
+
+def test_a_phone_sees_what_is_wrong_at_the_field_and_below(visitor):
+    visitor.page.set_viewport_size({"width": 400, "height": 800})
+    before = visitor.boxes(".mu_s")[0]
+    visitor.fill("mu_s", "0.5")
+    line, field = visitor.page.locator("#message"), visitor.page.locator(".mu_s")
+    line.wait_for()
+    line, field = line.bounding_box(), field.bounding_box()
+    assert field["height"] > before[3] - before[2] + 20.0  # for the reason
+    assert field["y"] > 0.0 and field["y"] + field["height"] < line["y"] and line["y"] + line["height"] < 800.0
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 720), (800, 900), (400, 800), (360, 740)])
+def test_nothing_leaves_its_card_and_sliders_come_first(visitor, width, height):
+    visitor.page.set_viewport_size({"width": width, "height": height})
+    visitor.page.wait_for_timeout(1000)
+    assert visitor.boxes(".vx, .vy, .omega")[:, 3].max() < height / 2
+    for kind in LAWS:
+        visitor.choose("law", kind)
+        visitor.page.wait_for_timeout(300)
+        marks = visitor.boxes(".bk-description, .bk-TooltipIcon")
+        assert len(marks) > 12 and (marks[:, 0] > marks[:, 4]).all() and (marks[:, 1] < marks[:, 5] - 13.0).all(), kind
+    tabs = visitor.boxes(".bk-tab")
+    assert len(tabs) == 5 and (tabs[:, 1] < tabs[:, 5]).all()
+    code = visitor.page.locator(".python textarea")
+    assert code.evaluate("(each) => each.scrollWidth - each.clientWidth") <= 0
+
+
+def test_the_lesson_has_the_numbers_of_the_library_offline(browser):
+    page, errors, asked = browser.new_page(), [], []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("request", lambda one: asked.append(one.url))
+    page.goto((Path(__file__).parents[2] / "docs" / "static" / "lesson.html").as_uri())
+    patches = {"disc": pf.ContactPatch.disc(0.01), "square": pf.ContactPatch.rectangle(0.02, 0.02)}
+    hertz = pf.patch.SoftFinger(c=0.01, n=0.0, k=2.0)
+    patches["soft fingertip (Hertz)"] = pf.ContactPatch.disc(0.01, cells=41, pressure=hertz)
+    for name, patch in patches.items():
+        for twist in ((0.01, 0.0, 2.0), (-0.02, 0.03, 1.0), (0.0, 0.0, -1.0), (0.02, 0.01, 0.0)):
+            for one, surface in (("wrench", pf.LimitSurfaceExact), ("ellipsoid", pf.LimitSurfaceEllipsoid)):
+                expected = np.divide(surface(patch).wrench(twist), [1.0, 1.0, 0.01])
+                found = page.evaluate(f"{one}(patch({name!r}), {list(twist)})")
+                np.testing.assert_allclose(np.divide(found, [1.0, 1.0, 0.01]), expected, atol=2e-3, err_msg=name)
+    page.locator("#load").fill("2")
+    page.locator("#shape").select_option("square")
+    shown = [float(each) for each in page.locator("#numbers tr").nth(1).inner_text().split("\t")[1:]]
+    assert shown == pytest.approx(np.multiply(page.evaluate("wrench(shown, [0.01, 0, 2])"), [2.0, 2.0, 2e3]), abs=1e-3)
+    time, speed, spin = page.evaluate("rest(shown, [0.01, 0, 2], 1)").pop()
+    assert max(speed, spin) < 0.02 * 0.02 and 1.0 < 9.81 * time / 0.01 < 3.0  # later than v/(mu g), as it spins
+    page.close()
+    assert errors == [] and len(asked) == 1
 
 
 def test_two_visitors_do_not_change_each_other(visitor, browser, address):

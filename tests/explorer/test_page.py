@@ -84,6 +84,25 @@ def test_a_law_has_its_fields_and_a_value_that_breaks_a_rule_is_one_line(page):
     assert page.state.law.mu_c == 0.4 and not page.message.visible
 
 
+def test_a_refused_value_is_told_at_its_field_beside_pale_results(page):
+    page.layout()
+    static, mass = page.controls.parameters[1], page.controls.mass
+    static.value = 0.5
+    assert "mu_s must be >= mu_c, got mu_s=0.5, mu_c=1.0" in static.stylesheets[0] and "Pale" in page.message.object
+    assert len(page.cards) == 3 and all(each.css_classes == ["stale"] for each in page.cards)
+    page.controls.parameters[0].value = 2.0  # refused too, and now the culprit
+    assert static.stylesheets == [] and "mu_c=2.0" in page.controls.parameters[0].stylesheets[0]
+    page._try(lambda: page._follow_to(0.003, -0.004))
+    assert [each.value for each in page.controls.parameters[:2]] == [1.0, 1.2]  # those of the results
+    assert page.controls.parameters[0].stylesheets == [] and not any(each.css_classes for each in page.cards)
+    mass.value = -1.0
+    assert "mass must be > 0" in mass.stylesheets[0]
+    page.controls.clear.clicks += 1
+    page.controls.cell_size.value = 2.0  # right, while nothing presses
+    assert mass.stylesheets == page.controls.cell_size.stylesheets == []
+    assert "Nothing presses" in page.message.object and page.controls.mass.value == 50.0
+
+
 def test_a_law_that_is_chosen_again_has_its_values(page):
     first = page.state.law
     page.controls.law.value = "dahl"
@@ -109,7 +128,7 @@ def test_the_page_says_whether_a_part_is_held_with_its_mass_and_friction(page):
 
 
 def test_each_control_says_what_it_is_in_the_unit_of_its_label(page):
-    rows = page.controls.layout().select(pn.Row)
+    rows = page.layout().select(pn.Row)
     icons = {row[0]: row[1].value for row in rows if isinstance(row[1], pn.widgets.TooltipIcon)}
     found = [each for name, each in vars(page.controls).items() if isinstance(each, pn.widgets.base.Widget)]
     for kind in LAWS:

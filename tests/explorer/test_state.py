@@ -215,6 +215,8 @@ def test_moving_the_twist_leaves_the_drawn_surface_as_it_is():
     figure = pictures.surface_figure(state)
     moved = pictures.moved(figure, answer(state))
     assert all(one is other for one, other in zip(figure["data"][:2], moved["data"][:2], strict=True))
+    named = [each["name"] for each in moved["data"] if each.get("showlegend", each["type"] != "surface")]
+    assert named[:2] == ["limit surface", "ellipsoid"] and len(named) == 5  # plotly leaves surfaces out by itself
     for trace, point in zip(moved["data"][2:], answer(state).points, strict=True):
         assert [trace[axis][1] for axis in "xyz"] == pytest.approx(point.tolist())
 
