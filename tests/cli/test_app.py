@@ -241,6 +241,13 @@ def check_columns(columns, expected):
             assert np.array_equal(values, np.asarray(expected[last]).ravel()), name
 
 
+@pytest.mark.parametrize(
+    ("text", "name"), [("in-hand", "in-hand"), (" a/b: c. ", "a-b-c"), ("../é 2.5", "é-2.5"), ("-?-", "unnamed")]
+)
+def test_names_of_files_are_letters_digits_dots_and_hyphens(text, name):
+    assert output.slug(text) == name
+
+
 def test_columns_of_several_contacts_carry_their_names():
     columns = output.history_columns(synthetic.solution(synthetic.scene(contacts=2)))
     assert [name for name in columns if name.endswith("fx")] == ["pad-1.fx", "pad-2.fx"]

@@ -115,7 +115,9 @@ def test_a_term_must_gain_more_than_its_scatter():
 def test_spreads_intervals_and_words_have_their_numbers():
     t, values = 0.01 * np.arange(400), SERVO | {"sigma_0": 100.0, "sigma_1": 3.0}
     log = JointLog(t, np.sin(3.0 * t), dq=3.0 * np.cos(3.0 * (t - 0.02)), voltage=np.zeros(len(t)))
-    folds = [values | {"mu_c": each, "sigma_0": 5e3 * each, "sigma_1": 2.0 + 50.0 * each} for each in (0.01, 0.02, 0.03)]
+    folds = [
+        values | {"mu_c": each, "sigma_0": 5e3 * each, "sigma_1": 2.0 + 50.0 * each} for each in (0.01, 0.02, 0.03)
+    ]
     errors, less = np.array([1.0, 1.0, 1.0]), np.exp([0.2, 0.3, 0.4])
     kept = Trial(Problem((log,), PENDULUM, None, ()), values, tuple(folds), errors, errors)
     # jackknife: sqrt((n - 1)/n sum of squares); 4.30265 and 2.91999 are quantiles 0.975 and 0.95 of Student's t

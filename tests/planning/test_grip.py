@@ -12,6 +12,7 @@ import pytest
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from planarfriction.planning import holding_load, plan_grip
+from planarfriction.planning.grip import _bounds
 from planarfriction.planning.motions import Aim, Grips, load_on, slide_of
 from planarfriction.planning.report import report_of
 from tests.support.repository import script
@@ -171,6 +172,11 @@ def test_a_plan_draws_itself():
     assert grip.lines[0].get_ydata()[-1] == pytest.approx(report.grip)
     assert grip.lines[1].get_ydata()[0] == pytest.approx(report.holding)
     assert [each.get_text() for each in turn.get_legend().get_texts()][1:] == ["friction -5 %", "friction +5 %"]
+
+
+def test_grips_are_between_a_fiftieth_and_four_times_the_holding_load():
+    assert _bounds(None, 10.0) == pytest.approx((0.2, 40.0))
+    assert _bounds((1.0, 2.0), 10.0) == (1.0, 2.0)
 
 
 def test_a_report_is_in_degrees_and_millimetres():

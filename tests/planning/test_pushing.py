@@ -11,6 +11,7 @@ import planarfriction as pf
 from planarfriction.planning import Pusher, Slider, motion_cone, plan_push, push
 from planarfriction.planning.contact_modes import TouchPoint, motion_at
 from planarfriction.planning.push_plans import PushReport
+from planarfriction.planning.touch import CORNER, END, FACE, Scenery, Touch, flush_after
 
 HALF = 0.045
 SQUARE = np.array([[-HALF, -HALF], [HALF, -HALF], [HALF, HALF], [-HALF, HALF]])
@@ -208,6 +209,18 @@ def test_a_report_of_a_push_is_in_millimetres_and_degrees():
     said = " ".join(str(PushReport(pose, pose, (0.0, 0.003, -0.1), 2, (0.0, 0.0), 0.1234, 0.75, True, 1.0)).split())
     assert "goal 100.00 -20.00 28.65 reached 100.00 -20.00 28.65 with an ellipsoid 0.00 3.00 -5.73" in said
     assert said.endswith("123.4 mm long, on edge 2, using 75% of the friction cone.")
+
+
+@pytest.mark.parametrize(
+    ("width", "left", "right"), [(0.04, Touch(END, 3, 1), Touch(END, 3, 0)), (0.2, Touch(CORNER, 3), Touch(CORNER, 0))]
+)
+def test_a_face_turns_about_its_end_or_about_the_corner_within(width, left, right):
+    path = np.array([[-HALF, 0.0, 0.0], [0.0, 0.0, 0.0]])  # flush with edge 3, which leads from corner 3 down to 0
+    scenery = Scenery(slider(), Pusher(MU, width=width), np.array([0.0, 1.0]), path)
+    assert flush_after(scenery, Touch(FACE, 3), 0.0, np.zeros(3), 1) == left
+    assert flush_after(scenery, Touch(FACE, 3), 0.0, np.zeros(3), -1) == right
+    low, high = scenery.overlap(3, 0.0, np.zeros(3))
+    assert (low, high) == pytest.approx((max(HALF - 0.5 * width, 0.0), min(HALF + 0.5 * width, 2.0 * HALF)))
 
 
 # ---------------------------------------------------------------------- what is refused
