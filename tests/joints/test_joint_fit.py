@@ -54,6 +54,15 @@ def test_six_parameters_come_back_from_a_noisy_torque():
         {n: getattr(LUGRE, n) for n in names}, rel=0.01
     )
     assert fit.unit == "N m" and fit.error < 0.01
+    (log,), friction = fit.trial.problem.logs, fit.friction
+    upper, lower, side = (axes.get_lines() for axes in fit.plot().axes)
+    np.testing.assert_allclose(upper[0].get_ydata(), log.torque)
+    np.testing.assert_allclose(upper[2].get_ydata(), fit.torque(log))
+    np.testing.assert_allclose(lower[1].get_ydata(), fit.torque(log) - log.torque)
+    speed, level = side[0].get_xydata().T
+    fall = (friction.mu_s - friction.mu_c) * np.exp(-((speed / friction.v_s) ** 2))
+    np.testing.assert_allclose(level, friction.mu_c + fall + friction.sigma_2 * speed)
+    assert speed[-1] == pytest.approx(np.abs(log.speed).max())
 
 
 @pytest.mark.parametrize("load", [0.0, 0.2])
