@@ -15,7 +15,7 @@ from planarfriction_studies.experiments import EXPERIMENTS
 from planarfriction_studies.experiments.beyond import cells, contacts, ladder
 from planarfriction_studies.experiments.beyond import run as beyond
 from planarfriction_studies.experiments.beyond import surfaces as beyond_surfaces
-from planarfriction_studies.experiments.beyond.tables import FAMILIES
+from planarfriction_studies.experiments.beyond.tables import FAMILIES, draw_ladder
 from planarfriction_studies.experiments.experiment import Work
 from planarfriction_studies.experiments.in_hand.runs import Case
 from planarfriction_studies.experiments.runs import IN_WORDS
@@ -213,6 +213,28 @@ def test_tables_of_the_pages_are_those_of_the_report(result):
         shown += page.count("<!-- table: ")
     assert shown >= 4
     assert markdown({"headings": ("a", "b"), "rows": [("x", 0.123)]}) == "| a | b |\n| --- | --- |\n| x | 0.12 |\n"
+
+
+def test_the_ladder_tells_cells_medians_and_errors():
+    """Columns of a disc of 317 cells and two pads of 100; two errors of 1 and 3 mm at a tenth of the time."""
+    rows = []
+    for shape, count, few in (("disc", 317, "64 discs"), ("two pads", 100, "8 discs")):
+        for load, off in (("load 2", 1e-3), ("load 2", 3e-3), ("load 1", 1e-3)):
+            rows.append(ladder.Row(f"{shape}, {load}", "full", 2 * count, {"end": 0.0}, 1.0))
+            rows.append(ladder.Row(f"{shape}, {load}", few, 16, {"end": off}, 0.1))
+    axes = draw_ladder(rows).axes
+    assert [each.get_xlabel().split("\n")[1] for each in axes[4:]] == ["patches of 317 cells", "patches of 100 cells"]
+    for each in axes[2:4]:
+        reference, medians = sorted(each.get_lines(), key=lambda line: -line.get_xdata()[0])
+        assert reference.get_xdata()[0] == 1.0
+        assert medians.get_xydata()[0] == pytest.approx([0.1, 2.0])
+        assert each.collections[-1].get_segments()[0][:, 1] == pytest.approx([1.0, 3.0])
+
+
+def test_the_cases_of_a_shape_are_its_own():
+    each = [ladder.cases_of(shape) for shape in beyond.SHAPES]
+    assert [{case.shape for case in cases} for cases in each] == [{shape} for shape in beyond.SHAPES]
+    assert sum(map(len, each)) == len(ladder.CASES)
 
 
 def test_the_ladder_draws_every_family_that_was_run(result):

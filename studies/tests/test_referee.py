@@ -17,11 +17,11 @@ import pytest
 
 from planarfriction.cli import main
 from planarfriction.errors import FileError
-from planarfriction_studies.referee import engines, truths
+from planarfriction_studies.referee import engines, report, truths
 from planarfriction_studies.referee.case import FOLDER, all_cases, read_case
 from planarfriction_studies.referee.export import export_case, sdf
 from planarfriction_studies.referee.pictures import film, scene
-from planarfriction_studies.referee.run import Apart, Kept, judge, no_result, run
+from planarfriction_studies.referee.run import Apart, Kept, Verdict, judge, no_result, run
 
 CASES = all_cases()
 TRUTHS = {
@@ -317,6 +317,25 @@ def test_a_crash_is_one_failure():
         ("fails", "the engine ended the process"),
         ("ok", ""),
     ]
+
+
+def test_numbers_of_a_table_have_their_units():
+    error, allowed, dt, cost, start = 2.5e-5, 1e-4, 2e-3, 3e-5, 0.24
+    good = Verdict("stop", "A", "ok", error, allowed, "m", "x of box", dt, cost, start)
+    bad = replace(good, case="disc", mark="fails", error=1.5e-3, cost=5e-5, start=0.5)
+    headings, rows = report.table([good, bad])
+    assert headings == ["case", "A"]
+    assert rows == [
+        ["stop", "ok 0.25"],
+        ["disc", "fails 15"],
+        ["ok", "1 of 2"],
+        ["median step [µs]", "40"],
+        ["median start [s]", "0.4"],
+    ]
+    assert [report.shown(each) for each in (good, bad)] == ["25 µm", "1.5 mm"]
+    assert report._numbers(good) == ["2.5e-05 m", "0.0001 m", "x of box", "2 ms", "30", "0.24"]
+    dots = [line.get_xdata()[0] for line in report.picture("stop", [good, bad]).axes[0].get_lines()]
+    assert dots == pytest.approx([0.25, 1.0])  # over what is allowed; the line
 
 
 def test_the_worst_time_step_counts():

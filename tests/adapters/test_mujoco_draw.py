@@ -20,10 +20,10 @@ FRAME = np.array([1.0, 2.0, 3.0]), np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [
 pytestmark = pytest.mark.mujoco
 
 
-def _drawn(patch, wrench, twist, newton=0.1):
+def _drawn(patch, wrench, twist, newton=0.1, scale=1.0):
     """Positions of what is drawn, by colour; of the arrow, its tip (from its tail on) last."""
     scene = mujoco.MjvScene(mujoco.MjModel.from_xml_string("<mujoco/>"), maxgeom=200)
-    draw_patch(scene, patch, FRAME, np.array(wrench), np.array(twist), newton)
+    draw_patch(scene, patch, FRAME, np.array(wrench), np.array(twist), newton, scale)
     found = {OUTLINE: [], FRICTION: [], CENTRE: []}
     for geom in scene.geoms[: scene.ngeom]:
         found[next(colour for colour in found if np.allclose(geom.rgba, colour))].append(geom.pos.copy())
@@ -41,6 +41,13 @@ def test_outline_arrow_and_centre_of_rotation_are_where_they_belong():
     assert arrow[1] == pytest.approx([0.0, 0.0, -0.2], abs=1e-6)  # -2 N along the frame's y, the world's z
     # (-vy, vx)/omega = (-5 mm, 0) along the world's y
     assert centre[0][1:] == pytest.approx([2.0 - 0.005, 3.0], abs=1e-12)
+
+
+def test_a_patch_is_drawn_larger_but_not_its_arrow_and_centre():
+    rim, arrow, centre = _drawn(pf.ContactPatch.disc(radius=0.02), (3.0, 0.0, 0.0), (0.01, 0.0, 2.0), 0.1, scale=2.5)
+    assert np.linalg.norm(rim - FRAME[0], axis=1) == pytest.approx(0.05, rel=0.02)
+    assert arrow[1] == pytest.approx([0.0, 0.3, 0.0], abs=1e-6)
+    assert centre[0][1:] == pytest.approx([2.0, 3.005], abs=1e-12)  # vx/omega = 5 mm along the frame's y
 
 
 @pytest.mark.parametrize("twist", [(0.0, 0.0, 0.0), (1e-9, 0.0, 1e-7), (0.1, 0.0, 0.1)])

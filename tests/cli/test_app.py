@@ -241,9 +241,21 @@ def check_columns(columns, expected):
             assert np.array_equal(values, np.asarray(expected[last]).ravel()), name
 
 
+@pytest.mark.parametrize(
+    ("text", "name"), [("in-hand", "in-hand"), (" a/b: c. ", "a-b-c"), ("../é 2.5", "é-2.5"), ("-?-", "unnamed")]
+)
+def test_names_of_files_are_letters_digits_dots_and_hyphens(text, name):
+    assert output.slug(text) == name
+
+
 def test_columns_of_several_contacts_carry_their_names():
-    columns = output.history_columns(synthetic.solution(synthetic.scene(contacts=2)))
+    run = synthetic.solution(synthetic.scene(contacts=2))
+    columns = output.history_columns(run)
     assert [name for name in columns if name.endswith("fx")] == ["pad-1.fx", "pad-2.fx"]
+    for name in ("fx", "fy", "tau", "normal_force"):
+        assert columns[f"pad-2.{name}"] == pytest.approx(run.data[name].values[:, 1], rel=1e-15)
+        assert columns[f"pad-2.{name}"] == pytest.approx(2.0 * columns[f"pad-1.{name}"])
+    assert columns["pad-2.vy"][-1] == pytest.approx(run.contact_twist("pad 2")[-1, 1])
 
 
 def test_run_draws(simulated, tmp_path, monkeypatch):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import pytest
 from numba.core import config
@@ -79,10 +80,19 @@ def test_damaged_machine_code_is_counted(tmp_path, monkeypatch):
     (folder,) = machine_code.folders(SOURCES)
     assert doctor.machine_code() == [(f"machine code in {folder}", "none")]
     folder.mkdir()
-    sound = machine_code._seal(b"origin", b"content") + b"content"
+    content = bytes(150_000)
+    sound = machine_code._seal(b"origin", content) + content
     (folder / "a.machine").write_bytes(sound)
     (folder / "b.machine").write_bytes(sound[:-1])
-    assert doctor.machine_code() == [(f"machine code in {folder}", "2 functions, 0.0 MB, 1 damaged")]
+    assert doctor.machine_code() == [(f"machine code in {folder}", "2 functions, 0.3 MB, 1 damaged")]
+
+
+def test_the_time_of_a_step_is_the_median_in_microseconds(monkeypatch):
+    model = SimpleNamespace(step=None, rest=lambda: None)
+    monkeypatch.setattr(doctor, "_model", lambda name: model)
+    monkeypatch.setattr(doctor, "partial", lambda *call: call)
+    monkeypatch.setattr(doctor.timeit, "repeat", lambda call, number, repeat: [9e-6 * number, 4e-6 * number, 0.0])
+    assert doctor.step_times()[0] == ("step, reduced", "4.00 us")
 
 
 def test_bug_reports_ask_for_the_output():

@@ -11,6 +11,7 @@ import pytest
 from planarfriction.cli import console, main
 from planarfriction.cli.output import write_csv
 from planarfriction.identify.logs import columns_of
+from planarfriction.validation import number_in
 from tests.support.identification_logs import clean_log, excitation, noisy
 
 FAST = ["--parameters", "mu_c,contact_radius", "--starts", "1"]
@@ -91,3 +92,10 @@ def test_a_bad_line_is_named(path, tmp_path, capsys):
     assert main(["identify", str(bad)]) == 2
     message = capsys.readouterr().err
     assert "line 8, column 'vx'" in message and message.count("\n") == 1
+
+
+@pytest.mark.parametrize("text", ["nan", "inf", "-1e999", "1,0", ""])
+def test_numbers_on_the_command_line_are_finite(text, path, capsys):
+    assert main(["identify", str(path), f"--start=mu_c={text}"]) == 2
+    assert "error: --start mu_c must be " in capsys.readouterr().err
+    assert number_in("--start", " 1e-3") == 1e-3

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from planarfriction.cli.app import app
 from planarfriction.cli.output import write_csv
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import Log, candidate_motions, current_estimate, design_experiment
-from planarfriction.identify.experiments import _Information
+from planarfriction.identify.experiments import MotionPlan, _Information
 from planarfriction.identify.logs import columns_of
 from planarfriction.identify.parameters import Coordinates
 from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, fitted, noisy
@@ -236,3 +237,13 @@ def test_a_plan_knows_beforehand_what_a_fit_does():
     coordinates = Coordinates(names, information.values, LAW.mu_c)
     assert np.diag(information.prior()) == pytest.approx([1.0 / 9.0, 1.0, 1.0, 1.0 / 9.0])
     np.testing.assert_allclose(information.prior(), coordinates.prior(coordinates.of(information.values))[1] ** 2)
+
+
+def test_a_plan_says_errors_as_shares_and_names_the_least_certain():
+    motions = tuple(SimpleNamespace(name=f"slide {number}") for number in (1, 2))
+    before, after = np.array([0.3, 2e-3, 40.0]), np.array([[0.05, 1e-3, 20.0], [0.01, 5e-4, 60.0]])
+    names, values = ("mu_c", "centre_x", "sigma_1"), np.array([0.5, 0.0, -400.0])
+    said = " ".join(MotionPlan(names, values, motions, np.array([3.26, 1.0]), before, after).table().split())
+    assert "Next motion to measure: slide 1." in said
+    assert "slide 1 3.3 mu_c, 10 % slide 2 1.0 sigma_1, 15 %" in said
+    assert "mu_c 0.5 unknown 10 % -" in said and "centre_x 0 0.002 0.001 m" in said  # beyond a half; no share of zero

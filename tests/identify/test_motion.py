@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import MassProperties, Slide, fit_start, identify_motion, predict_slide
 from planarfriction.identify.checks import check_slides
+from planarfriction.identify.motion import SlideProblem
 from planarfriction.identify.slides import slide_poses
 
 BODY = MassProperties(0.37, 8.1e-4)
@@ -203,3 +206,14 @@ def test_times_that_stand_still_are_shown_with_all_digits():
     time[7] = time[6]
     with pytest.raises(InvalidValueError, match=r"time of slide must increase, got 1700000000\.04 after .* sample 8"):
         Slide(time, slides(1)[0].pose)
+
+
+def test_noise_of_slides_counts_what_is_fitted():
+    """Two slides of 10 samples, one parameter and a start of six numbers for each: 13 of 60 numbers are fitted."""
+    off = [np.tile([3e-3, 1e-3, 2e-2], (10, 1)), np.tile([-1e-3, 1e-3, 4e-2], (10, 1))]
+    slides = [SimpleNamespace(pose=each, time=range(10)) for each in off]
+    problem = SimpleNamespace(slides=slides, robust=False, names=("mu_c",), poses=lambda values: [0.0, 0.0])
+    problem.even_sigma = lambda noise: noise
+    noise, _ = SlideProblem.estimate_noise(problem, np.ones(1), np.ones((2, 3)))
+    across, turn = np.sqrt(3e-6 * 60 / 47), np.sqrt(1e-3 * 60 / 47)  # of x and y (5e-6 + 1e-6)/2
+    np.testing.assert_allclose(noise, [[across, across, turn]] * 2, rtol=1e-12)

@@ -114,6 +114,15 @@ def test_the_figure_of_one_coordinate_shows_loops(found):
     labels = [axes.get_xlabel() for axes in figure.axes]
     assert labels[-2:] == ["velocity [m/s]", "displacement since reversal [mm]"]
     assert len(figure.axes) == 7
+    over_speed, over_way = (axes.get_lines()[0] for axes in figure.axes[-2:])
+    (history,), longest = found.histories, 5e3 * found.law.mu_s / found.law.sigma_0  # [mm]
+    assert over_speed.get_xdata() == pytest.approx(history["twist"][:, 0])
+    assert over_speed.get_ydata() == pytest.approx(history["measured"][:, 0])
+    way = over_way.get_xdata()
+    assert 0.5 * longest < np.nanmax(np.abs(way)) <= longest * (1.0 + 1e-9)
+    steps, speed, time = np.diff(way), history["twist"][:, 0], history["time"]
+    whole = np.isfinite(steps) & (speed[1:] * speed[:-1] > 0.0) & (np.arange(len(steps)) > 2)
+    assert np.median(steps[whole] / (500.0 * (speed[1:] + speed[:-1]) * np.diff(time))[whole]) == pytest.approx(1.0)
 
 
 def test_the_loss_is_that_of_scipy():

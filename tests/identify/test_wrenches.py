@@ -238,6 +238,22 @@ def test_json_and_plot(log, tmp_path):
     figure.savefig(tmp_path / "residuals.png")
     assert (tmp_path / "residuals.png").read_bytes().startswith(b"\x89PNG")
     assert len(figure.axes) == 11  # three channels three times, speeds, correlations
+    (history,), lines = found.histories, [axes.get_lines() for axes in figure.axes]
+    measured, fitted = history["measured"][:, 1], history["predicted"][:, 1]
+    assert lines[2][0].get_ydata() == pytest.approx(measured, rel=1e-12)  # fy in N
+    assert lines[2][1].get_ydata() == pytest.approx(fitted, rel=1e-12)
+    assert lines[3][0].get_ydata() == pytest.approx((measured - fitted) / found.noise[1], abs=1e-9)
+    speed, steady = lines[6][1].get_xydata().T
+    law = found.law
+    level = law.mu_c + (law.mu_s - law.mu_c) * np.exp(-((1e-3 * speed / law.v_s) ** law.gamma))
+    assert steady == pytest.approx(level + 1e-3 * law.sigma_2 * speed, rel=1e-9)
+    assert speed[-1] == pytest.approx(1e3 * history["speed"].max())
+    assert lines[6][0].get_xdata().max() == pytest.approx(1e3 * history["speed"].max())
+    assert lines[7][0].get_xdata()[1] == pytest.approx(1e3 * (log.time[1] - log.time[0]))
+    assert lines[7][0].get_ydata()[:2] == pytest.approx(found.residual_correlations()[:2, 0])
+    seen = np.isfinite(history["held_out"][:, 1])
+    expected = np.stack([measured, history["held_out"][:, 1]], -1)[seen]
+    assert lines[9][0].get_xydata() == pytest.approx(expected, rel=1e-12)
 
 
 def write(path, log, **changes):

@@ -11,7 +11,7 @@ from planarfriction.joints.fit import improves
 from planarfriction.joints.loops.runs import run_measured
 from planarfriction.joints.problem import Problem
 from planarfriction.joints.result import Trial
-from planarfriction.joints.verdicts import speed_lag, standing
+from planarfriction.joints.verdicts import judge, speed_lag, standing
 
 LUGRE = JointFriction(0.8, 0.3, 0.0, 0.0, 1.2, 0.05, 400.0, 2.0)
 SERVO = {"inertia": 2e-3, "offset": 0.01, "torque_gain": 0.1, "back_emf": 0.03, "mu_c": 0.02, "sigma_2": 0.005}
@@ -54,6 +54,15 @@ def test_six_parameters_come_back_from_a_noisy_torque():
         {n: getattr(LUGRE, n) for n in names}, rel=0.01
     )
     assert fit.unit == "N m" and fit.error < 0.01
+    (log,), friction = fit.trial.problem.logs, fit.friction
+    upper, lower, side = (axes.get_lines() for axes in fit.plot().axes)
+    np.testing.assert_allclose(upper[0].get_ydata(), log.torque)
+    np.testing.assert_allclose(upper[2].get_ydata(), fit.torque(log))
+    np.testing.assert_allclose(lower[1].get_ydata(), fit.torque(log) - log.torque)
+    speed, level = side[0].get_xydata().T
+    fall = (friction.mu_s - friction.mu_c) * np.exp(-((speed / friction.v_s) ** 2))
+    np.testing.assert_allclose(level, friction.mu_c + fall + friction.sigma_2 * speed)
+    assert speed[-1] == pytest.approx(np.abs(log.speed).max())
 
 
 @pytest.mark.parametrize("load", [0.0, 0.2])
@@ -110,6 +119,27 @@ def test_a_term_must_gain_more_than_its_scatter():
     assert improves(trial([0.8, 1.7, 0.8, 2.4]), base)
     assert not improves(trial([0.5, 2.4, 0.6, 3.3]), base)  # two better, two worse
     assert not improves(trial([0.9, 1.8, 0.9, 2.7]), base)  # evenly, but as little as a wrong term may
+
+
+def test_spreads_intervals_and_words_have_their_numbers():
+    t, values = 0.01 * np.arange(400), SERVO | {"sigma_0": 100.0, "sigma_1": 3.0}
+    log = JointLog(t, np.sin(3.0 * t), dq=3.0 * np.cos(3.0 * (t - 0.02)), voltage=np.zeros(len(t)))
+    folds = [
+        values | {"mu_c": each, "sigma_0": 5e3 * each, "sigma_1": 2.0 + 50.0 * each} for each in (0.01, 0.02, 0.03)
+    ]
+    errors, less = np.array([1.0, 1.0, 1.0]), np.exp([0.2, 0.3, 0.4])
+    kept = Trial(Problem((log,), PENDULUM, None, ()), values, tuple(folds), errors, errors)
+    # jackknife: sqrt((n - 1)/n sum of squares); 4.30265 and 2.91999 are quantiles 0.975 and 0.95 of Student's t
+    assert kept.spread["mu_c"] == pytest.approx(0.02 / np.sqrt(3.0), rel=1e-12)
+    far = 4.30265 * 0.02 / np.sqrt(3.0)
+    assert kept.interval("mu_c") == pytest.approx((1e-9, 0.02 + far), rel=1e-5)  # not below the least value
+    assert kept.interval("sigma_0") == pytest.approx(100.0 * np.exp([-50.0 * far, 50.0 * far]), rel=1e-4)
+    assert kept.gain(Trial(None, {}, (), less, less)) == pytest.approx((0.3, 2.91999 * 0.1 / np.sqrt(3.0)), rel=1e-5)
+    said = "\n".join(map(str, judge(kept, {})))
+    assert "kt/R = 0.1 N m/V; with the drive off: kt = 0.3 N m/A, R = 3 Ohm" in said  # 0.03/0.1 and 0.03/0.1^2
+    assert "all torques grow by 1.2 % for each 10 g" in said  # half of 10 g over 400 g
+    assert "lags by 20 ms (20 to 20)" in said
+    assert "spread 58 of 1e+02" in said and "sigma_1" not in said  # 0.58 is more than half of sigma_0, less than of 3
 
 
 def test_steps_are_told_and_may_end_a_fit():

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 import planarfriction as pf
 from planarfriction.errors import FrictionError, InvalidValueError
+from planarfriction.patch import shared
 
 LIGHT = np.array([[0.0, 2.0, 0.0], [0.0, 4.0, 2.0]])
 HEAVY = np.array([[30.0, 10.0, 0.0], [0.0, 20.0, 40.0]])
@@ -124,3 +125,11 @@ def test_broken_maps(maps, loads, message):
 def test_maps_for_other_cells_are_refused():
     with pytest.raises(InvalidValueError, match=r"pressure must have shape \[L, 9\]"):
         pf.ContactPatch.rectangle(0.01, cells=3, pressure=pf.PressureMaps([1.0, 2.0], [[1, 2], [3, 4]]))
+
+
+def test_weights_over_all_loads_count_as_the_radius_of_gyration(monkeypatch):
+    patch = both()
+    monkeypatch.setattr(shared, "loads_of_change", lambda patch: np.array(LOADS))
+    sizes = np.sqrt([patch.second_moment(load) for load in LOADS])
+    expected = (sizes[0] * patch.weights(LOADS[0]) + sizes[1] * patch.weights(LOADS[1])) / sizes.sum()
+    np.testing.assert_allclose(shared.mean_weights(patch), expected, rtol=1e-12)

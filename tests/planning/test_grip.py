@@ -12,7 +12,9 @@ import pytest
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from planarfriction.planning import holding_load, plan_grip
+from planarfriction.planning.grip import _bounds
 from planarfriction.planning.motions import Aim, Grips, load_on, slide_of
+from planarfriction.planning.report import report_of
 from tests.support.repository import script
 
 LAW = pf.LuGre(mu_c=1.0, mu_s=1.2, elasto_plastic=0.9)
@@ -161,6 +163,36 @@ def test_a_plan_draws_itself():
     figure = turning().plot()
     assert [axes.get_ylabel() for axes in figure.axes] == ["grip [N]", "turn [deg]", "slide [mm]"]
     assert len(figure.axes[1].lines) == 4  # three frictions and the goal
+    report, (grip, turn, slide) = turning().report, figure.axes
+    assert turn.lines[3].get_ydata()[0] == pytest.approx(-30.0)
+    for number, factor in enumerate((1.0, 0.95, 1.05)):
+        k = report.frictions.tolist().index(factor)
+        assert turn.lines[number].get_ydata()[-1] == pytest.approx(math.degrees(report.angles[k]), abs=1e-3)
+        assert slide.lines[number].get_ydata()[-1] == pytest.approx(1e3 * np.hypot(*report.slides[k]), abs=1e-3)
+    assert grip.lines[0].get_ydata()[-1] == pytest.approx(report.grip)
+    assert grip.lines[1].get_ydata()[0] == pytest.approx(report.holding)
+    assert [each.get_text() for each in turn.get_legend().get_texts()][1:] == ["friction -5 %", "friction +5 %"]
+
+
+def test_grips_are_between_a_fiftieth_and_four_times_the_holding_load():
+    assert _bounds(None, 10.0) == pytest.approx((0.2, 40.0))
+    assert _bounds((1.0, 2.0), 10.0) == (1.0, 2.0)
+
+
+def test_a_report_is_in_degrees_and_millimetres():
+    frictions, ends = [0.99, 1.0, 1.01], np.zeros((3, 6))
+    ends[:, 3:] = [[4e-3, 3e-3, 0.30], [2e-3, 1e-3, 0.20], [1e-3, 0.0, 0.14]]
+    ends[1, :3] = 3e-3, 0.0, 0.4
+    turned = report_of(Aim(0.2, np.zeros(2), 0.01), frictions, ends, 6.0, 4.0, (1, 2, 3.0))
+    assert turned.per_percent == pytest.approx(0.08)  # (0.30 - 0.14)/2
+    assert turned.speed == pytest.approx(5e-3)  # 3 mm/s, and 0.4 rad/s at 10 mm
+    assert turned.spread == pytest.approx(0.1)
+    said = " ".join(str(turned).split())
+    assert "turn by 11.46 degrees" in said and "-1 % 17.189 4.000 3.000 nominal 11.459 2.000 1.000 +1 % 8.021" in said
+    assert "changes the result by 4.6 degrees" in said and "6 N, 1.50 times the holding force" in said
+    slid = report_of(Aim(None, np.array([0.0, 1e-3]), 0.01), frictions, ends, 6.0, 4.0, (1, 2, 3.0))
+    assert slid.per_percent == pytest.approx(1.5e-3) and slid.spread == pytest.approx(np.sqrt(20.0) * 1e-3)
+    assert "slide by (0, 1) mm" in str(slid) and "changes the result by 1.5 mm" in str(slid)
 
 
 @pytest.mark.parametrize("patch", [PATCH, SOFT])

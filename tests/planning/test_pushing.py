@@ -10,6 +10,8 @@ import pytest
 import planarfriction as pf
 from planarfriction.planning import Pusher, Slider, motion_cone, plan_push, push
 from planarfriction.planning.contact_modes import TouchPoint, motion_at
+from planarfriction.planning.push_plans import PushReport
+from planarfriction.planning.touch import CORNER, END, FACE, Scenery, Touch, flush_after
 
 HALF = 0.045
 SQUARE = np.array([[-HALF, -HALF], [HALF, -HALF], [HALF, HALF], [-HALF, HALF]])
@@ -190,8 +192,35 @@ def test_a_plan_leads_to_its_pose(kind):
 
 def test_a_push_is_drawn():
     found = push(slider(), Pusher(MU), straight((-0.06, 0.01), (0.0, 0.03)))
-    assert len(found.plot().axes[0].lines) == 9
-    assert "stick" in repr(found)
+    axes = found.plot().axes[0]
+    assert len(axes.lines) == 9
+    (x, y, turn), (c, s) = found.end, (np.cos(found.end[2]), np.sin(found.end[2]))
+    closed = [*SQUARE, SQUARE[0]] @ np.array([[c, s], [-s, c]]) + [x, y]
+    np.testing.assert_allclose(axes.lines[7].get_xydata(), 1e3 * closed, atol=1e-9)
+    np.testing.assert_allclose(axes.lines[8].get_xydata(), 1e3 * found.pose[:, :2], atol=1e-9)
+    dots = {each.get_label(): each.get_offsets() for each in axes.collections}
+    np.testing.assert_allclose(dots["pusher: stick"], 1e3 * found.pusher_pose[found.mode == "stick", :2], atol=1e-9)
+    start = f"Push to ({1e3 * x:.4g} mm, {1e3 * y:.4g} mm, {np.degrees(turn):.4g} deg): "
+    assert repr(found).startswith(start) and f"stick {100 * np.mean(found.mode == 'stick'):.0f}%" in repr(found)
+
+
+def test_a_report_of_a_push_is_in_millimetres_and_degrees():
+    pose = (0.1, -0.02, 0.5)
+    said = " ".join(str(PushReport(pose, pose, (0.0, 0.003, -0.1), 2, (0.0, 0.0), 0.1234, 0.75, True, 1.0)).split())
+    assert "goal 100.00 -20.00 28.65 reached 100.00 -20.00 28.65 with an ellipsoid 0.00 3.00 -5.73" in said
+    assert said.endswith("123.4 mm long, on edge 2, using 75% of the friction cone.")
+
+
+@pytest.mark.parametrize(
+    ("width", "left", "right"), [(0.04, Touch(END, 3, 1), Touch(END, 3, 0)), (0.2, Touch(CORNER, 3), Touch(CORNER, 0))]
+)
+def test_a_face_turns_about_its_end_or_about_the_corner_within(width, left, right):
+    path = np.array([[-HALF, 0.0, 0.0], [0.0, 0.0, 0.0]])  # flush with edge 3, which leads from corner 3 down to 0
+    scenery = Scenery(slider(), Pusher(MU, width=width), np.array([0.0, 1.0]), path)
+    assert flush_after(scenery, Touch(FACE, 3), 0.0, np.zeros(3), 1) == left
+    assert flush_after(scenery, Touch(FACE, 3), 0.0, np.zeros(3), -1) == right
+    low, high = scenery.overlap(3, 0.0, np.zeros(3))
+    assert (low, high) == pytest.approx((max(HALF - 0.5 * width, 0.0), min(HALF + 0.5 * width, 2.0 * HALF)))
 
 
 # ---------------------------------------------------------------------- what is refused

@@ -14,6 +14,7 @@ from planarfriction.errors import FileError
 from planarfriction.scenes import Statistics, in_hand
 from planarfriction.scenes.solution import History, write_dataset
 from planarfriction.writing import check_writable
+from tests.support import synthetic
 
 UNITS = {"fx": "N", "fy": "N", "tau": "N m", "normal_force": "N"}
 
@@ -250,3 +251,8 @@ def test_recorded_states_have_the_units_of_their_model(make, units):
     data = pf.simulate(pf.scenes.free_slide(model, t_end=0.01), bristles="all").data
     (name,) = [each for each in data if each.startswith("bristles")]
     assert data[name].attrs["units"] == units
+
+
+def test_a_solution_says_its_end_and_its_cost():
+    said = "Solution('in-hand', success: 201 samples to t=2 s, x=0.002, y=-0.02, theta=-1.2, 1234 steps in 250 ms)"
+    assert repr(synthetic.solution()) == said
