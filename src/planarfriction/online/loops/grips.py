@@ -64,8 +64,8 @@ STUCK = 1.0
 """Rate at which it falls if a part that is to slip has stuck [1/s]."""
 
 BRAKE, BRAKES = 1.3, 0.06
-"""Grip of a part that has stuck, of the one that balances it, and how long it is that [s]: if its slip sensor is dead, it
-stops."""
+"""Grip of a part that has stuck, over the one that balances it, and for how long [s]: it stops if its slip sensor is
+dead."""
 
 SURE = 0.17
 """Time without slip after which the wrench of such a part no longer changes if it has stuck [s]."""
