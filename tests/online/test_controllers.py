@@ -102,6 +102,24 @@ def test_a_dead_slip_sensor_drops_nothing(make, velocity):
     assert (gripper.normal_force > 1.5 * control.state["load"] / 0.52).all()  # by the least friction of the prior
 
 
+@pytest.mark.parametrize("kind, goal, centre", [(SlideBy, -0.02, (0.0, -0.01)), (TurnBy, -0.8, (0.025, 0.0))])
+def test_a_slip_sensor_that_dies_in_a_slip_drops_nothing(kind, goal, centre):
+    """It says 0 from a share of the way on, another of each part."""
+    gripper = Gripper(few(centre=(centre,) * COUNT, tap=(0.0, 0.0, 0.0), tilt=0.0), 20.0, seed=1)
+    control, dead = kind(FrictionObserver(known_model(), batch=COUNT), goal), np.zeros(COUNT, bool)
+    for sample in gripper.empty_hand():
+        control.observer.update(sample)
+    sample = gripper.measurement
+    for _ in range(3000):
+        dead |= gripper.slip[:, kind.axis] / goal > np.linspace(0.1, 0.8, COUNT)
+        sample.slip_velocity[dead] *= 0.0
+        sample = gripper.step(control.update(sample))
+    assert (dead & control.blind).all()
+    assert np.hypot(*gripper.slip[:, :2].T).max() < (0.025 if kind is SlideBy else 5e-3)
+    assert np.abs(gripper.slip[:, 2]).max() < 0.9
+    assert (gripper.normal_force > 1.5 * control.state["load"] / 0.52).all()
+
+
 @pytest.mark.parametrize("kind", [SlideBy, TurnBy, Hinge])
 def test_no_slip_sensor_no_slip_on_purpose(kind):
     own = FrictionObserver(known_model(), batch=COUNT, sensors=Sensors(slip_rate=0.0))

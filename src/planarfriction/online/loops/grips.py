@@ -20,7 +20,7 @@ STATE = np.dtype(
         *((name, float, 3) for name in ("slid", "velocity")),
         *((name, float) for name in ("found", "goal", "began", "balance", "caught", "eased", "force", "torque")),
         *((name, float) for name in ("blind", "weight", "lately", "pressed", "count")),
-        *((name, float) for name in ("broke", "dipped", "before")),
+        *((name, float) for name in ("broke", "dipped", "before", "borne", "stood", "quiet")),
         *((name, float, EARLY) for name in ("forces", "loads")),
     ]
 )
@@ -30,10 +30,11 @@ controllers: 1 once friction is found, goal, time since the slip began [s], the 
 caught, share of the grip that is left, and filtered force and torque; of all: time for which the part falls while the
 slip sensor does not say so [s], largest holding load before that, filtered holding load and grip force, and number,
 grips and holding loads of the first samples; of slips on purpose: holding load over grip at which the part breaks
-loose, time since a dip of the grip began [s], and displacement then."""
+loose, time since a dip of the grip began [s], and displacement then; of all: filtered size of the wrench, and the
+largest since the part stuck [N], and time since a slip velocity that was not 0 [s]."""
 
 _FAR = math.inf
-FRESH = (-_FAR, -_FAR, 0.0, _FAR, *[0.0] * 6, -_FAR, 0.0, 0.0, 1.0, *[0.0] * 8, _FAR, 0.0, _FAR, _FAR)
+FRESH = (-_FAR, -_FAR, 0.0, _FAR, *[0.0] * 6, -_FAR, 0.0, 0.0, 1.0, *[0.0] * 8, _FAR, *[0.0] * 4, _FAR, _FAR)
 """State before the first sample; what has not begun is infinitely far."""
 
 LOAD_TIME = 0.3
@@ -46,9 +47,9 @@ PAUSE = 0.1
 """Longest time between samples that grips and loads go on by, and between slip velocities while a part is let slip [s].
 """
 
-LOST, LATE = 0.08, 0.02
-"""Share of its load that a part loses while the grip is lowered only if it falls [-], and the time of its filter, after
-which a slip sensor that works has said so [s]."""
+LOST, LOSES, LATE = 0.08, 0.05, 0.02
+"""Shares of the wrench that a part loses only if it slips [-]: while the grip is first lowered, and once it has stuck
+in a slip on purpose; and the time of its filter, after which a slip sensor that works has said so [s]."""
 
 UNSURE = 1.2
 """Grip of a part whose friction cannot be found, over the one that its load needs at the least friction [-]."""
@@ -61,6 +62,13 @@ STICKS = 0.05
 
 STUCK = 1.0
 """Rate at which it falls if a part that is to slip has stuck [1/s]."""
+
+BRAKE, BRAKES = 1.3, 0.06
+"""Grip of a part that has stuck, over the one that balances it, and for how long [s]: it stops if its slip sensor is
+dead."""
+
+SURE = 0.17
+"""Time without slip after which the wrench of such a part no longer changes if it has stuck [s]."""
 
 AIM = 0.3
 """Share of the tolerance by which a part is caught before the goal: late samples let it go on."""
@@ -138,11 +146,12 @@ def _follow(c, e, least_load):
     needed = e.gauge * c.pressed if xp.in_range(force) and force > 0.0 else 0.0
     c.load, c.age = max(needed, c.load * math.exp(-dt / LOAD_TIME)), max(c.age, 0.0) + dt
     c.span += dt
-    v = e.velocity
+    v, c.quiet = e.velocity, c.quiet + dt
     if dt > 0.0 and xp.in_range(v[0]) and xp.in_range(v[1]) and xp.in_range(v[2]):
         for i in range(3):
             c.slid[i] += v[i] * c.span if c.span >= 0.0 else 0.0
             c.velocity[i] = v[i]
+            c.quiet = c.quiet if v[i] == 0.0 else 0.0
         c.span = 0.0
     if c.age < SETTLED and xp.in_range(force):  # one wrong sample is not the grip, nor the load
         for i in range(EARLY - 1):
@@ -151,17 +160,26 @@ def _follow(c, e, least_load):
         c.count = min(c.count + 1.0, float(EARLY))
         c.grip, c.load = _median(c.forces, c.count), _median(c.loads, c.count)
         c.weight, c.lately = c.load, c.load
+    share = min(dt / LATE, 1.0)
     if needed > 0.0:
-        c.lately += min(dt / LATE, 1.0) * (min(needed, 1.5 * c.lately) - c.lately)
+        c.lately += share * (min(needed, 1.5 * c.lately) - c.lately)
+    size = math.hypot(math.hypot(e.wrench[0], e.wrench[1]), e.wrench[2] / e.radius)
+    if xp.in_range(size):
+        c.borne += (share if c.age >= SETTLED else 1.0) * (size - c.borne)
     return needed, dt
 
 
 @kernel
-def _unsure(c, e, dt, seeks):
-    """Return True if friction cannot be found: it contradicts itself, no slip velocity comes, or it stays at 0."""
-    if seeks and c.age >= SETTLED and c.blind < LATE:
-        c.weight = max(c.weight, c.lately)
-        c.blind = c.blind + dt if e.slip <= 0.5 and c.lately < (1.0 - LOST) * c.weight else 0.0
+def _unsure(c, e, dt, seeks, lost):
+    """Return True if friction cannot be found: it contradicts itself, no slip velocity comes, or it stays at 0.
+
+    A wrench that a part which sticks bears does not change with the grip, that of one which slips falls with it.
+    """
+    if not seeks or c.age < SETTLED:
+        c.stood = c.borne
+    elif c.blind < LATE:
+        c.weight, c.stood = max(c.weight, c.lately), max(c.stood, c.borne)
+        c.blind = c.blind + dt if c.quiet > LATE and c.borne < (1.0 - lost) * c.stood else 0.0
     return c.blind >= LATE or e.flags >= NO_SIGN or max(c.span, c.age if c.span < 0.0 else 0.0) >= PAUSE
 
 
@@ -190,7 +208,7 @@ def hold(states, found, least_load, most, least_mu, z, reserve, gain, explore):
         path = math.hypot(slid[0], slid[1]) + e.radius * abs(slid[2])
         if slips and c.age >= SETTLED and (e.determined[0] > 0 or path >= explore):
             c.found = 1.0
-        unsure = _unsure(c, e, dt, c.found == 0.0)
+        unsure = _unsure(c, e, dt, c.found == 0.0, LOST)
         low = e.mu_c * math.exp(-z * math.sqrt(e.covariance[0, 0]))
         speed = math.hypot(v[0], v[1]) + e.radius * abs(v[2]) if slips else 0.0
         held = reserve * c.load / low + gain * speed
@@ -216,12 +234,13 @@ def slip(states, found, least_load, most, least_mu, axis, tolerance, duration, a
         c.began += dt
         if slips and c.began < 0.0 and c.age >= SETTLED:
             c.began, c.balance = 0.0, 1.05 * needed / max(e.gauge, 1e-9)
-        balance, unsure = c.balance, _unsure(c, e, dt, c.began < 0.0)
+        rests = c.since > SURE and c.quiet > STICKS  # if the slip sensor is right, the wrench stays as it is
+        balance, unsure = c.balance, _unsure(c, e, dt, c.began < 0.0 or rests, LOST if c.began < 0.0 else LOSES)
         time = c.began + delay if c.began >= 0.0 else 0.0
         place, speed, push = trapezoid(xp, time, goal, duration)
         there = x + v * delay
         left = goal - there
-        c.since = 0.0 if slips else c.since + dt
+        c.since = 0.0 if slips and c.quiet <= STICKS else c.since + dt
         stuck = c.since > STICKS  # then the wrench is that of the load, and says which grip balances it
         braking = 0.5 * acceleration
         if c.caught == 0.0 and c.pressed > 0.0:
@@ -231,12 +250,12 @@ def slip(states, found, least_load, most, least_mu, axis, tolerance, duration, a
         far = left - AIM * tolerance - v * REACTS - 0.5 * v * v / braking
         if c.began >= 0.0 and c.caught == 0.0 and (near or far <= 0.0):
             c.caught, c.dipped = 1.0, APPROACH + span  # it may be on its way already: no dip before this is seen
-        if slips:
+        if slips and c.quiet <= LATE:
             c.balance = min(c.balance * math.exp(adapt * (v - speed - 2.0 * (place - there)) * dt), LARGEST)
         if stuck and c.began >= 0.0:
             c.balance = 1.1 * needed / e.mu_c
         a = push + SPEED_GAIN * (speed - v) + PLACE_GAIN * (place - there)
-        lead = min(max(a / acceleration, -0.6), 0.25)
+        lead = min(max(a / acceleration, -0.6), 0.25 if c.quiet <= LATE else 0.0)
         start = _begin(c, 2.5 * c.load / e.mu_c, most)
         c.dipped += dt
         if c.caught > 0.0:
@@ -250,8 +269,9 @@ def slip(states, found, least_load, most, least_mu, axis, tolerance, duration, a
         elif c.began < 0.0:
             asked = min(start, c.grip) * math.exp(-RELEASE * dt)
         else:
-            asked = balance * (1.0 - lead) * math.exp(-STUCK * max(c.since - STICKS, 0.0))
-        if unsure and c.caught == 0.0:
+            brake = BRAKE if stuck and c.since < STICKS + BRAKES else 1.0
+            asked = brake * balance * (1.0 - lead) * math.exp(-STUCK * max(c.since - STICKS - BRAKES, 0.0))
+        if unsure and (c.caught == 0.0 or c.blind >= LATE):
             asked = UNSURE * max(c.load, c.weight) / least_mu
         _set(c, asked, most)
 
@@ -279,6 +299,6 @@ def hinge(states, found, least_load, most, least_mu, reserve, gain):
         speed = math.hypot(v[0], v[1]) if slips else 0.0
         carried = reserve * c.eased * c.force / e.mu_c + gain * speed
         asked = carried if c.found > 0.0 else min(start, c.grip * math.exp(-RELEASE * dt))
-        if _unsure(c, e, dt, c.found == 0.0):
+        if _unsure(c, e, dt, c.found == 0.0, LOST):
             asked = UNSURE * max(c.load, c.weight) / least_mu
         _set(c, asked, most)
