@@ -88,7 +88,12 @@ def pushing(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert made.PAGE.read_text().count("\n| ") == 1 + len(made.BOARDS)
 
 
-MAKERS = {f"make_{make.__name__}": make for make in (beside, coverage, house, images, measured, moving, pushing)}
+def joint(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(made, "T_END", 1.0)
+    made.holds().savefig(folder / "joint-holds.png")  # the other picture is that of a fit, which test_joints makes
+
+
+MAKERS = {f"make_{make.__name__}": make for make in (beside, coverage, house, images, joint, measured, moving, pushing)}
 SLOW = {"make_explorer": explorer}
 
 
@@ -98,6 +103,8 @@ SLOW = {"make_explorer": explorer}
 def test_a_maker_of_pages_makes_them(name, tmp_path, monkeypatch):
     if name == "make_explorer":
         pytest.importorskip("playwright", reason="needs the extra [browser]")
+    if name == "make_joint":
+        pytest.importorskip("mujoco", reason="needs the extra [mujoco]")
     if not DOCS.is_dir():
         pytest.skip("no docs beside these tests")
     monkeypatch.syspath_prepend(DOCS)

@@ -175,8 +175,8 @@ def test_interruption_in_a_later_window_keeps_what_is_done(monkeypatch):
 
 def test_interruption_while_shapes_are_built_keeps_what_is_done(monkeypatch):
     monkeypatch.setattr(packing, "BATCH", 3)
-    model = MODELS["published"]()
-    build, calls = type(model.shapes)._built, []
+    shapes = type(MODELS["published"]().shapes)
+    build, calls = shapes._built, []
 
     def slow(self, load):
         calls.append(load)
@@ -184,9 +184,9 @@ def test_interruption_while_shapes_are_built_keeps_what_is_done(monkeypatch):
             raise KeyboardInterrupt
         return build(self, load)
 
-    monkeypatch.setattr(type(model.shapes), "_built", slow)
+    monkeypatch.setattr(shapes, "_built", slow)
     with pytest.raises(pf.errors.SimulationInterrupted) as caught:
-        pf.simulate(free(model))
+        pf.simulate(free(MODELS["published"]()))
     assert 0.003 < float(caught.value.solution.data.time[-1]) < 0.012
 
 
