@@ -142,7 +142,7 @@ def main() -> None:
     creep = np.hypot(np.ptp(beside[last]), np.ptp(below[last])) / 0.2
     print(f"at rest: it creeps at {1e6 * creep:.4f} um/s")
     folder.mkdir(parents=True, exist_ok=True)
-    figure = new_figure(9.0, 2.8)
+    figure = new_figure(9.0, 3.1)
     for axes, shown, picture in zip(figure.subplots(1, len(SHOWN)), SHOWN, pictures, strict=True):
         axes.imshow(picture)
         axes.set_title(f"{shown} s, grip {controls(shown)[0]:.1f} N", fontsize="x-large")
