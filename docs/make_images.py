@@ -50,7 +50,7 @@ def figures() -> dict[str, plots.style.PlotFigure]:
 
 def discs() -> plots.style.PlotFigure:
     """Draw the discs that stand for three patches, the darker the more load they carry, over the cells."""
-    figure = plots.style.new_figure(9.0, 3.1)
+    figure = plots.style.new_figure(9.0, 3.3)
     circle, tee = (PUBLISHED_PATCHES[name]() for name in ("Circle", "NonConvex2"))
     patches = {"a disc": circle, "a T": tee, "a fingertip": fingertip()}
     for axes, (words, patch) in zip(figure.subplots(1, 3), patches.items(), strict=True):

@@ -19,19 +19,13 @@ from planarfriction.kernels.cells import CellsContact
 from planarfriction.kernels.contacts import ModelFunctions, functions_of
 from planarfriction.kernels.passes import Passes
 from planarfriction.kernels.steps import StepFunctions, step_functions
-from planarfriction.kernels.vectors import Vector, plus, put, three
+from planarfriction.kernels.vectors import Vector, copy, plus, put, three
 
 RESULTS = LANES * 2 * DISC.size**2
 """Numbers of the results of a block of cells: derivatives, or rates or bristles, row by row."""
 
 BLOCK = RESULTS + LANES * 12
 """Numbers of a block of cells: results, and copies of up to eight numbers, of the bristle and of the weight."""
-
-
-@kernel
-def _copy(count: int, source: Doubles, target: Doubles) -> None:
-    for i in range(count):
-        target[i] = source[i]
 
 
 @kernel
@@ -55,10 +49,10 @@ def _filled(numbers: int, size: int) -> Any:
             for i in range(count, lanes):
                 block[RESULTS + m * LANES + i] = 0.0
         for m in range(numbers):
-            _copy(count, at(contact.cells, m * n + first), at(block, RESULTS + m * LANES))
+            copy(at(contact.cells, m * n + first), at(block, RESULTS + m * LANES), count)
         for m in range(size):
-            _copy(count, at(z, m * n + first), at(block, bristle + m * LANES))
-        _copy(count, at(contact.weights, first), at(block, weight))
+            copy(at(z, m * n + first), at(block, bristle + m * LANES), count)
+        copy(at(contact.weights, first), at(block, weight), count)
         return Rows(at(block, RESULTS), at(block, bristle), at(block, weight), out, LANES), lanes
 
     return filled
@@ -86,7 +80,7 @@ def evaluate(
         rows, count = cell_rows(record, z, first, lanes, block if copied > 0 else at(zdot, first), block)
         total = plus(total, 1.0, rate(record.law, twist, 0.0, rows, count))
         for m in range(copied):
-            _copy(min(lanes, n - first), at(block, m * LANES), at(zdot, m * n + first))
+            copy(at(block, m * LANES), at(zdot, m * n + first), min(lanes, n - first))
     put(w, total)
 
 
@@ -102,7 +96,7 @@ def linearise(
         square = bristle.size * bristle.size
         for m in range(2 * square if bristle.linear else 4 * square):
             row = m if m < 2 * square else m + square  # behind the inverse
-            _copy(min(lanes, n - first), at(block, m * LANES), at(lin, row * n + first))
+            copy(at(block, m * LANES), at(lin, row * n + first), min(lanes, n - first))
 
 
 def step(
@@ -116,7 +110,7 @@ def step(
         rows, count = cell_rows(record, z, first, lanes, block if copied > 0 else at(new, first), block)
         total = plus(total, 1.0, advance(record.law, twist, dt, rows, count))
         for m in range(copied):
-            _copy(min(lanes, n - first), at(block, m * LANES), at(new, m * n + first))
+            copy(at(block, m * LANES), at(new, m * n + first), min(lanes, n - first))
     put(out, total)
 
 
