@@ -16,6 +16,7 @@ from planarfriction.identify.parameters import Coordinates, scaled_patch, soft_f
 from planarfriction.identify.simulators import SIMULATORS
 from planarfriction.identify.uncertainty import covariance
 from planarfriction.identify.verdicts import speed_gap
+from planarfriction.patch import PUBLISHED_PATCHES
 from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, fitted, noisy, truth
 
 
@@ -358,3 +359,13 @@ def test_discs_grow_and_move_with_their_patch():
     wrenches = SIMULATORS["distributed"](patch, law).wrenches(twists, loads, 2e-3, vector)
     expected = rollout(pf.DistributedModel(scaled, law), None, twists, loads, 2e-3).wrenches
     np.testing.assert_allclose(wrenches, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_a_model_whose_quickest_relative_fails_is_tried_too():
+    """The reduced model as published, with the bristles that made this log, ends far from it: 100 times the noise."""
+    law = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
+    scene = pf.scenes.driven(pf.DistributedModel(PUBLISHED_PATCHES["Circle"](), law))
+    found = identify_lugre(Log.from_solution(pf.simulate(scene)), PUBLISHED_PATCHES["Circle"]())
+    assert (found.chosen, found.law.elasto_plastic) == ("distributed", pf.ElastoPlastic(0.9))
+    assert found.estimates["sigma_0"] == pytest.approx(law.sigma_0, rel=0.05)
+    assert found.estimates["mu_s"] == pytest.approx(law.mu_s, rel=1e-3)

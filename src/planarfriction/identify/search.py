@@ -65,18 +65,12 @@ def refine(fit: Fit) -> Fit:
 
 
 def warm_start(problem: LogProblem, lead: Fit, guesses: Sequence[np.ndarray], *, noise: np.ndarray) -> Fit:
-    """Find the best rough fit of another model than that of `lead`.
+    """Find the best rough fit of another model than that of `lead`, from where this ended and from the best guess.
 
-    The search begins where the lead ended, if that is near the data, else at the best of the `guesses` `[F]`: a model
-    that does not fit ends far away. If this does not come near the data, the other start is tried too.
+    A lead that does not fit ends far away, and one that fits may stay where the corner of the bristles is not seen.
     """
     guess = min(guesses, key=lambda values: misfit(problem, values, noise))
-    fits = []
-    for start in (lead.values, guess) if lead.near else (guess, lead.values):
-        fits.append(multistart(problem, [start], noise=noise))
-        if fits[-1].near:
-            break
-    return min(fits, key=lambda fit: fit.cost)
+    return multistart(problem, [lead.values, guess], noise=noise)
 
 
 @contextlib.contextmanager

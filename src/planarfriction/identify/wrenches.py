@@ -42,8 +42,9 @@ that was chosen takes windows of its logs."""
 LEAD = next(iter(SIMULATORS))
 """Name of the quickest model, which finds where the others begin."""
 
-WORSE = 2.0
-"""Ratio of the costs of two kinds of bristles above which other models do without the worse one."""
+WORSE, EXPLAINED = 2.0, 1.2
+"""Ratio of the costs of two kinds of bristles above which other models do without the worse one; and mean square of the
+residuals over the noise above which they do so only if that one is near the data: the quickest model may be wrong."""
 
 USUAL_BRISTLES = ElastoPlastic(0.9)
 """Bristles that "auto" compares with plain ones."""
@@ -117,7 +118,10 @@ def identify_lugre(
     with interruptible(problems):
         for name in dict.fromkeys((LEAD, *models)):
             lead = min(leads, key=lambda fit: fit.cost, default=None)
-            for law in kinds if lead is None else [fit.problem.law for fit in leads if fit.cost < WORSE * lead.cost]:
+            if lead is not None:
+                sure = 2.0 * lead.cost < EXPLAINED * lead.problem.numbers
+                kinds = [fit.problem.law for fit in leads if fit.cost < WORSE * lead.cost or not (sure or fit.near)]
+            for law in kinds:
                 problems.append(LogProblem(logs, patch, names, law, options, name, progress))
                 late = problems[-1].work * USUAL_EVALUATIONS
                 if model == "auto" and name != LEAD and late > PATIENCE:
