@@ -86,6 +86,13 @@ def test_what_is_called_identified_is_right():
     assert max(each for _, _, every in results for each in every.values()) < 4.5
 
 
+def test_a_rejected_kind_of_bristles_gives_way_to_one_that_explains_the_data():
+    """This contact never slips: of the friction that it never shows, elasto-plastic bristles predict anything."""
+    found, inside, _ = judged(301, "auto")
+    assert not found.scores[0].rejected and any(each.rejected for each in found.scores)
+    assert inside["sigma_0"] and not found.identifiable("mu_c")
+
+
 if __name__ == "__main__":
     for number in range(*map(int, sys.argv[1:3])):
         case = random_case(number)

@@ -144,7 +144,7 @@ def identify_lugre(
                     candidates.append(Candidate(fit, uncertainty(fit)))
         best = min(candidates, key=lambda each: each.uncertainty.score)
         alike = [each for each in candidates if each.score.model == best.score.model]
-        best = min(alike, key=lambda each: each.cost(best.fit.sigma))
+        best = min(alike, key=lambda each: (each.uncertainty.rejected, each.cost(best.fit.sigma)))
         found = _identification(best, candidates, skipped, leads[0].starts)
     return with_findings(found, whole, findings)
 
