@@ -614,6 +614,13 @@ def test_figures_have_the_size_and_the_panels_that_are_asked_for():
         assert overhang(small) <= CUT
 
 
+def test_all_histories_fit_into_a_column_of_a_paper():
+    with matplotlib.style.context("planarfriction.plots.print"):
+        figure = plots.plot_histories({"a": synthetic.solution(), "b": synthetic.solution()}, size=(3.5, 3.0))
+        assert faults(figure) == []
+    assert [figure.axes[i].get_title() for i in range(2)] == ["body", "contacts"]
+
+
 def test_figures_draw_into_axes_of_a_users_own():
     run, figure = synthetic.solution(), style.new_figure(9.0, 3.0)
     left, middle, right = figure.subplots(1, 3)

@@ -31,6 +31,14 @@ LONGEST, LETTER, HANDLE = 60, 6.6, 48.0
 """Letters in a line of the legend; width of a letter of 10 pt, and of a line with its gaps [pt]."""
 
 
+TITLES = "body: position, angle, speed", "contacts: friction on the body, normal force"
+"""Titles of the columns of all panels; short ones end before the colon."""
+
+LOW, NARROW = 1.0, 6.0
+"""Height of a panel, with its share of all that is around it, below which labels have two lines, and width of a figure
+below which titles are short [inch]."""
+
+
 class _Panel(NamedTuple):
     title: str
     kind: str
@@ -101,8 +109,9 @@ def draw_histories(figure: Any, solutions: pf.Solution | Mapping[str, pf.Solutio
     _draw_panels(axes, chosen, known)
     for each in panels[:-1].ravel():
         each.set_xlabel("")
-    panels[0, 0].set_title("body: position, angle, speed", fontsize="medium")
-    panels[0, 1].set_title("contacts: friction on the body, normal force", fontsize="medium")
+    for each, title in zip(panels[0], TITLES, strict=True):
+        short = figure.bbox.width < NARROW * figure.dpi
+        each.set_title(title.partition(":")[0] if short else title, fontsize="medium")
     _finish(figure, axes, chosen, known)
 
 
@@ -121,6 +130,9 @@ def _draw_panels(axes: Sequence[Any], chosen: Sequence[str], known: Mapping[str,
 
 def _finish(figure: Any, axes: Sequence[Any], chosen: Sequence[str], known: Mapping[str, pf.Solution]) -> None:
     """Align labels, keep those of time in the last row, and add a legend."""
+    if figure.bbox.height < LOW * figure.dpi * axes[0].get_gridspec().nrows:
+        for each in axes:
+            each.set_ylabel(each.get_ylabel().replace(" ", "\n", 1))
     figure.align_ylabels(axes)
     for above in axes[:-1] if len(chosen) < len(_PANELS) else ():
         above.set_xlabel("")
