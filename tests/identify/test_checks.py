@@ -306,6 +306,7 @@ def test_separators_and_other_names(log, tmp_path, separator, point):
     [
         ("t,vx,vy,omega,fx,fy,moment,normal_force", "has no column tau; found t, vx, vy, omega, fx, fy, moment, "),
         ("t,x,y,theta,fx,fy,tau", "has no column normal_force; found"),
+        ("stamp,x,y,theta,a.vx,a.vy,a.omega,a.fx,a.fy,a.tau,a.fn", "has no column t; found"),
         ("stamp,vx,vy,fx,fy,tau,fn", "has no column t, omega; found"),
         ("t,vx [mm/s],vy,omega,fx,fy,tau,fn", "column vx [mm/s] must be in SI units, got mm/s"),
         ("t,vx,Vx,vy,omega,fx,fy,tau,fn", "columns vx and Vx are the same"),

@@ -60,10 +60,12 @@ def find_columns(path: Path, headings: Sequence[str], *, contact: str | None, wi
         except InvalidValueError as error:
             raise FileError(f"{path}: {error}") from None
     elif _missing(named, "", with_load):
-        whole = [each for each in contacts if not _missing(named, f"{each}.", with_load)]
+        lacks = {each: len(_missing(named, f"{each}.", with_load)) for each in contacts}
+        whole = [each for each in contacts if lacks[each] == 0]
         if len(whole) > 1:
             raise FileError(f"{path}: has the contacts {shown(', '.join(whole))}: choose one of them")
-        contact = whole[0] if whole else None
+        nearest = min(contacts, key=lacks.__getitem__, default="")  # the message names what it lacks
+        contact = nearest if nearest and lacks[nearest] < len(_missing(named, "", with_load)) else None
     prefix = "" if contact is None else f"{contact}."
     if missing := _missing(named, prefix, with_load):
         raise FileError(
