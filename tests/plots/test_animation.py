@@ -264,7 +264,6 @@ def test_a_frame_draws_and_says_where_body_and_contacts_are():
         assert arrow._posA_posB[0] == pytest.approx(start, abs=1e-9)
     assert film.words.get_text() == "moved by x 4.50 mm, y -11.25 mm, turned by -38.67 deg"
     assert film.clock.get_text() == "t = 1.50 s"
-    # the hardest pressed of all frames: 2 sqrt(0.1^2 + 1.1^2) N is not reached by sines, and 30 % of the view are its arrow
     longest = max(np.hypot(*each.forces.T).max() for each in film.track.contacts)
     side = np.diff(film.views[0], axis=-1).min()
     assert film.millimetres_per_newton * longest == pytest.approx(0.3 * side)
@@ -276,7 +275,7 @@ def test_the_wrench_is_drawn_with_its_shadow_and_its_tail():
     film = film_of(run, frames=41)
     (panel,) = panels(film, SurfacePanel)
     panel.show(30)
-    fx, fy, tau = head = panel.points[30]
+    fx, fy, _ = head = panel.points[30]
     names = [float(run.data[name][150, 0]) for name in ("fx", "fy", "tau")]
     radius = run.scene.contacts[0].model.patch.contact_radius()
     assert head == pytest.approx(np.array(names) / 2.0 / [1.0, 1.0, radius], rel=2e-3)  # exact radius, of cells here
