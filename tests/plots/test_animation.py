@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import re
 import subprocess
 
@@ -363,6 +364,12 @@ def test_the_share_that_slips_is_that_of_the_load():
     panel.show(2)
     share = 100.0 * slips[2].sum() / slips.shape[1]
     assert panel.words.get_text() == f"pad: {share:.0f} % of the load slips"
+    panel = panels(film_of(synthetic.solution(synthetic.scene(contacts=2))), CellPanel)[1]
+    panel.track = dataclasses.replace(
+        panel.track, contact=dataclasses.replace(panel.track.contact, name="long" + 8 * " long")
+    )
+    panel.show(0)
+    assert panel.words.get_text().startswith("long long long long...: ")
 
 
 # ---------------------------------------------------------------------- the view
@@ -480,6 +487,28 @@ def test_a_gif_has_its_frames_at_their_pace(tmp_path):
     # frames that are alike may be one: their times add up, to the hundredth of a second that GIF counts
     assert sum(durations) == pytest.approx(1e3 * (10 / 30.0 + film_files.LAST), abs=10)
     assert max(seen) == pytest.approx(0.3)
+
+
+def coloured(number: int) -> np.ndarray:
+    """A frame of 60 x 40 pixels: white, two frequent colours, and 30 rare ones that change from frame to frame."""
+    pixels = np.full((60, 40, 3), 255, dtype=np.uint8)
+    pixels[:20], pixels[20:30] = (0, 114, 178), (230, 97, 0)
+    rare = 7 * np.arange(30) + 211 * number
+    pixels[50:].reshape(-1, 3)[:30] = np.stack([rare % 256, rare // 7 % 256, rare // 3 % 256], -1)
+    return pixels
+
+
+def test_frequent_colours_are_kept_and_rare_ones_are_near(tmp_path):
+    path, file = tmp_path / "colours.gif", io.BytesIO()
+    film_files.write_frames(path, file, coloured, 8, 10.0)
+    with Image.open(file) as image:
+        assert image.n_frames == 8 and image.info["loop"] == 0
+        for number in range(8):
+            image.seek(number)
+            assert image.info["duration"] == (100 if number < 7 else 1100)
+            off = np.abs(np.asarray(image.convert("RGB"), dtype=int) - coloured(number).astype(int))
+            assert off[:50].max() == 0
+            assert off.reshape(-1, 3)[2000:2030].mean() < 30.0  # 22: medians of 256 boxes
 
 
 def test_an_html_file_plays_by_itself(tmp_path):
