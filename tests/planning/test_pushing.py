@@ -273,7 +273,7 @@ def test_a_pusher_that_is_away_reaches_the_slider_no_sooner_than_it_can():
     scenery = Scenery(slider(), Pusher(MU, 0.02), np.array([0.0, 2.0]), path)
     # a gap of 155 mm; ends move at 50 mm/s and at 0.5 rad/s with 10 mm
     assert scenery.not_before(0.0, np.zeros(3)) == 2.0
-    near = Scenery(slider(), Pusher(MU, 0.02), np.array([0.0, 2.0]), path + [0.1, 0.0, 0.0])
+    near = Scenery(slider(), Pusher(MU, 0.02), np.array([0.0, 2.0]), path + np.array([0.1, 0.0, 0.0]))
     assert near.not_before(0.0, np.zeros(3)) == pytest.approx(0.055 / (0.05 + 0.005))
     at, touch = touch_after(near, 0.0, np.zeros(3))
     # the right end leads: -0.1 + 0.05 t + 0.01 sin(0.5 t) = -0.045
