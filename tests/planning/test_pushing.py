@@ -326,6 +326,14 @@ def test_bad_input_is_refused_in_one_line():
         assert "\n" not in str(caught.value)
 
 
+def test_polygons_with_an_edge_along_an_axis_are_sliders_and_stars_are_not():
+    corners = 0.05 * np.exp(2j * np.pi * (np.arange(5) - 0.5) / 5)  # one edge stands upright on the right
+    corners = np.stack([corners.real, corners.imag], -1)
+    assert Slider(SURFACES["exact"], corners).inward[0] == pytest.approx([-1.0, 0.0], abs=1e-12)
+    with pytest.raises(pf.FrictionError, match="outline must be convex"):
+        Slider(SURFACES["exact"], corners[[0, 2, 4, 1, 3]])
+
+
 def test_sliders_take_outlines_of_either_sense():
     turned = dataclasses.replace(slider(), outline=SQUARE[::-1])
     assert turned.gaps(np.zeros(2)).max() == pytest.approx(-HALF)
