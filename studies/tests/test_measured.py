@@ -443,7 +443,7 @@ def test_a_push_over_time_shows_where_force_and_torque_point(cases):
 def test_peaks_are_drawn_measured_over_predicted_with_their_medians(cases):
     test = [case for case in cases["onsets"] if np.isfinite(case.answer[3])][:12]
     test = [case._replace(board=("feet", "flat")[i % 2]) for i, case in enumerate(test)]
-    benchmark = Drawn("onsets", test, reduced=[case.answer + [0.0, 0.0, 0.0, 0.1 * i] for i, case in enumerate(test)])
+    benchmark = Drawn("onsets", test, reduced=[case.answer + 0.1 * i * np.eye(4)[3] for i, case in enumerate(test)])
     (axes,) = drawn(pictures._draw_onsets, benchmark)
     for lines, first in ((axes.lines[:2], 0), (axes.lines[2:4], 1)):
         pairs = np.array([[test[i].answer[3] + 0.1 * i, test[i].answer[3]] for i in range(first, 12, 2)])

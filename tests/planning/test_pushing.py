@@ -268,6 +268,19 @@ def test_the_geometry_of_a_push_is_that_of_complex_numbers():
         assert velocity == pytest.approx((moves.real, moves.imag, rate[2]))
 
 
+def test_a_face_is_flush_with_the_edge_that_it_looks_at():
+    thing, q = Slider(pf.LimitSurfaceEllipsoid(PATCH), UNEVEN), np.array([0.01, -0.02, 0.4])
+    for edge, (x, y) in enumerate(thing.inward):
+        for off in (5e-5, -5e-5, 2e-4):
+            path = np.array([[-0.1, 0.0, np.arctan2(y, x) + 0.4 + off]] * 2)
+            scenery = Scenery(thing, Pusher(MU, 0.03), np.array([0.0, 1.0]), path)
+            if abs(off) < 1e-4:
+                assert scenery.flush(Touch(CORNER, edge), 0.5, q) == Touch(FACE, edge)
+            else:
+                with pytest.raises(pf.FrictionError, match="not wedge the slider"):
+                    scenery.flush(Touch(CORNER, edge), 0.5, q)
+
+
 def test_a_pusher_that_is_away_reaches_the_slider_no_sooner_than_it_can():
     path = np.array([[-0.2, 0.0, 0.0], [-0.1, 0.0, 1.0]])
     scenery = Scenery(slider(), Pusher(MU, 0.02), np.array([0.0, 2.0]), path)
