@@ -18,9 +18,9 @@ import pytest
 from planarfriction.cli import main
 from planarfriction.errors import FileError
 from planarfriction_studies.referee import engines, report, truths
-from planarfriction_studies.referee.case import FOLDER, all_cases, read_case
+from planarfriction_studies.referee.case import FOLDER, Body, Force, Shape, all_cases, read_case
 from planarfriction_studies.referee.export import export_case, sdf
-from planarfriction_studies.referee.pictures import film, scene
+from planarfriction_studies.referee.pictures import film, outline, scene
 from planarfriction_studies.referee.run import Apart, Kept, Verdict, judge, no_result, run
 
 CASES = all_cases()
@@ -470,6 +470,51 @@ def test_pictures_show_where_bodies_end():
     assert len(pads_and_plate) == 3 and end.get_linestyle() == "--"
     x, y = end.get_xy()[:-1].mean(0)
     assert (x, y) == pytest.approx([1e3 * truth.value for truth in CASES["in_hand"].truths[:2]], abs=1e-9)
+
+
+def test_outlines_are_those_of_turned_and_shifted_shapes():
+    """A box off the middle of a body that turns, from above and from the side; the length of what is round."""
+    shape = Shape("box", "box", (0.2, 0.1, 0.06), (0.03, -0.02, 0.01))
+    body = Body("plate", [shape], (1.0, 2.0, 3.0))
+    turn = 0.5
+    corners = np.array([[-0.07, -0.07], [0.13, -0.07], [0.13, 0.03], [-0.07, 0.03]]) @ [1.0, 1.0j]
+    turned = np.exp(1j * turn) * corners + complex(1.04, 2.05)
+    found = outline(body, shape, 1, 0.04, 0.05, turn)
+    np.testing.assert_allclose(found @ [1.0, 1.0j], turned, atol=1e-12)
+    aside = outline(body, shape, 2, 0.04, 0.05)
+    expected = [[0.97, 2.98], [1.17, 2.98], [1.17, 3.04], [0.97, 3.04]]
+    np.testing.assert_allclose(aside, expected, atol=1e-12)
+    rod = Shape("rod", "cylinder", (0.05, 0.3), axis=(1.0, 0.0, 0.0))
+    np.testing.assert_allclose(rod.half, [0.15, 0.05, 0.05])
+    np.testing.assert_allclose(Shape("pill", "capsule", (0.05, 0.3)).half, [0.05, 0.05, 0.2])
+    coin = Shape("coin", "cylinder", (0.05, 0.01))
+    np.testing.assert_allclose(np.hypot(*(outline(body, coin, 1) - [1.0, 2.0]).T), 0.05)
+    np.testing.assert_allclose(np.ptp(outline(body, coin, 2), axis=0), [0.1, 0.01])
+    heavy = Body("box", [Shape("box", "box", (0.3, 0.2, 0.1))], mass=1.2)
+    np.testing.assert_allclose(heavy.moments, 0.1 * np.array([0.04 + 0.01, 0.09 + 0.01, 0.09 + 0.04]))
+
+
+def test_forces_act_where_and_when_a_case_says():
+    """A pull at a point of a turned body, a sine beside a ramp, an incline of its own, and the time of settling."""
+    values = [[1.0, 2.0, -3.0, 0.1, 0.2, 0.3], [3.0, 2.0, -3.0, 0.1, 0.2, 0.3]]
+    sine = {"amplitude": (0.0, 0.5, 0.0, 0.0, 0.0, 0.0), "frequency": 2.0, "phase": 0.3}
+    force = Force("a", values, (0.0, 1.0), at=(0.1, 0.05, 0.02), **sine)
+    bodies = [
+        Body("a", [], mass=2.0, centre_of_mass=(0.01, 0.0, 0.0), tilt=0.4),
+        Body("b", [], mass=3.0),
+        Body("floor", [], joint="fixed"),
+    ]
+    case = replace(CASES["stop"], bodies=bodies, forces=[force], gravity=(0.5, 0.0, -9.0))
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    places, turns = np.zeros((2, 3)), np.stack([turn, np.eye(3)])
+    pull = np.array([1.5, 2.0 + 0.5 * math.sin(math.pi + 0.3), -3.0])
+    incline = 2.0 * (-9.0 * np.array([-math.sin(0.4), 0.0, math.cos(0.4)]) - [0.5, 0.0, -9.0])
+    torque = np.cross([-0.05, 0.09, 0.02], pull) + [0.1, 0.2, 0.3]
+    found = case.wrenches(0.25, places, turns)
+    np.testing.assert_allclose(found, [[*(pull + incline), *torque], np.zeros(6)], atol=1e-12)
+    settling = case.wrenches(None, places, turns)
+    down = np.cross([-0.05, 0.09, 0.02], [0.0, 0.0, -3.0])
+    np.testing.assert_allclose(settling, [[-1.0, 0.0, -3.0, *down], [-1.5, 0.0, 0.0, 0.0, 0.0, 0.0]], atol=1e-12)
 
 
 def test_films_go_to_where_an_engine_ends():
