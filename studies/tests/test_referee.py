@@ -509,7 +509,7 @@ def test_forces_act_where_and_when_a_case_says():
     places, turns = np.zeros((2, 3)), np.stack([turn, np.eye(3)])
     pull = np.array([1.5, 2.0 + 0.5 * math.sin(math.pi + 0.3), -3.0])
     incline = 2.0 * (-9.0 * np.array([-math.sin(0.4), 0.0, math.cos(0.4)]) - [0.5, 0.0, -9.0])
-    torque = np.cross([-0.05, 0.09, 0.02], pull) + [0.1, 0.2, 0.3]
+    torque = np.cross([-0.05, 0.09, 0.02], pull) + np.array([0.1, 0.2, 0.3])
     found = case.wrenches(0.25, places, turns)
     np.testing.assert_allclose(found, [[*(pull + incline), *torque], np.zeros(6)], atol=1e-12)
     settling = case.wrenches(None, places, turns)
