@@ -50,7 +50,7 @@ def box_of(axes, number: int) -> list[float]:
 
 
 def test_boxes_and_vertices_are_where_their_numbers_say():
-    figure, axes = looks.panels(4.0, 3.0)
+    _, axes = looks.panels(4.0, 3.0)
     looks.box(axes, 1.5, (1.0, 2.0, 2.5, 4.0, 7.0, 9.0), "0.5", 0.2)
     assert box_of(axes, 0) == pytest.approx([1.5, 1.0, 2.0, 2.5, 4.0, 7.0])
     assert axes.lines[-1].get_xydata().tolist() == [[1.5, 9.0]]
