@@ -8,9 +8,11 @@ import math
 import os
 import re
 import runpy
+import sys
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +21,7 @@ from planarfriction.cli import main
 from planarfriction.errors import FileError
 from planarfriction_studies.referee import engines, report, truths
 from planarfriction_studies.referee.case import FOLDER, Body, Force, Shape, all_cases, read_case
+from planarfriction_studies.referee.engines.newton import NewtonWorld
 from planarfriction_studies.referee.export import export_case, sdf
 from planarfriction_studies.referee.pictures import film, outline, scene
 from planarfriction_studies.referee.run import Apart, Kept, Verdict, judge, no_result, run
@@ -586,6 +589,60 @@ def test_the_view_of_simulators(monkeypatch, capsys, tmp_path):
     )
     assert heading == ["case", "A", "A, best", "A, patches"]
     assert row == ["stribeck", "23 mm", "1.3 mm", "< 0.001 nm"]  # 9, 0.5 and 0 times the 2.6 mm that are allowed
+
+
+class StubbedNewton:
+    """The parts of Newton that a world calls: states that hold forces and poses, and a solver that adds up forces."""
+
+    body_count = 3
+
+    def __init__(self, monkeypatch):
+        monkeypatch.setitem(sys.modules, "newton", self)
+        self.collided = []
+
+    def state(self):
+        return SimpleNamespace(body_f=Column((3, 6)), body_q=Column((3, 7)), body_qd=Column((3, 6)))
+
+    def control(self):
+        return "control"
+
+    def CollisionPipeline(self, model):
+        return SimpleNamespace(contacts=lambda: "contacts", collide=lambda state, contacts: self.collided.append(state))
+
+    def step(self, now, after, control, contacts, dt):
+        assert (control, contacts, dt) == ("control", "contacts", 2e-3)
+        after.body_q.values = now.body_q.values + now.body_f.values[:, [0, 1, 2, 3, 4, 5, 0]]
+
+
+class Column:
+    def __init__(self, shape):
+        self.values = np.zeros(shape)
+
+    def assign(self, values):
+        self.values = np.array(values)
+
+    def numpy(self):
+        return self.values
+
+
+def test_a_step_of_newton_goes_on_from_the_last_one(monkeypatch):
+    """Bodies 2 and 0 of three, whose poses grow by the forces of each step."""
+    stub = StubbedNewton(monkeypatch)
+    world = NewtonWorld(CASES["stop"], stub, [2, 0], stub, 2e-3)
+    forces = np.arange(12.0).reshape(2, 6)
+    for _ in range(3):
+        world.step(forces)
+    positions, _ = world.poses()
+    np.testing.assert_array_equal(positions, 3.0 * forces[:, :3])
+    assert len({id(state) for state in stub.collided}) == 2  # in turn
+    half = np.sqrt(0.5)
+    first, last = [1.0, 2.0, 3.0, 0.0, 0.0, half, half], [4.0, 5.0, 6.0, half, 0.0, 0.0, half]
+    world._now.body_q.values = np.array([first, 7 * [0.0], last])
+    positions, turns = world.poses()
+    np.testing.assert_array_equal(positions, [[4.0, 5.0, 6.0], [1.0, 2.0, 3.0]])
+    about_x = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
+    about_z = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    np.testing.assert_allclose(turns, [about_x, about_z], atol=1e-12)
 
 
 SOURCES = {
