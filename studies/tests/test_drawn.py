@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import planarfriction as pf
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction_studies.experiments import facts, looks
-from planarfriction_studies.experiments.beyond import contacts, tables
+from planarfriction_studies.experiments.beyond import cells, contacts, tables
+from planarfriction_studies.experiments.classics import run as classics
+from planarfriction_studies.experiments.convergence import run as convergence
+from planarfriction_studies.experiments.convergence import runs as convergence_runs
 from planarfriction_studies.experiments.drift import run as drift
 from planarfriction_studies.experiments.in_hand import figures
 from planarfriction_studies.experiments.limit_surfaces import figures as surfaces
 from planarfriction_studies.experiments.load_dependent import run as load_dependent
 from planarfriction_studies.experiments.staircase import run as staircase
+from planarfriction_studies.experiments.timing import run as timing
 from planarfriction_studies.experiments.velocity_driven import boxes
 from planarfriction_studies.experiments.velocity_driven import run as driven
 
@@ -251,3 +257,76 @@ def test_the_spin_of_line_and_disc_and_the_drift_on_grooves():
     assert closed.get_xydata()[-1] == pytest.approx([40.0, np.degrees(contacts.closed_drift(np.radians(40.0)))])
     for each in models:
         has(each, [31.0, 35.0, 40.0], np.degrees([0.1, 0.2, 0.3]))
+
+
+# ---------------------------------------------------------------------- convergence
+
+
+def test_the_profile_of_velocities_is_drawn_in_centimetres_and_radians():
+    _, axes = looks.panels(4.0, 3.0)
+    convergence._draw_profile(axes)
+    profile = convergence_runs.profile()
+    for i, (name, factor) in enumerate((("vx", 1e2), ("vy", 1e2), ("omega", 1.0))):
+        has(axes.lines[2 * i], profile.times, factor * profile.values[:, i])
+        is_published(axes.lines[2 * i + 1], f"convergence/velocity/{name}", factor)
+
+
+def test_errors_over_counts_are_drawn_beside_the_published_ones():
+    counts, random = [5, 7, 11], np.random.default_rng(0)
+    family, case = convergence_runs.FAMILIES[0], ("LineGrad", "p1")
+    errors = {case: {name: random.random((3, 2)) for name in convergence_runs.FAMILIES}}
+    figure = convergence._errors_over_counts(family, counts, errors)
+    for i, (axes, quantity) in enumerate(zip(figure.axes[:2], convergence.QUANTITIES, strict=True)):
+        has(axes.lines[0], counts, errors[case][family][:, i])
+        is_published(axes.lines[1], f"convergence/{family}/LineGrad/p1/{quantity}", 1.0)
+    radii = {"mask": np.array([-0.1, 0.2, -0.3]), "cut": np.array([0.01, -0.02, 0.03])}
+    lines = convergence._radius_errors(counts, radii, np.array([0.5, 0.6, 0.7])).axes[0].lines
+    for line, values in zip(lines, (np.abs(radii["mask"]), [0.5, 0.6, 0.7], np.abs(radii["cut"])), strict=True):
+        has(line, counts, values)
+
+
+# ---------------------------------------------------------------------- classics and timing
+
+
+def test_the_classics_are_drawn_in_the_units_of_their_axes():
+    names = ["stick-slip", "presliding"]
+    names += [f"break-away, {rate:g} N/s" for rate in classics.RATES]
+    names += [f"lag, {frequency:g} rad/s" for frequency in classics.FREQUENCIES]
+    found = {name: made(i) | {"vx": np.random.default_rng(90 + i).random(501)} for i, name in enumerate(names)}
+    hunted = {"time": TIME, "x": np.sin(TIME), "force": np.cos(TIME)}
+    slip, loop, away, lag, hunting, force = classics._figure(found, hunted).axes
+    has(slip.lines[0], TIME, found["stick-slip"]["x"])
+    has(slip.lines[1], TIME, classics.PULL * TIME)
+    has(loop.lines[0], 1e6 * found["presliding"]["x"], -found["presliding"]["fx"])
+    has(away.lines[0], classics.RATES, [-found[f"break-away, {rate:g} N/s"]["fx"].min() for rate in classics.RATES])
+    last = TIME >= 2.5
+    for line, frequency in zip(lag.lines, classics.FREQUENCIES, strict=True):
+        run = found[f"lag, {frequency:g} rad/s"]
+        has(line, 1e3 * run["vx"][last], -run["fx"][last])
+    has(hunting.lines[0], TIME, hunted["x"])
+    assert hunting.lines[1].get_ydata() == pytest.approx([classics.GOAL] * 2)
+    has(force.lines[0], TIME, hunted["force"])
+
+
+def test_times_over_errors_have_bars_from_quartile_to_quartile():
+    entry = {"tolerance": 1e-6, "error": 2e-7, "evaluations": 321.0, "repeats": 5}
+    entry |= dict(zip(timing.TIMES, (0.02, 0.018, 0.025), strict=True))
+    problem = type("Problem", (), {"name": "case", "window": SimpleNamespace(states=12)})()
+    (axes,) = timing._figure({problem: {"RODAS4": [entry]}}).axes
+    has(axes.lines[0], [2e-7], [0.02])
+    (bar,) = axes.collections[0].get_segments()
+    assert bar[:, 1] == pytest.approx([0.018, 0.025])
+    table = timing._points_table(problem, {"RODAS4": [entry]})
+    assert table.rows[0] == ("RODAS4, 1e-06", "2.0e-07", "20 (18 to 25)", 321, 5) and "12 states" in table.note
+    data = timing._dataset({"RODAS4": [entry]})
+    assert float(data["time"][0]) == 0.02 and data["solver"].values.tolist() == ["RODAS4"]
+
+
+def test_errors_of_few_discs_are_drawn_over_their_number():
+    random = np.random.default_rng(0)
+    names = ("8 discs", "16 discs", "published", "all")
+    errors = {name: {words: random.random() for words in cells.LINES} for name in names}
+    lines = cells.figure(errors).axes[0].lines
+    for i, words in enumerate(cells.LINES):
+        has(lines[2 * i], [8, 16], [errors["8 discs"][words], errors["16 discs"][words]])
+        assert lines[2 * i + 1].get_ydata() == pytest.approx([errors["published"][words]] * 2)

@@ -52,7 +52,7 @@ def test_few_discs_moved_at_random(shape):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_motions_turn_within_the_patch_or_stop(seed):
-    """Spins whose rim moves at 20 mm/s after a fortieth of the time; reversals with stops; 1.4 r is as far as they go."""
+    """Spins whose rim moves at 20 mm/s after a fortieth of the time; reversals with stops; 1.4 r at most."""
     r, t = 0.01, np.linspace(0.0, 1.0, cells.SAMPLES)
     twist = cells.wandering(np.random.default_rng(seed), r)
     np.testing.assert_allclose(np.abs(twist[:, 2]) * r, 0.02 * np.minimum(40.0 * t, 1.0), rtol=1e-12)
