@@ -15,6 +15,7 @@ import pytest
 import planarfriction as pf
 from planarfriction.cli import main
 from planarfriction.errors import InvalidValueError
+from planarfriction.plots import style
 from planarfriction_studies.measured import (
     TASKS,
     Benchmark,
@@ -26,6 +27,8 @@ from planarfriction_studies.measured import (
     slide_integrator,
     slides,
 )
+from planarfriction_studies.measured import figures as pictures
+from planarfriction_studies.measured.benchmark import Result
 from planarfriction_studies.measured.end_regions import EndRegions, shares
 from planarfriction_studies.measured.figures import draw, ellipse
 from planarfriction_studies.measured.mujoco_box import MujocoBox
@@ -365,6 +368,88 @@ def test_regions_of_ends_are_drawn_and_hold_them():
     answers = [case.answer[-1] - case.question.first[-1] for case in benchmark.test("slides")]
     far = [d @ np.linalg.solve(region[:2, :2], d) for d in np.array(answers)[:, :2]]
     assert (off**2).sum(axis=1) == pytest.approx(far, rel=1e-9)
+
+
+class Drawn:
+    """A comparison of one task that was run, with the answers of models by name."""
+
+    def __init__(self, task, test, regions=None, **answers):
+        made = {name: Result({}, tuple(each), (), {}, {}, 0.0, regions) for name, each in answers.items()}
+        self.results, self.test = {task: made}, lambda _: test
+
+
+def drawn(draw_it, benchmark):
+    figure = style.new_figure(8.0, 4.0)
+    draw_it(figure, benchmark)
+    return figure.axes
+
+
+def test_slides_are_drawn_from_their_start_in_millimetres_and_degrees(cases):
+    test = cases["slides"][:20]
+    off = np.array([2e-3, -1e-3, 0.1])
+    regions = np.repeat(np.diag([4e-6, 1e-6, 0.01])[None], 20, axis=0)
+    benchmark = Drawn("slides", test, regions, ellipsoid=[case.answer + off for case in test])
+    axes = drawn(pictures._draw_slides, benchmark)
+    named = {case.name: case for case in test}
+    shown = [named[each.get_title(loc="left")] for each in axes[:6:2]]
+    spins = [abs(case.answer[-1, 2] - case.answer[0, 2]) for case in shown]
+    assert spins[0] < spins[1] < spins[2]
+    for case, way, turn in zip(shown, axes[:6:2], axes[1:6:2], strict=True):
+        poses = case.answer - case.answer[0]
+        np.testing.assert_allclose(way.lines[0].get_xydata(), 1e3 * poses[:, :2], atol=1e-9)
+        np.testing.assert_allclose(way.lines[1].get_xydata(), 1e3 * (poses + off)[:, :2], atol=1e-9)
+        edge = way.lines[2].get_xydata() - 1e3 * (poses + off)[-1, :2]
+        np.testing.assert_allclose(np.hypot(*(edge / [2.0, 1.0]).T), 1.0, rtol=1e-9)
+        np.testing.assert_allclose(turn.lines[0].get_xdata(), case.question.time)
+        for line, angle in zip(turn.lines[:2], (poses[:, 2], poses[:, 2] + 0.1), strict=True):
+            np.testing.assert_allclose(line.get_ydata(), np.degrees(angle), atol=1e-9)
+        bar = turn.collections[0].get_segments()[0][:, 1]
+        np.testing.assert_allclose(bar, np.degrees(poses[-1, 2] + [0.0, 0.2]), atol=1e-9)
+
+
+def test_centres_of_rotation_are_joined_to_what_is_predicted(cases):
+    case = next(case for case in cases["pushes"] if "hard_10_90_10" in case.name)
+    twists = case.answer * [1.0, 2.0, -0.5]
+    (axes,) = drawn(pictures._draw_centres, Drawn("pushes", [case], **{"exact surface": [twists]}))
+    where = {each.get_label(): 1e3 * np.stack([-v[:, 1], v[:, 0]], -1) / v[:, 2:] for each, v in
+             zip(axes.lines[-3:-1], (case.answer, twists), strict=True)}  # fmt: skip
+    assert list(where) == ["measured", "exact surface"]
+    for line, places in zip(axes.lines[-3:-1], where.values(), strict=True):
+        np.testing.assert_allclose(line.get_xydata(), places, rtol=1e-6)
+    for line, ends in zip(axes.lines[:25], zip(*where.values(), strict=True), strict=True):
+        np.testing.assert_allclose(line.get_xydata(), ends, rtol=1e-6)
+    feet = case.question.patch.positions
+    np.testing.assert_allclose(axes.lines[-1].get_xydata(), 1e3 * feet)
+    assert axes.get_ylim() == pytest.approx((-1.6e3 * np.abs(feet).max(), 1.6e3 * np.abs(feet).max()))
+
+
+def test_a_push_over_time_shows_where_force_and_torque_point(cases):
+    test = [case for case in cases["series"] if case.question.wanted == "wrenches"][:3]
+    longest = max(test, key=lambda case: len(case.scored))
+    number = next(i for i, case in enumerate(test) if case is longest)
+    answers = [case.answer @ np.diag([-1.0, -1.0, 2.0]) for case in test]
+    way, turn = drawn(pictures._draw_series, Drawn("series", test, ellipsoid=answers))
+    fx, fy, tau = longest.answer[longest.scored].T
+    length = push_series.LENGTH
+    for line, share in zip(turn.lines, (1.0, 2.0), strict=True):
+        angle = np.degrees(np.arctan2(share * tau, length * np.hypot(fx, fy)))
+        np.testing.assert_allclose(line.get_xydata(), np.stack([longest.question.time[longest.scored], angle], -1))
+    for line, wrench in zip(way.lines, (longest.answer, answers[number]), strict=True):
+        fx, fy, _ = wrench[longest.scored].T
+        assert np.cos(np.radians(line.get_ydata())) * np.hypot(fx, fy) == pytest.approx(fx, abs=1e-9)
+        assert np.sin(np.radians(line.get_ydata())) * np.hypot(fx, fy) == pytest.approx(fy, abs=1e-9)
+
+
+def test_peaks_are_drawn_measured_over_predicted_with_their_medians(cases):
+    test = [case for case in cases["onsets"] if np.isfinite(case.answer[3])][:12]
+    test = [case._replace(board=("feet", "flat")[i % 2]) for i, case in enumerate(test)]
+    benchmark = Drawn("onsets", test, reduced=[case.answer + 0.1 * i * np.eye(4)[3] for i, case in enumerate(test)])
+    (axes,) = drawn(pictures._draw_onsets, benchmark)
+    for lines, first in ((axes.lines[:2], 0), (axes.lines[2:4], 1)):
+        pairs = np.array([[test[i].answer[3] + 0.1 * i, test[i].answer[3]] for i in range(first, 12, 2)])
+        np.testing.assert_allclose(lines[0].get_xydata(), pairs)
+        np.testing.assert_allclose(lines[1].get_xydata(), [np.median(pairs, axis=0)])
+    assert [line.get_label() for line in axes.lines[::2][:2]] == ["feet", "flat"]
 
 
 def test_an_interrupt_keeps_what_is_done(tmp_path, capsys):

@@ -8,9 +8,11 @@ import math
 import os
 import re
 import runpy
+import sys
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,9 +20,10 @@ import pytest
 from planarfriction.cli import main
 from planarfriction.errors import FileError
 from planarfriction_studies.referee import engines, report, truths
-from planarfriction_studies.referee.case import FOLDER, all_cases, read_case
+from planarfriction_studies.referee.case import FOLDER, Body, Force, Shape, all_cases, read_case
+from planarfriction_studies.referee.engines.newton import NewtonWorld
 from planarfriction_studies.referee.export import export_case, sdf
-from planarfriction_studies.referee.pictures import film, scene
+from planarfriction_studies.referee.pictures import film, outline, scene
 from planarfriction_studies.referee.run import Apart, Kept, Verdict, judge, no_result, run
 
 CASES = all_cases()
@@ -472,6 +475,51 @@ def test_pictures_show_where_bodies_end():
     assert (x, y) == pytest.approx([1e3 * truth.value for truth in CASES["in_hand"].truths[:2]], abs=1e-9)
 
 
+def test_outlines_are_those_of_turned_and_shifted_shapes():
+    """A box off the middle of a body that turns, from above and from the side; the length of what is round."""
+    shape = Shape("box", "box", (0.2, 0.1, 0.06), (0.03, -0.02, 0.01))
+    body = Body("plate", [shape], (1.0, 2.0, 3.0))
+    turn = 0.5
+    corners = np.array([[-0.07, -0.07], [0.13, -0.07], [0.13, 0.03], [-0.07, 0.03]]) @ [1.0, 1.0j]
+    turned = np.exp(1j * turn) * corners + complex(1.04, 2.05)
+    found = outline(body, shape, 1, 0.04, 0.05, turn)
+    np.testing.assert_allclose(found @ [1.0, 1.0j], turned, atol=1e-12)
+    aside = outline(body, shape, 2, 0.04, 0.05)
+    expected = [[0.97, 2.98], [1.17, 2.98], [1.17, 3.04], [0.97, 3.04]]
+    np.testing.assert_allclose(aside, expected, atol=1e-12)
+    rod = Shape("rod", "cylinder", (0.05, 0.3), axis=(1.0, 0.0, 0.0))
+    np.testing.assert_allclose(rod.half, [0.15, 0.05, 0.05])
+    np.testing.assert_allclose(Shape("pill", "capsule", (0.05, 0.3)).half, [0.05, 0.05, 0.2])
+    coin = Shape("coin", "cylinder", (0.05, 0.01))
+    np.testing.assert_allclose(np.hypot(*(outline(body, coin, 1) - [1.0, 2.0]).T), 0.05)
+    np.testing.assert_allclose(np.ptp(outline(body, coin, 2), axis=0), [0.1, 0.01])
+    heavy = Body("box", [Shape("box", "box", (0.3, 0.2, 0.1))], mass=1.2)
+    np.testing.assert_allclose(heavy.moments, 0.1 * np.array([0.04 + 0.01, 0.09 + 0.01, 0.09 + 0.04]))
+
+
+def test_forces_act_where_and_when_a_case_says():
+    """A pull at a point of a turned body, a sine beside a ramp, an incline of its own, and the time of settling."""
+    values = [[1.0, 2.0, -3.0, 0.1, 0.2, 0.3], [3.0, 2.0, -3.0, 0.1, 0.2, 0.3]]
+    sine = {"amplitude": (0.0, 0.5, 0.0, 0.0, 0.0, 0.0), "frequency": 2.0, "phase": 0.3}
+    force = Force("a", values, (0.0, 1.0), at=(0.1, 0.05, 0.02), **sine)
+    bodies = [
+        Body("a", [], mass=2.0, centre_of_mass=(0.01, 0.0, 0.0), tilt=0.4),
+        Body("b", [], mass=3.0),
+        Body("floor", [], joint="fixed"),
+    ]
+    case = replace(CASES["stop"], bodies=bodies, forces=[force], gravity=(0.5, 0.0, -9.0))
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    places, turns = np.zeros((2, 3)), np.stack([turn, np.eye(3)])
+    pull = np.array([1.5, 2.0 + 0.5 * math.sin(math.pi + 0.3), -3.0])
+    incline = 2.0 * (-9.0 * np.array([-math.sin(0.4), 0.0, math.cos(0.4)]) - [0.5, 0.0, -9.0])
+    torque = np.cross([-0.05, 0.09, 0.02], pull) + np.array([0.1, 0.2, 0.3])
+    found = case.wrenches(0.25, places, turns)
+    np.testing.assert_allclose(found, [[*(pull + incline), *torque], np.zeros(6)], atol=1e-12)
+    settling = case.wrenches(None, places, turns)
+    down = np.cross([-0.05, 0.09, 0.02], [0.0, 0.0, -3.0])
+    np.testing.assert_allclose(settling, [[-1.0, 0.0, -3.0, *down], [-1.5, 0.0, 0.0, 0.0, 0.0, 0.0]], atol=1e-12)
+
+
 def test_films_go_to_where_an_engine_ends():
     case = CASES["stop"]
     verdicts = [
@@ -541,6 +589,60 @@ def test_the_view_of_simulators(monkeypatch, capsys, tmp_path):
     )
     assert heading == ["case", "A", "A, best", "A, patches"]
     assert row == ["stribeck", "23 mm", "1.3 mm", "< 0.001 nm"]  # 9, 0.5 and 0 times the 2.6 mm that are allowed
+
+
+class StubbedNewton:
+    """The parts of Newton that a world calls: states that hold forces and poses, and a solver that adds up forces."""
+
+    body_count = 3
+
+    def __init__(self, monkeypatch):
+        monkeypatch.setitem(sys.modules, "newton", self)
+        self.collided = []
+
+    def state(self):
+        return SimpleNamespace(body_f=Column((3, 6)), body_q=Column((3, 7)), body_qd=Column((3, 6)))
+
+    def control(self):
+        return "control"
+
+    def CollisionPipeline(self, model):
+        return SimpleNamespace(contacts=lambda: "contacts", collide=lambda state, contacts: self.collided.append(state))
+
+    def step(self, now, after, control, contacts, dt):
+        assert (control, contacts, dt) == ("control", "contacts", 2e-3)
+        after.body_q.values = now.body_q.values + now.body_f.values[:, [0, 1, 2, 3, 4, 5, 0]]
+
+
+class Column:
+    def __init__(self, shape):
+        self.values = np.zeros(shape)
+
+    def assign(self, values):
+        self.values = np.array(values)
+
+    def numpy(self):
+        return self.values
+
+
+def test_a_step_of_newton_goes_on_from_the_last_one(monkeypatch):
+    """Bodies 2 and 0 of three, whose poses grow by the forces of each step."""
+    stub = StubbedNewton(monkeypatch)
+    world = NewtonWorld(CASES["stop"], stub, [2, 0], stub, 2e-3)
+    forces = np.arange(12.0).reshape(2, 6)
+    for _ in range(3):
+        world.step(forces)
+    positions, _ = world.poses()
+    np.testing.assert_array_equal(positions, 3.0 * forces[:, :3])
+    assert len({id(state) for state in stub.collided}) == 2  # in turn
+    half = np.sqrt(0.5)
+    first, last = [1.0, 2.0, 3.0, 0.0, 0.0, half, half], [4.0, 5.0, 6.0, half, 0.0, 0.0, half]
+    world._now.body_q.values = np.array([first, 7 * [0.0], last])
+    positions, turns = world.poses()
+    np.testing.assert_array_equal(positions, [[4.0, 5.0, 6.0], [1.0, 2.0, 3.0]])
+    about_x = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
+    about_z = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    np.testing.assert_allclose(turns, [about_x, about_z], atol=1e-12)
 
 
 SOURCES = {

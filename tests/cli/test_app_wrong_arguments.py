@@ -83,6 +83,13 @@ def test_numbers(capsys, command, value):
     assert len(fails(capsys, *command, value)) < 300 + len(value[:5000]) * value.isdigit()
 
 
+@pytest.mark.parametrize("name", ["make", "model", "options", "self"])
+@pytest.mark.parametrize("command", ["run", "sweep"])
+def test_names_of_no_value(capsys, command, name):
+    told = fails(capsys, command, "in-hand", "--set", f"{name}=1")
+    assert told.startswith(f"error: {name} must name a value of the scene")
+
+
 @pytest.mark.parametrize("value", ["", "  ", LONG, "nan", "é", "\udcff", "a\0b", "plain", "none.csv", "folder.csv"])
 @pytest.mark.parametrize(
     "command",

@@ -14,11 +14,12 @@ import planarfriction as pf
 from planarfriction.errors import FileError, FrictionError, InvalidValueError
 from planarfriction.laws import LAWS
 from planarfriction.patch import PUBLISHED_PATCHES
+from planarfriction.plots.limit_surface import scaled_samples
 from planarfriction_explorer import code, films, pictures
 from planarfriction_explorer.drawing import MOST_SIDE, Drawing
 from planarfriction_explorer.films import film, read_scene, ready_scene
 from planarfriction_explorer.ladder import RUNGS, climb, motion
-from planarfriction_explorer.state import State, answer, law_parameters
+from planarfriction_explorer.state import PRESETS, State, answer, law_parameters
 
 PAINTED = Drawing.published("Square").painted(0.004, 0.002, radius=0.003, pressure=0.4)
 
@@ -196,7 +197,11 @@ def test_arrows_of_slip_turn_about_the_centre_on_loaded_cells():
     x0, y0, x1, y1 = (np.array(arrows[name]) for name in ("x0", "y0", "x1", "y1"))
     along, lever = np.stack([x1 - x0, y1 - y0]), np.stack([x0 - 2.0, y0 - 1.0])
     assert len(x0) > 2 and np.abs(y0).max() < 1.5
-    np.testing.assert_allclose((along * lever).sum(axis=0), 0.0, atol=1e-12)
+    step = 2e3 * state.drawing.cell_size  # every second of 21 columns has an arrow, and the fastest one is as long
+    np.testing.assert_allclose(along, step * np.stack([-lever[1], lever[0]]) / np.hypot(*lever).max(), atol=1e-12)
+    assert np.diff(np.unique(x0.round(9))).min() == pytest.approx(step)
+    np.testing.assert_allclose(np.sin(arrows["angle"]), -along[0] / np.hypot(*along), atol=1e-12)  # 0 points up
+    np.testing.assert_allclose(np.cos(arrows["angle"]), along[1] / np.hypot(*along), atol=1e-12)
 
 
 def test_the_force_is_drawn_as_it_acts_and_the_mark_where_nothing_moves():
@@ -207,6 +212,9 @@ def test_the_force_is_drawn_as_it_acts_and_the_mark_where_nothing_moves():
     shares = pictures.REACH * 1e3 * PAINTED.width * found.points[:, :2].T
     np.testing.assert_allclose(along, shares, rtol=1e-12)
     np.testing.assert_allclose([arrows["x0"][0], arrows["y0"][0]], 1e3 * PAINTED.surface.centre_of_pressure)
+    wide = State(Drawing(np.ones((4, 6)), 2e-3), twist=(0.01, 0.02, 0.0))
+    arrows = pictures.wrench_arrows(wide, answer(wide))
+    np.testing.assert_allclose(np.hypot(arrows["x1"], arrows["y1"])[1:], 0.4 * 12.0, rtol=1e-9)  # of 12 mm x 8 mm
     assert pictures.points_of_interest(state) == {"x": [pytest.approx(2.0)], "y": [pytest.approx(-6.0)]}
 
 
@@ -219,6 +227,50 @@ def test_moving_the_twist_leaves_the_drawn_surface_as_it_is():
     assert named[:2] == ["limit surface", "ellipsoid"] and len(named) == 5  # plotly leaves surfaces out by itself
     for trace, point in zip(moved["data"][2:], answer(state).points, strict=True):
         assert [trace[axis][1] for axis in "xyz"] == pytest.approx(point.tolist())
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_the_surface_is_that_of_the_map_and_the_wires_are_a_sphere(quick):
+    shell, wires = pictures.surface_figure(State(PAINTED), quick=quick)["data"][:2]
+    kind = pf.LimitSurfaceCells if quick else pf.LimitSurfaceTable
+    polar, azimuth = np.linspace(0.0, np.pi, 37)[:, None], np.linspace(0.0, 2.0 * np.pi, 73)[None]
+    _, mesh = scaled_samples(kind(PAINTED.patch), polar, azimuth)
+    np.testing.assert_allclose(np.stack([shell[each] for each in "xyz"], -1), mesh, atol=1e-12)
+    np.testing.assert_array_equal(shell["surfacecolor"], shell["z"])
+    points = np.stack([wires[each] for each in "xyz"], -1)
+    rings, spokes = np.split(points, [7 * 74])  # 7 circles of 73 points and a gap, 13 half circles of 37
+    assert len(spokes) == 13 * 38
+    np.testing.assert_allclose(np.linalg.norm(points[np.isfinite(points[:, 0])], axis=1), 1.0, atol=1e-9)
+    height = rings.reshape(7, 74, 3)[:, :-1, 2]
+    np.testing.assert_allclose(height, np.tile(-np.cos(np.linspace(0.0, np.pi, 7))[:, None], (1, 73)), atol=1e-9)
+    around = spokes.reshape(13, 38, 3)[:, 1:-2]
+    turns = np.unwrap(np.arctan2(-around[..., 1], -around[..., 0]), axis=0)
+    np.testing.assert_allclose(turns, np.tile(np.linspace(0.0, 2.0 * np.pi, 13)[:, None], (1, 35)), atol=1e-9)
+
+
+def test_the_table_has_the_power_and_the_largest_errors():
+    state = State(PAINTED, normal_force=3.0, twist=(0.01, 0.02, 0.0))
+    found, (force, angle) = answer(state), PAINTED.largest_errors
+    said = pictures.numbers_table(state, found, 0.0123)
+    assert "none, no spin" in said and f"power: {1e3 * found.power:.4g} mW" in said and "in 12.3 ms" in said
+    assert f"off by {found.force_error:.3f} of" in said and f"by {found.angle_error:.1f}° in the twist" in said
+    assert 0.0 < found.force_error < force and f"by up to {force:.3f} and {angle:.1f}°" in said
+
+
+def test_the_errors_of_the_grid_are_those_of_the_patch():
+    patch = PAINTED.patch
+    said = pictures.grid_line(State(PAINTED))
+    assert f"cells of this grid: {patch.grid_error()}; " in said and f"{patch.grid_error(refined=3)}.</p>" in said
+    assert "many cells" in pictures.grid_line(State(Drawing(np.ones((27, 27)), 1e-3)))
+
+
+def test_the_examples_are_a_fingertip_an_angle_and_a_box():
+    finger, foot, box = (state.drawing for state in list(PRESETS.values())[1:])
+    assert (finger.width, foot.width, box.width, box.height) == pytest.approx((0.014, 0.06, 0.15, 0.1))
+    x, y = np.meshgrid(*[np.linspace(-6.75, 6.75, 28)] * 2)
+    np.testing.assert_allclose(finger.pressures, np.sqrt(np.clip(1 - (x**2 + y**2) / 49, 0, None)), atol=6e-4)
+    assert foot.pressures.sum() == 24 * 24 - 16 * 16 and not foot.pressures[:16, 8:].any()
+    np.testing.assert_allclose(box.pressures, np.tile(0.2 + 0.8 * np.arange(30) / 29, (20, 1)), atol=6e-4)
 
 
 def test_the_section_of_a_disc_ends_at_its_force_and_its_torque():
@@ -323,6 +375,24 @@ def test_the_ladder_moves_with_the_twist_and_turns_round():
     state = State(twist=(0.01, -0.02, 3.0))
     np.testing.assert_allclose(motion(state)(0.08), state.twist)
     np.testing.assert_allclose(motion(state)(0.18), np.negative(state.twist))
+    np.testing.assert_allclose(motion(state)(0.0125), np.multiply(0.25, state.twist))
+    np.testing.assert_allclose(motion(state)(0.125), 0.0, atol=1e-12)
+
+
+def test_the_error_of_a_rung_is_a_distance_in_units_of_the_limit():
+    state = State(Drawing(np.array([[1.0, 2.0, 0.5]]), 4e-3), pf.Dahl(mu_c=0.5), 3.0, (0.01, -0.02, 3.0))
+    found = {each.name: each for each in climb(state)}["reduced, as published"]
+    runs = []
+    for kind in (pf.DistributedModel, pf.ReducedModelPublished):
+        model, wrenches = kind(state.drawing.patch, state.law), []
+        bristles = model.rest()
+        for middle in np.arange(5e-4, 0.2, 1e-3):
+            bristles, wrench = model.step(bristles, motion(state)(middle), 3.0, 1e-3)
+            wrenches.append(wrench)
+        runs.append(np.array(wrenches))
+    scale = 0.5 * 3.0 * np.array([1.0, 1.0, state.drawing.surface.contact_radius])
+    expected = np.sqrt((((runs[1] - runs[0]) / scale) ** 2).sum(axis=1).mean())
+    assert found.error == pytest.approx(expected, rel=0.05)  # wrenches in the middle of steps of a millisecond
 
 
 def test_models_are_compared_with_the_distributed_one():

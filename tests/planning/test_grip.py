@@ -13,7 +13,7 @@ import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from planarfriction.planning import holding_load, plan_grip
 from planarfriction.planning.grip import _bounds
-from planarfriction.planning.motions import Aim, Grips, load_on, slide_of
+from planarfriction.planning.motions import Aim, Grips, grip_position, load_on, slide_of
 from planarfriction.planning.report import report_of
 from tests.support.repository import script
 
@@ -122,6 +122,40 @@ def test_slopes_of_ends_are_differences():
     step = 1e-3 * np.eye(3)
     differences = np.stack([(vector(each) - vector(-each)) / 2e-3 for each in step], axis=1)
     assert (np.abs(slopes - differences) < 1e-3 * np.abs(differences).max(axis=1)[:, None]).all()
+
+
+@pytest.mark.parametrize("mounted_on", ["world", "body"])
+def test_ends_and_loads_of_a_scene_that_is_seen_turned_are_turned(mounted_on):
+    """A pad off the origin on a plate that is pulled, seen from axes turned by 0.5: rounding and 1e-5 of the solver."""
+    turn, profile = 0.5, pf.Signal.constant(0.5)
+    patch = pf.ContactPatch.rectangle(0.02, 0.01, cells=6)
+    pad = {"count": 2, "mounted_on": mounted_on, "position": (0.01, 0.02), "angle": 0.2}
+    for_one = pf.Contact(pf.ReducedModel(patch, LAW), 3.0, **pad)
+    body = pf.Body(0.2, 3e-4, position=(0.03, -0.01), angle=0.3, gravity=(0.0, -9.81))
+    ends, loads = [], []
+    for by in (0.0, turn):
+        seen = dataclasses.replace(
+            body,
+            position=tuple(pf.geometry.rotate(np.array(body.position), by)),
+            angle=body.angle + by,
+            gravity=tuple(pf.geometry.rotate(np.array(body.gravity), by)),
+        )
+        contact = for_one
+        if mounted_on == "world":
+            place = tuple(pf.geometry.rotate(np.array(for_one.position), by))
+            contact = dataclasses.replace(for_one, position=place, angle=for_one.angle + by)
+        scene = pf.Scene(seen, contact, 0.1)
+        ends.append(Grips(scene, 0, [1.0]).ends(profile, [1.0])[0])
+        loads.append(load_on(scene, 0, 0.2, pf.geometry.rotate(np.array([0.004, -0.002]), by), 0.0))
+    speed, slide = pf.geometry.rotate(ends[0][:2], turn), pf.geometry.rotate(ends[0][3:5], turn)
+    assert ends[1] == pytest.approx([*speed, ends[0][2], *slide, ends[0][5]], abs=1e-5)
+    assert abs(ends[0][5]) > 1e-3 and np.hypot(*ends[0][3:5]) > 1e-4
+    assert loads[1] == pytest.approx(loads[0], abs=1e-9)
+    away = np.array(body.position) - grip_position(pf.Scene(body, for_one, 0.1), 0)
+    arm = pf.geometry.rotate(away, 0.2) + np.array([0.004, -0.002])  # the pad stays where it is
+    if mounted_on == "world":  # half the weight, about the pad, in its axes
+        force = pf.geometry.rotate(np.array([0.0, -0.981]), -for_one.angle)
+        assert loads[0] == pytest.approx([*force, -0.981 * arm[0]], abs=1e-9)
 
 
 def test_misses_count_what_was_wanted():

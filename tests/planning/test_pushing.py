@@ -11,7 +11,7 @@ import planarfriction as pf
 from planarfriction.planning import Pusher, Slider, motion_cone, plan_push, push
 from planarfriction.planning.contact_modes import TouchPoint, motion_at
 from planarfriction.planning.push_plans import PushReport
-from planarfriction.planning.touch import CORNER, END, FACE, Scenery, Touch, flush_after
+from planarfriction.planning.touch import CORNER, END, FACE, Scenery, Touch, flush_after, place_of, touch_after
 
 HALF = 0.045
 SQUARE = np.array([[-HALF, -HALF], [HALF, -HALF], [HALF, HALF], [-HALF, HALF]])
@@ -223,6 +223,97 @@ def test_a_face_turns_about_its_end_or_about_the_corner_within(width, left, righ
     assert (low, high) == pytest.approx((max(HALF - 0.5 * width, 0.0), min(HALF + 0.5 * width, 2.0 * HALF)))
 
 
+UNEVEN = np.array([[-0.05, -0.03], [0.02, -0.04], [0.06, 0.01], [-0.02, 0.05]])
+
+
+def test_the_geometry_of_a_push_is_that_of_complex_numbers():
+    """A quadrilateral without symmetry, turned, and a face that turns along a path of two pieces."""
+    times = np.array([1.0, 2.0, 4.0])
+    poses = np.array([[-0.12, 0.03, 0.1], [-0.08, 0.02, 0.3], [-0.02, 0.06, 0.2]])
+    thing = Slider(pf.LimitSurfaceEllipsoid(PATCH), UNEVEN)
+    scenery, q, t, width = Scenery(thing, Pusher(MU, 0.03), times, poses), np.array([0.01, -0.02, 0.4]), 2.5, 0.03
+    x, y, angle = pose = poses[1] + 0.25 * (poses[2] - poses[1])
+    rate = 0.5 * (poses[2] - poses[1])
+    assert scenery.pose(t) == pytest.approx(pose) and scenery.pose(1.5) == pytest.approx(0.5 * (poses[0] + poses[1]))
+    assert scenery.rate(t) == pytest.approx(rate) and scenery.rate(2.0) == pytest.approx(poses[1] - poses[0])
+    assert scenery.rate(2.0, forward=True) == pytest.approx(rate)
+    assert (scenery.piece_end(1.0), scenery.piece_end(2.0), scenery.path_end) == (2.0, 4.0, 4.0)
+    pusher, body = complex(x, y), complex(q[0], q[1])
+    ends = (pusher + np.exp(1j * angle) * 0.5j * width * np.array([-1.0, 1.0]) - body) * np.exp(-1j * q[2])
+    for i, end in enumerate(ends):
+        assert scenery.end(i, t, q) == pytest.approx((end.real, end.imag))
+    corners = (body + np.exp(1j * q[2]) * (UNEVEN @ [1.0, 1j]) - pusher) * np.exp(-1j * angle)
+    assert scenery.corners(t, q) == pytest.approx(np.stack([corners.real, corners.imag], -1))
+    corner, edge = UNEVEN[3], UNEVEN[0] - UNEVEN[3]  # the edge on the left leads from corner 3 down to 0
+    length = np.hypot(*edge)
+    along = np.array([(np.array([end.real, end.imag]) - corner) @ edge / length for end in ends])
+    assert scenery.overlap(3, t, q) == pytest.approx((max(along[1], 0.0), min(along[0], length)))
+    assert scenery.within(Touch(FACE, 3), t, q) == pytest.approx(min(along[0], length) - max(along[1], 0.0))
+    assert scenery.within(Touch(END, 3, 0), t, q) == pytest.approx(min(along[0], length - along[0]))
+    assert scenery.within(Touch(CORNER, 3), t, q) == pytest.approx(0.5 * width - abs(corners[3].imag))
+    normal = np.array([-edge[1], edge[0]]) / length
+    middle = corner + 0.5 * (max(along[1], 0.0) + min(along[0], length)) * edge / length
+    faces = np.exp(1j * (angle - q[2]))
+    half = 0.5 * (min(along[0], length) - max(along[1], 0.0))
+    for touch, at, inwards, wide in (
+        (Touch(END, 3, 1), np.array([ends[1].real, ends[1].imag]), normal, 0.0),
+        (Touch(CORNER, 2), UNEVEN[2], np.array([faces.real, faces.imag]), 0.0),
+        (Touch(FACE, 3), middle, normal, half),
+    ):
+        place, velocity = place_of(scenery, touch, t, q)
+        assert place.at == pytest.approx(at) and place.normal == pytest.approx(inwards)
+        assert place.half_width == pytest.approx(wide)
+        arm = body + np.exp(1j * q[2]) * complex(*at) - pusher
+        moves = (complex(rate[0], rate[1]) + 1j * rate[2] * arm) * np.exp(-1j * q[2])
+        assert velocity == pytest.approx((moves.real, moves.imag, rate[2]))
+
+
+def test_a_face_is_flush_with_the_edge_that_it_looks_at():
+    thing, q = Slider(pf.LimitSurfaceEllipsoid(PATCH), UNEVEN), np.array([0.01, -0.02, 0.4])
+    for edge, (x, y) in enumerate(thing.inward):
+        for off in (5e-5, -5e-5, 2e-4):
+            path = np.array([[-0.1, 0.0, np.arctan2(y, x) + 0.4 + off]] * 2)
+            scenery = Scenery(thing, Pusher(MU, 0.03), np.array([0.0, 1.0]), path)
+            if abs(off) < 1e-4:
+                assert scenery.flush(Touch(CORNER, edge), 0.5, q) == Touch(FACE, edge)
+            else:
+                with pytest.raises(pf.FrictionError, match="not wedge the slider"):
+                    scenery.flush(Touch(CORNER, edge), 0.5, q)
+
+
+def test_a_pusher_that_is_away_reaches_the_slider_no_sooner_than_it_can():
+    path = np.array([[-0.2, 0.0, 0.0], [-0.1, 0.0, 1.0]])
+    scenery = Scenery(slider(), Pusher(MU, 0.02), np.array([0.0, 2.0]), path)
+    # a gap of 155 mm; ends move at 50 mm/s and at 0.5 rad/s with 10 mm
+    assert scenery.not_before(0.0, np.zeros(3)) == 2.0
+    near = Scenery(slider(), Pusher(MU, 0.02), np.array([0.0, 2.0]), path + np.array([0.1, 0.0, 0.0]))
+    assert near.not_before(0.0, np.zeros(3)) == pytest.approx(0.055 / (0.05 + 0.005))
+    at, touch = touch_after(near, 0.0, np.zeros(3))
+    # the right end leads: -0.1 + 0.05 t + 0.01 sin(0.5 t) = -0.045
+    assert -0.1 + 0.05 * at + 0.01 * np.sin(0.5 * at) == pytest.approx(-HALF, abs=1e-9)
+    assert touch == Touch(END, 3, 0)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+def test_a_flush_face_that_slides_pushes_along_the_edge_of_its_friction_cone(side, turn):
+    """Without a turn an ellipsoid moves along the force, which passes through its centre, at the normal velocity."""
+    cos, sin = np.cos(turn), np.sin(turn)
+    world = np.array([[cos, -sin], [sin, cos]])
+    place = TouchPoint(world @ [-HALF, 0.01 * side], world @ [1.0, 0.0], half_width=0.04)
+    velocity = np.array([*(world @ [0.1, 0.08 * side]), 0.0])
+    found = motion_at(SURFACES["ellipsoid"], place, MU, velocity)
+    assert found.mode == ("slide left" if side > 0.0 else "slide right")
+    assert found.twist == pytest.approx([*(world @ [0.1, 0.1 * MU * side]), 0.0], abs=1e-9)
+    force = world.T @ found.force / np.hypot(*found.force)
+    assert force == pytest.approx(np.array([1.0, MU * side]) / np.hypot(1.0, MU))
+    # it crosses the face 0.3 x 45 mm beside the centre, on the other side; and slides at 50 of 128 mm/s
+    assert found.slack == pytest.approx(min(0.05 / np.hypot(0.1, 0.08), 1.0 - (0.01 + MU * HALF) / 0.04), abs=1e-9)
+    assert found.leans == 0
+    narrow = motion_at(SURFACES["ellipsoid"], place._replace(half_width=0.02), MU, velocity)
+    assert narrow.leans == -side  # about its right end, where it slides to the left
+
+
 # ---------------------------------------------------------------------- what is refused
 
 
@@ -246,6 +337,14 @@ def test_bad_input_is_refused_in_one_line():
         with pytest.raises(pf.FrictionError, match=words) as caught:
             call()
         assert "\n" not in str(caught.value)
+
+
+def test_polygons_with_an_edge_along_an_axis_are_sliders_and_stars_are_not():
+    corners = 0.05 * np.exp(2j * np.pi * (np.arange(5) - 0.5) / 5)  # one edge stands upright on the right
+    corners = np.stack([corners.real, corners.imag], -1)
+    assert Slider(SURFACES["exact"], corners).inward[0] == pytest.approx([-1.0, 0.0], abs=1e-12)
+    with pytest.raises(pf.FrictionError, match="outline must be convex"):
+        Slider(SURFACES["exact"], corners[[0, 2, 4, 1, 3]])
 
 
 def test_sliders_take_outlines_of_either_sense():

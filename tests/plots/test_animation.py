@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import re
 import subprocess
 
@@ -236,6 +237,81 @@ def test_the_outline_is_drawn_where_the_body_is():
     assert drawn[:4] == pytest.approx(1e3 * synthetic.PLATE @ turn.T + np.array([2.0, -20.0]), abs=1e-6)
 
 
+def test_a_frame_draws_and_says_where_body_and_contacts_are():
+    """A pad off the centre of mass on a turned contact, with its centre of pressure beside the origin of its frame."""
+    patch = pf.patch.PUBLISHED_PATCHES["LineGrad"]()
+    scene = synthetic.scene(contacts=2, mounted_on="body", patch=patch)
+    contacts = [
+        dataclasses.replace(each, angle=0.5, position=(0.03, 0.01 * i)) for i, each in enumerate(scene.contacts)
+    ]
+    run = synthetic.solution(dataclasses.replace(scene, contacts=contacts))
+    run = changed(run, x=0.002 + 0.003 * np.asarray(run.data["time"]))
+    film = film_of(run)
+    film.show(3)  # 1.5 s
+    x, y, theta = 0.002 + 0.0045, -0.005 * 1.5**2, -0.3 * 1.5**2
+    times = np.linspace(0.0, 1.5, 4)
+    path = 1e3 * np.stack([0.002 + 0.003 * times, -0.005 * times**2], -1)
+    assert film.path.get_xydata() == pytest.approx(path, abs=1e-9)
+
+    def turned(points, angle):
+        return points @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+
+    for contact, (_, cells, arrow) in zip(contacts, film.contacts, strict=True):
+        origin = np.array([x, y]) + turned(np.array(contact.position), theta)
+        drawn = np.array([polygon.vertices[:4].mean(axis=0) for polygon in cells.get_paths()])
+        drawn = (cells.get_transform() - film.axes.transData).transform(drawn)
+        assert drawn == pytest.approx(1e3 * (origin + turned(patch.positions, theta + 0.5)), abs=1e-6)
+        start = 1e3 * (origin + turned(patch.centre_of_pressure(), theta + 0.5))
+        assert arrow._posA_posB[0] == pytest.approx(start, abs=1e-9)
+    assert film.words.get_text() == "moved by x 4.50 mm, y -11.25 mm, turned by -38.67 deg"
+    assert film.clock.get_text() == "t = 1.50 s"
+    longest = max(np.hypot(*each.forces.T).max() for each in film.track.contacts)
+    side = np.diff(film.views[0], axis=-1).min()
+    assert film.millimetres_per_newton * longest == pytest.approx(0.3 * side)
+    assert f"(longest {longest:.3g} N)" in film.figure.legends[0].get_texts()[0].get_text()
+
+
+def test_the_wrench_is_drawn_with_its_shadow_and_its_tail():
+    run = synthetic.solution()
+    film = film_of(run, frames=41)
+    (panel,) = panels(film, SurfacePanel)
+    panel.show(30)
+    fx, fy, _ = head = panel.points[30]
+    names = [float(run.data[name][150, 0]) for name in ("fx", "fy", "tau")]
+    radius = run.scene.contacts[0].model.patch.contact_radius()
+    assert head == pytest.approx(np.array(names) / 2.0 / [1.0, 1.0, radius], rel=2e-3)  # exact radius, of cells here
+    assert np.ravel(panel.head.get_data_3d()) == pytest.approx(head)
+    assert pytest.approx(panel.points[5:31]) == np.asarray(panel.tail.get_data_3d()).T
+    assert pytest.approx(np.array([[0.0, 0.0, 0.0], head])) == np.asarray(panel.arm.get_data_3d()).T
+    floor = panel.axes.get_zlim()[0]
+    assert pytest.approx(np.array([[fx, fy, floor]] * 2)) == np.asarray(panel.shadow.get_data_3d()).T
+
+
+def test_cells_are_pale_unbent_blue_bent_and_orange_where_they_slip():
+    film = film_of(synthetic.solution(synthetic.scene(patch=pf.ContactPatch.rectangle(0.04, 0.01, 8))))
+    (panel,) = panels(film, CellPanel)
+    bent, slips = panel.track.slip
+    bent[2], slips[2] = np.linspace(0.0, 1.2, bent.shape[1]), np.arange(bent.shape[1]) % 3 == 0
+    panel.show(2)
+    expected = np.where(slips[2], 1.0, 0.89 * np.minimum(bent[2], 1.0))
+    assert np.asarray(panel.cells.get_array()) == pytest.approx(expected)
+    assert (*panel.axes.get_xlim(), *panel.axes.get_ylim()) == pytest.approx((-22.4, 22.4) * 2)
+    twist = panel.track.twists[2]
+    centre = (-1e3 * twist[1] / twist[2], 1e3 * twist[0] / twist[2])
+    assert panel.centre.get_xydata()[0] == pytest.approx(centre, abs=1e-9)
+
+
+def test_a_frame_without_load_has_the_surface_of_the_last_load_before():
+    run = soft_finger()
+    run = changed(run, normal_force=np.repeat([0.0, 1.0, 0.0, 3.0, 0.0], 41)[:201, None])
+    (panel,) = panels(film_of(run), SurfacePanel)
+    low, high = (round(np.log(load) / np.log(1.15)) for load in (1.0, 3.0))
+    assert [panel.level(frame) for frame in range(5)] == [low, low, low, high, high]
+    assert {level: float(load) for level, load in panel.levels.items()} == pytest.approx(
+        {low: 1.15**low, high: 1.15**high}
+    )
+
+
 def test_a_patch_in_steady_sliding_has_its_wrench_on_the_limit_surface():
     patch = pf.patch.PUBLISHED_PATCHES["NonConvex2"]()
     run = synthetic.solution(synthetic.scene(patch=patch))
@@ -288,6 +364,12 @@ def test_the_share_that_slips_is_that_of_the_load():
     panel.show(2)
     share = 100.0 * slips[2].sum() / slips.shape[1]
     assert panel.words.get_text() == f"pad: {share:.0f} % of the load slips"
+    panel = panels(film_of(synthetic.solution(synthetic.scene(contacts=2))), CellPanel)[1]
+    panel.track = dataclasses.replace(
+        panel.track, contact=dataclasses.replace(panel.track.contact, name="long" + 8 * " long")
+    )
+    panel.show(0)
+    assert panel.words.get_text().startswith("long long long long...: ")
 
 
 # ---------------------------------------------------------------------- the view
@@ -305,7 +387,10 @@ def sides(film: Film) -> np.ndarray:
 def test_the_view_follows_a_body_that_goes_far():
     film = film_of(far())
     assert np.ptp(sides(film), axis=0) == pytest.approx(np.zeros(2), abs=1e-9)
-    assert sides(film)[0].max() < 500.0  # mm; the way is a metre
+    reach = np.hypot(75.0, 40.0)
+    assert sides(film)[0].min() == pytest.approx(2.3 * reach)  # mm; the way is a metre
+    middle = film.views.mean(axis=-1)
+    assert middle[1:4, 0] == pytest.approx(1e3 * film.track.poses[1:4, 0])
     for frame, pose in enumerate(film.track.poses):
         low, high = film.views[frame].T
         reach = 1e3 * np.hypot(0.075, 0.04)
@@ -402,6 +487,28 @@ def test_a_gif_has_its_frames_at_their_pace(tmp_path):
     # frames that are alike may be one: their times add up, to the hundredth of a second that GIF counts
     assert sum(durations) == pytest.approx(1e3 * (10 / 30.0 + film_files.LAST), abs=10)
     assert max(seen) == pytest.approx(0.3)
+
+
+def coloured(number: int) -> np.ndarray:
+    """A frame of 60 x 40 pixels: white, two frequent colours, and 30 rare ones that change from frame to frame."""
+    pixels = np.full((60, 40, 3), 255, dtype=np.uint8)
+    pixels[:20], pixels[20:30] = (0, 114, 178), (230, 97, 0)
+    rare = 7 * np.arange(30) + 211 * number
+    pixels[50:].reshape(-1, 3)[:30] = np.stack([rare % 256, rare // 7 % 256, rare // 3 % 256], -1)
+    return pixels
+
+
+def test_frequent_colours_are_kept_and_rare_ones_are_near(tmp_path):
+    path, file = tmp_path / "colours.gif", io.BytesIO()
+    film_files.write_frames(path, file, coloured, 8, 10.0)
+    with Image.open(file) as image:
+        assert image.n_frames == 8 and image.info["loop"] == 0
+        for number in range(8):
+            image.seek(number)
+            assert image.info["duration"] == (100 if number < 7 else 1100)
+            off = np.abs(np.asarray(image.convert("RGB"), dtype=int) - coloured(number).astype(int))
+            assert off[:50].max() == 0
+            assert off.reshape(-1, 3)[2000:2030].mean() < 30.0  # 22: medians of 256 boxes
 
 
 def test_an_html_file_plays_by_itself(tmp_path):

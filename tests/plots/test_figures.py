@@ -157,6 +157,8 @@ def test_the_ellipsoid_beside_the_surface_is_a_sphere_in_equal_limits(monkeypatc
     surface = pf.LimitSurfaceCells(PUBLISHED_PATCHES["LineGrad"]())
     figure = plots.plot_limit_surface(surface)
     own, ellipsoid = figure.axes
+    soft = pf.ContactPatch.disc(0.02, 9, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.01))
+    assert len(plots.plot_limit_surface(pf.LimitSurfaceCells(soft, normal_force=2.0)).axes) == 2  # both at its load
     for axes in figure.axes:
         assert (axes.get_xlim(), axes.get_ylim(), axes.get_zlim()) == (own.get_xlim(),) * 3
         assert axes.get_zlabel() == "$\\tau/r$ [-]"
@@ -327,6 +329,36 @@ def test_pads_are_drawn_with_what_they_are_fixed_to(mounted_on, times):
     path = axes.patches[-1].get_path().vertices.reshape(317, 5, 2)
     assert path[:, :4].mean(axis=(0, 1)) == pytest.approx([0.0, 0.0], abs=1e-6)
     assert np.ptp(path[..., 0]) == pytest.approx(20.0, abs=1e-6)
+
+
+def test_pads_and_the_path_are_drawn_where_they_are():
+    scene = synthetic.scene(contacts=2, mounted_on="body", patch=pf.ContactPatch.rectangle(0.02, 0.01, 6))
+    contacts = [
+        dataclasses.replace(each, angle=0.5, position=(0.03 * i, 0.01)) for i, each in enumerate(scene.contacts)
+    ]
+    run = synthetic.solution(dataclasses.replace(scene, contacts=contacts))
+    run = with_values(run, x=0.002 + 0.01 * run.data["time"].values)
+    axes = plots.plot_motion(run).axes[0]
+    poses = np.stack([run.data[name].values for name in ("x", "y", "theta")], -1)
+    (line,) = [each for each in axes.lines if len(each.get_xdata()) == len(poses)]
+    assert line.get_xydata() == pytest.approx(1e3 * poses[:, :2], abs=DRAWING)
+    strobe = poses[np.linspace(0, 200, 12).round().astype(int)]
+    (dots,) = [each for each in axes.collections if len(each.get_offsets()) == 12]
+    assert np.asarray(dots.get_offsets()) == pytest.approx(1e3 * strobe[:, :2], abs=DRAWING)
+    pads = [(each.get_transform() - axes.transData).transform(each.get_path().vertices) for each in axes.patches]
+    for pad, (contact, pose) in zip(pads, ((each, pose) for pose in strobe for each in contacts), strict=True):
+        middle = pose[:2] + pf.geometry.rotate(np.array(contact.position), pose[2])
+        assert pad.reshape(-1, 5, 2)[:, :4].mean(axis=(0, 1)) == pytest.approx(1e3 * middle, abs=1e-6)
+        corner = middle + pf.geometry.rotate(np.array([0.01, 0.005]), pose[2] + 0.5)
+        assert np.abs(pad - 1e3 * corner).sum(axis=1).min() < 1e-6
+
+
+def test_a_motion_that_cannot_be_seen_says_how_far_it_goes():
+    run = resting()
+    time = run.data["time"].values
+    run = with_values(run, x=2e-6 * time, y=-1e-6 * time, theta=np.radians(1e-3) * time)
+    title = plots.plot_motion(run).axes[0].get_title(loc="left")
+    assert title == "moves by up to 4.5 µm, turns by up to 35 µrad"
 
 
 @pytest.mark.parametrize("mounted_on", ["world", "body"])
@@ -590,6 +622,7 @@ def test_a_body_that_is_tiny_beside_its_path_is_drawn_larger_and_says_so():
     times = float(figure.axes[0].get_title(loc="left").split()[2])
     plate = outlines(figure)[0]
     assert np.ptp(plate, axis=0) == pytest.approx(times * np.array([150.0, 80.0]), rel=1e-6)
+    assert labels(figure.axes[0]) == {"x [km]", "y [km]"}  # 30 km along x, and less along y
     assert plots.plot_motion(synthetic.solution()).axes[0].get_title(loc="left") == ""
     assert plots.plot_motion(resting()).axes[0].get_title(loc="left") == "it does not move"
 

@@ -9,7 +9,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import FileError, InvalidValueError
-from planarfriction.scenes.slip import _stretches
+from planarfriction.scenes.slip import _stretches, centres, reach, slip_fraction
 
 PATCH = pf.ContactPatch.disc(0.01, cells=7)
 LAW = pf.LuGre(mu_c=0.5, sigma_0=1e5, sigma_1=300.0, sigma_2=0.0, elasto_plastic=0.9)
@@ -70,6 +70,40 @@ def test_slow_is_not_stuck():
     assert 0.9 * full < event.onset < full * 1.1
     assert event.end == 3.0
     assert event.path == pytest.approx(speed * (3.0 - event.onset), rel=1e-6)
+
+
+def test_the_path_of_a_slip_is_that_of_the_centre_of_pressure():
+    """A patch whose load lies beside the origin of its frame, about which it turns while it slides along y."""
+    patch = pf.ContactPatch.from_pressure([[1.0, 0.0, 5.0], [1.0, 0.0, 0.0]], 4e-3)
+    twist, (x, y) = (0.0, 0.01, -2.0), patch.centre_of_pressure()
+    scene = pf.scenes.driven(pf.DistributedModel(patch, LAW), twist=twist, at="origin", t_end=0.5)
+    (event,) = pf.simulate(scene, bristles="all", save_every=1e-3).slip_events()
+    lasts = event.end - event.onset
+    assert event.end == 0.5 and event.onset < 0.002
+    assert event.path == pytest.approx(np.hypot(2.0 * y, 0.01 - 2.0 * x) * lasts, rel=1e-3)
+    assert event.angle == pytest.approx(-2.0 * lasts, rel=1e-3)
+    assert reach(patch) == pytest.approx(np.hypot(4e-3 + 4e-3 / 3, 2e-3 - 2e-3 / 3), rel=1e-9)
+
+
+def test_the_share_that_slips_counts_loads():
+    """Plain bristles without a damper: one cell at full deflection, of a load of 1 or 3 of 4, and one unbent."""
+    law = pf.LuGre(mu_c=0.5, mu_s=0.5, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0)
+    model = pf.DistributedModel(pf.ContactPatch.from_pressure([[1.0, 3.0]], 4e-3), law)
+    twist, full = np.array([[0.01, 0.0, 0.0]] * 4), 0.5 / 1e5
+    states = np.zeros((4, 2, 2))
+    states[0, 0, 0], states[1, 0, 1], states[2, 0] = full, full, full
+    share = slip_fraction(model, states, twist, np.array([2.0, 2.0, 2.0, 0.0]))
+    assert share == pytest.approx(np.sqrt([0.25, 0.75, 1.0, 1.0]), rel=1e-9)
+    assert slip_fraction(model, states, 0.0 * twist, np.ones(4)) == pytest.approx(np.zeros(4))
+
+
+def test_centres_follow_the_load_and_stay_where_there_is_none():
+    maps = pf.PressureMaps([1.0, 3.0], [[1.0, 1.0, 0.0], [0.0, 1.0, 1.0]])
+    patch = pf.ContactPatch.rectangle(0.03, 0.01, cells=3, pressure=maps)
+    found = centres(patch, np.array([0.0, 1.0, 2.0]))
+    for place, load in zip(found[1:], (1.0, 2.0), strict=True):
+        assert place == pytest.approx(patch.centre_of_pressure(load))
+    assert found[0] == pytest.approx(found[2])
 
 
 def test_what_slip_events_need_is_said_in_one_line(tmp_path):

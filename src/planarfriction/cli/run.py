@@ -150,7 +150,7 @@ def scene_makers(
     return {kind: functools.partial(_ready, SCENES[name], model, options) for kind, model in made.items()}
 
 
-def _ready(make: Callable[..., pf.Scene], model: Any, options: dict[str, Any], **values: Any) -> pf.Scene:
+def _ready(make: Callable[..., pf.Scene], model: Any, options: dict[str, Any], /, **values: Any) -> pf.Scene:
     """Make a ready scene: values that its function takes, such as `mass`, go there, the others to what it returns."""
     from planarfriction.sweeps.settings import Settable
 

@@ -48,7 +48,7 @@ class Settable:
             if not isinstance(self._table, dict):
                 Scene.from_dict(self._table, source=self._source)  # says what is wrong
 
-    def __call__(self, **values: Any) -> Scene:
+    def __call__(self, /, **values: Any) -> Scene:
         """Make the scene with values by their paths. Raises InvalidValueError for a path that leads nowhere."""
         table: Any = self._table
         for path, value in values.items():
