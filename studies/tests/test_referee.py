@@ -435,6 +435,15 @@ def rows_of(path):
     return list(csv.DictReader(path.read_text().splitlines()))
 
 
+@pytest.mark.parametrize("command", ["referee", "simulators"])
+def test_without_any_engine_one_line_says_so(command, monkeypatch, capsys):
+    monkeypatch.setattr(engines, "MODULES", {"mujoco": "no_such_package"})
+    assert main([command, "--case", "stop"]) == 2
+    assert capsys.readouterr().err.startswith("error: no simulator is installed: run pip install")
+    assert main([command, "--case", "stop", "--engine", "MuJoCo"]) == 2
+    assert capsys.readouterr().err.endswith("an engine that is installed: none, got MuJoCo\n")
+
+
 def test_export(tmp_path):
     for name in ("push", "ramp"):
         export_case(CASES[name], tmp_path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import threading
 import time
 
 import pytest
@@ -62,6 +63,21 @@ def test_progress_is_a_line_now_and_then_without_a_terminal(monkeypatch, capsys)
     assert len(others) < 4
     time.sleep(0.1)
     assert capsys.readouterr().err == ""  # nothing after the end
+
+
+def test_a_line_of_progress_that_is_being_written_ends_before_the_end(monkeypatch):
+    begun, written = threading.Event(), []
+
+    def write_slowly(text):
+        begun.set()
+        time.sleep(0.1)
+        written.append(text)
+
+    monkeypatch.setattr(console, "EVERY", 0.01)
+    monkeypatch.setattr(console, "note", write_slowly)
+    with console.work_progress("identifying"):
+        assert begun.wait(10.0)
+    assert written
 
 
 @pytest.mark.parametrize(

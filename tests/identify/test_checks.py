@@ -321,6 +321,13 @@ def test_columns_found_against_columns_needed(tmp_path, headings, words):
     assert words in str(error.value).replace("'", ""), str(error.value)
 
 
+def test_a_contact_is_not_chosen_where_columns_name_none(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("t,vx,vy,omega,fx,fy,tau,normal_force\n0,0,0,0,0,0,0,1\n")
+    with pytest.raises(FileError, match=r"contact must be left out: no column is named as pad\.vx, got 'pad'"):
+        Log.from_csv(path, contact="pad")
+
+
 def test_run_writes_logs_that_identify_reads(solution, tmp_path, capsys):
     columns = history_columns(solution)
     assert list(columns)[:7] == ["time", "x", "y", "theta", "vx", "vy", "omega"]

@@ -6,6 +6,7 @@ import copy
 import pickle
 import sys
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -173,3 +174,22 @@ def test_torch_models_share_nothing_that_changes():
         for found in at_once(lambda i, model=together: work(model)):
             for array, true in zip(found, work(alone), strict=True):
                 np.testing.assert_array_equal(array, true)
+
+
+def test_threads_that_ask_for_a_load_at_once_share_its_shape(monkeypatch):
+    shapes, together, built = MODELS["published soft"]().shapes, threading.Barrier(THREADS), []
+    at = type(shapes._surface).at
+
+    def build_slowly(surface, load):
+        built.append(load)
+        time.sleep(0.05)  # the other threads ask meanwhile
+        return at(surface, load)
+
+    def shape_at(_):
+        together.wait()
+        return shapes.shape_at(2.0)
+
+    monkeypatch.setattr(type(shapes._surface), "at", build_slowly)
+    with ThreadPoolExecutor(THREADS) as pool:
+        first, *others = pool.map(shape_at, range(THREADS))
+    assert built == [2.0] and all(other is first for other in others)

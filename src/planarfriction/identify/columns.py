@@ -54,6 +54,8 @@ def find_columns(path: Path, headings: Sequence[str], *, contact: str | None, wi
     """
     named = _named(path, headings)
     contacts = sorted({name.rpartition(".")[0] for name in named} - {""})
+    if contact is not None and not contacts:
+        raise FileError(f"{path}: contact must be left out: no column is named as pad.vx, got {shown(repr(contact))}")
     if contact is not None:
         try:
             contact = validation.choice("contact", contact, contacts)

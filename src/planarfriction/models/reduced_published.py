@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import threading
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
@@ -104,7 +105,7 @@ class PublishedShapes:
         self._arguments = self._surface, self._patch, _ = surface, patch, on_load_change
         self.depends_on_load = patch.depends_on_load and on_load_change != "keep"
         self._rescales = on_load_change == "rescale"
-        self._recent = functools.lru_cache(REMEMBERED)(self._built)
+        self._recent, self._lock = functools.lru_cache(REMEMBERED)(self._built), threading.Lock()
 
     def __reduce__(self) -> tuple[Any, ...]:
         return PublishedShapes, self._arguments  # threads share recent shapes, copies of a model do not
@@ -113,7 +114,8 @@ class PublishedShapes:
         """Return the shape at a load > 0 [N]; recent loads are cached. None: any load, if it does not change it."""
         if load is None or not self.depends_on_load:
             return self.reference
-        return self._recent(load)
+        with self._lock:  # threads that ask for one load at once wait for the same shape
+            return self._recent(load)
 
     @functools.cached_property
     def reference(self) -> PublishedShape:

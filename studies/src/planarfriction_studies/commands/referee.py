@@ -94,9 +94,12 @@ def _judged(
     """Judge with progress; return verdicts, those of the file among them, and the exit code."""
     from planarfriction.cli import INTERRUPTED
     from planarfriction.cli.console import note, work_progress
+    from planarfriction.errors import FrictionError
     from planarfriction.writing import check_writable
     from planarfriction_studies.referee.run import Apart, Kept, run
 
+    if not engines:
+        raise FrictionError("no simulator is installed: run pip install 'planarfriction[mujoco]' or [drake], [mjx]")
     if file is not None:
         check_writable(file)
     kept, code = Kept(file), 0
@@ -184,7 +187,9 @@ def _engines(names: tuple[str, ...], left_out: list[str]) -> list[Any]:
     found = list(installed(left_out))
     for name in names:
         if not any(engine.name.lower().startswith(name.lower()) for engine in found):
-            rule = f"begin the name of an engine that is installed: {'; '.join(engine.name for engine in found)}"
+            rule = (
+                f"begin the name of an engine that is installed: {'; '.join(engine.name for engine in found) or 'none'}"
+            )
             raise InvalidValueError("--engine", rule, name)
     exact = {name.lower() for name in names} & {each.name.lower() for each in found}
 
