@@ -412,6 +412,12 @@ def test_unprepared_models_and_unknown_names_are_refused():
     soft = pf.ContactPatch.rectangle(0.02, cells=9, pressure=pf.SoftFinger(c=0.01, n=0.3, k=2.0))
     for wrong, message in (
         ([patches[0], patches[0]], "patches must have each pair of geoms once, got block, pad left"),
+        ([], "patches must be a list of PatchContact, not empty"),
+        (patches[0], "patches must be a list of PatchContact, not empty, got PatchContact"),
+        (
+            [PatchContact(PAD, site="left", geoms=("block", "block"))],
+            "geoms must be on two bodies",
+        ),
         ([PatchContact(PAD, site="nowhere", geoms=pads)], "site must be in the model, got nowhere"),
         ([PatchContact(PAD, site="left", geoms=("pad left", "nothing"))], "geoms must be in the model, got nothing"),
         (

@@ -202,7 +202,9 @@ def _digest(patches: Sequence[PatchContact]) -> list[int]:
 
 
 def check_once(patches: Sequence[PatchContact]) -> None:
-    """Raise for what is no patch, and for the same pair twice."""
+    """Raise for what is no list of patches, and for the same pair twice."""
+    if not (isinstance(patches, Sequence) and patches):
+        raise InvalidValueError("patches", "be a list of PatchContact, not empty", patches)
     for patch in patches:
         validation.instance("patches", patch, PatchContact, "patches")
     pairs = [frozenset(patch.geoms) for patch in patches]
@@ -236,6 +238,8 @@ class Placed:
         self.patch, self.site = patch, _named(m, "site", patch.site, mujoco.mjtObj.mjOBJ_SITE)
         self.geoms = np.array([_named(m, "geoms", name, mujoco.mjtObj.mjOBJ_GEOM) for name in patch.geoms])
         bodies, owner = m.geom_bodyid[self.geoms], m.site_bodyid[self.site]
+        if bodies[0] == bodies[1]:
+            raise InvalidValueError("geoms", "be on two bodies", " and ".join(patch.geoms))
         if owner not in bodies:
             raise InvalidValueError("site", f"be on the body of one of the geoms {patch.geoms}", patch.site)
         own = int(bodies[1] == owner)
