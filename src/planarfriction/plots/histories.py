@@ -101,8 +101,12 @@ def draw_histories(figure: Any, solutions: pf.Solution | Mapping[str, pf.Solutio
     _draw_panels(axes, chosen, known)
     for each in panels[:-1].ravel():
         each.set_xlabel("")
-    panels[0, 0].set_title("body: position, angle, speed", fontsize="medium")
-    panels[0, 1].set_title("contacts: friction on the body, normal force", fontsize="medium")
+    titles = "body: position, angle, speed", "contacts: friction on the body, normal force"
+    narrow = figure.bbox.width < style.NARROW * figure.dpi
+    for each in axes if narrow else ():  # panels are half an inch high in one column of a paper
+        each.set_ylabel(style.wrapped(each.get_ylabel(), 9), fontsize="small")
+    for each, title in zip(panels[0], titles, strict=True):
+        each.set_title(title.partition(":")[0] if narrow else title, fontsize="medium")
     _finish(figure, axes, chosen, known)
 
 
