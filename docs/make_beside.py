@@ -71,7 +71,7 @@ def main(folder: Path) -> None:
     true = {load: truth(load) for load in LOADS}
     runs = {(load, name): in_mujoco(load, way) for load in LOADS for name, way in WAYS.items()}
     rows = np.arange(0, len(true[1]), round(1.0 / (FPS * SLOW * DT)))
-    colours = dict(zip(WAYS, (style.PUBLISHED, style.FEW), strict=True))
+    colours = dict(zip(WAYS, (style.OTHER, style.FEW), strict=True))
 
     def frame(number: int) -> np.ndarray:
         row = rows[number]

@@ -7,6 +7,7 @@ reproduction come from `make_tables.py`.
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,7 @@ def fingertip() -> pf.ContactPatch:
 
 def figures() -> dict[str, plots.style.PlotFigure]:
     """The figures by the names of their files."""
-    circle, pads = PUBLISHED_PATCHES["Circle"](), PUBLISHED_PATCHES["NonConvex1"]()
+    circle, pads = PUBLISHED_PATCHES["Circle"](), replace(PUBLISHED_PATCHES["NonConvex1"](), name="two pads")
     models = {"distributed": pf.DistributedModel(circle, LAW), "reduced": pf.ReducedModel(circle, LAW)}
     in_hand = {name: pf.simulate(pf.scenes.in_hand(model)) for name, model in models.items()}
     return {
@@ -127,12 +128,12 @@ def pre_sliding_cycles() -> plots.style.PlotFigure:
     law = pf.LuGre(mu_s=1.2, elasto_plastic=0.9, sigma_1=0.0, sigma_2=0.0)
     figure = plots.style.new_figure(8.0, 3.2)
     force, energy = figure.subplots(1, 2)
-    for kind in (pf.ReducedModelPublished, pf.ReducedModel):
+    for kind, mark in ((pf.ReducedModelPublished, ".-"), (pf.ReducedModel, "x-")):
         model = kind(PUBLISHED_PATCHES["Circle"](), law)
         fx, taken = small_cycles(model)
-        look = {"color": plots.style.model_colour(model), "label": kind.__name__}
-        force.plot(fx, ".-", **look)
-        energy.plot(1e9 * taken, ".-", **look)
+        look = {"color": plots.style.model_colour(model), "label": kind.__name__, "markersize": 5}
+        force.plot(fx, mark, **look)
+        energy.plot(1e9 * taken, mark, **look)
     force.set(xlabel="cycles", ylabel="force left over, fx [N]")
     energy.set(xlabel="cycles", ylabel="energy that friction took [nJ]")
     for axes in (force, energy):

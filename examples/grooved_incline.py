@@ -84,7 +84,7 @@ def draw(slopes: np.ndarray, found: dict[str, list[float]], path: pf.Solution, s
     axes[0].plot([0.0, 0.0], [0.0, -far], color=PALETTE[6], linestyle=":", label="fall line")
     angle = drift(slope)
     axes[0].plot(
-        [0.0, far * np.sin(angle)], [0.0, -far * np.cos(angle)], "--", color=PALETTE[4], label="closed form", zorder=1
+        [0.0, far * np.sin(angle)], [0.0, -far * np.cos(angle)], "--", color=EXACT, label="closed form", zorder=3
     )
     axes[0].set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-40.0, 130.0))
     axes[0].set_title(f"slope {np.degrees(slope):.0f} deg, {path.data.time[-1]:.2f} s", fontsize=9)

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import copy
 import io
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -77,14 +78,17 @@ class TurnInHand(gymnasium.vector.VectorEnv):
         patches = [PatchContact(pad, site=side, geoms=(side, "plate")) for side in SIDES]
         spec = mujoco.MjSpec.from_string(HAND)
         prepare(spec, patches)
-        self.friction = Friction(spec.compile(), patches)
-        self.models = self.friction.copies({"mu_c": np.ones(worlds)})
+        m = spec.compile()
+        self._open = contextlib.ExitStack()
+        if points is None:
+            self.friction = Friction(m, patches)
+            self.models = self.friction.copies({"mu_c": np.ones(worlds)})
+            self._open.enter_context(self.friction.install())
+        else:
+            self.models = [copy.copy(m) for _ in range(worlds)]
         self.data = [mujoco.MjData(m) for m in self.models]
         self.targets, self.decisions = np.zeros(worlds), 0
-        self._open = contextlib.ExitStack()
         self._threads = self._open.enter_context(ThreadPoolExecutor(threads))
-        if points is None:
-            self._open.enter_context(self.friction.install())
 
     def close_extras(self, **_: Any) -> None:
         """Take the friction out of MuJoCo."""
@@ -96,9 +100,10 @@ class TurnInHand(gymnasium.vector.VectorEnv):
         drawn = pf.randomise(LAW, FRICTION, self.num_envs, seed=int(self.np_random.integers(2**31)))
         self.targets = np.radians(self.np_random.uniform(*TARGETS, self.num_envs))
         for e, (m, d) in enumerate(zip(self.models, self.data, strict=True)):
-            for name, values in drawn.items():
-                self.friction.parameters(m)[name][:] = values[e]
-            if self.points is not None:
+            if self.points is None:
+                for name, values in drawn.items():
+                    self.friction.parameters(m)[name][:] = values[e]
+            else:
                 m.pair_dim[:], m.pair_friction[:, :2] = 3, drawn["mu_c"][e]
                 m.geom_size[:2, 1:] = drawn["scale"][e] * SIDE * self.points
             mujoco.mj_resetData(m, d)

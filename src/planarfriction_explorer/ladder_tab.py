@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import panel as pn
-from bokeh.models import ColumnDataSource, NumeralTickFormatter
+from bokeh.models import ColumnDataSource, FixedTicker, NumeralTickFormatter
 from bokeh.plotting import figure
 
 from planarfriction.plots.style import DISTRIBUTED, FEW, OTHER, PUBLISHED, SECOND
@@ -105,10 +105,11 @@ def _chart(source: ColumnDataSource) -> Any:
         tools="",
         toolbar_location=None,
         x_axis_label="time in the solver [ms]",
-        y_axis_label="error [% of μc fN]",
+        y_axis_label="error [% of μ_c f_N]",
     )
     looks.tidy(plot)
     plot.x_range.range_padding = plot.y_range.range_padding = 0.1
     plot.xaxis.formatter = NumeralTickFormatter(format="0.[00]")
+    plot.xaxis.ticker = FixedTicker(ticks=[digit * 10.0**power for power in range(-2, 4) for digit in (1, 2, 5)])
     plot.scatter("seconds", "error", size=12, color="colour", source=source)
     return plot

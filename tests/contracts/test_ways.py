@@ -1,4 +1,4 @@
-"""The way of a call through the library: the figure in docs/maintaining.md shows the rooms that calls walk through."""
+"""The path of a call through the library: the figure in docs/maintaining.md shows the rooms that calls walk through."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from planarfriction.cli.options import FILE
 
 NAME = "joint"
 
-SHORT_HELP = "Friction of a joint, from a torque, a voltage or the goal of a servo."
+SHORT_HELP = "Estimate the friction of a joint from a torque, a voltage or the goal of a servo."
 
 
 @click.command(name=NAME, short_help=SHORT_HELP)

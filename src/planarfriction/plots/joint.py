@@ -29,12 +29,12 @@ def plot_joint(fit: Any) -> style.PlotFigure:
     grid = figure.add_gridspec(2, 2, height_ratios=[1.4, 1.0], width_ratios=[1.6, 1.0])
     upper = figure.add_subplot(grid[0, 0])
     lower = figure.add_subplot(grid[1, 0], sharex=upper)
-    upper.plot(log.time, measured, "k", lw=1.0, label=f"measured, {log.name}")
-    for run, colour, name in zip(runs, ("0.65", "C0"), ("Coulomb + viscous", "fit"), strict=True):
+    upper.plot(log.time, measured, color=style.EXACT, lw=1.0, label=f"measured, {log.name}")
+    for run, colour, name in zip(runs, (style.MEASURED, style.DISTRIBUTED), ("Coulomb + viscous", "fit"), strict=True):
         upper.plot(log.time, run, color=colour, lw=1.2, label=name)
         lower.plot(log.time, run - measured, color=colour, lw=1.0)
     upper.set_ylabel(what)
-    upper.legend(frameon=False, fontsize="small")
+    figure.legend(*upper.get_legend_handles_labels(), loc="outside upper left", ncols=3, frameon=False)
     lower.set(xlabel="time [s]", ylabel=f"error [{fit.unit}]")
     side = figure.add_subplot(grid[:, 1])
     fastest = max(float(np.abs(each.speed).max()) for each in problem.logs)
@@ -43,9 +43,13 @@ def plot_joint(fit: Any) -> style.PlotFigure:
         float(np.abs(each.torque if problem.by_torque else fit.torque_gain * each.volts).max()) for each in problem.logs
     )
     level = friction.mu_c + (friction.mu_s - friction.mu_c) * np.exp(-((speed / friction.v_s) ** 2))
-    for share in SHARES if friction.load_motor or friction.load_external else SHARES[:1]:
+    shares = SHARES if friction.load_motor or friction.load_external else SHARES[:1]
+    for share, colour, line in zip(shares, style.PALETTE, style.LINE_STYLES, strict=False):
         load = friction.load(share * pushed, -share * pushed)
-        side.semilogx(speed, level + load + friction.sigma_2 * speed, label=f"held load {share * pushed:.2g} N m")
+        look = {"color": colour, "ls": line, "label": f"held load {share * pushed:.2g} N m"}
+        side.semilogx(speed, level + load + friction.sigma_2 * speed, **look)
     side.set(xlabel="speed [rad/s]", ylabel="friction [N m]", ylim=(0.0, None))
-    side.legend(frameon=False, fontsize="small")
+    side.legend(frameon=False)
+    for axes in (upper, lower, side):
+        style.tidy(axes)
     return figure

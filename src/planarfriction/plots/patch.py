@@ -123,9 +123,10 @@ def _title(patch: pf.ContactPatch, weights: np.ndarray, normal_force: float | No
     loaded = int((weights > 0.0).sum())
     radius = unit_for("length", patch.contact_radius(normal_force))
     what = ("disc" if patch.has_discs else "point" if patch.grid is None else "cell") + "s" * (loaded != 1)
-    text = f"{patch.name}: {loaded} loaded {what}, r = {radius.factor * patch.contact_radius(normal_force):.3g} "
-    text += radius.label
+    parts = [f"{patch.name}: {loaded} loaded {what}"]
+    parts.append(f"r = {radius.factor * patch.contact_radius(normal_force):.3g} {radius.label}")
     if normal_force is not None:
         force = unit_for("force", normal_force)
-        text += f", load {force.factor * normal_force:.6g} {force.label}"
-    return style.wrapped(text, width)
+        parts.append(f"load {force.factor * normal_force:.6g} {force.label}")
+    whole = [part.replace(" ", "\N{NO-BREAK SPACE}") for part in parts[1:]]  # a number keeps its unit
+    return style.wrapped(", ".join(parts[:1] + whole), width)

@@ -22,7 +22,7 @@ MODES = ("stick", "slide left", "slide right", "free")
 
 
 def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
-    """Draw the grip, the turn and the slide over time: solid as the scene is, dashed with other frictions."""
+    """Draw the grip, the turn and the slide over time: broken lines have other frictions."""
     figure = style.new_figure(7.2, 6.4)
     grip, turn, slide = figure.subplots(3, 1, sharex=True)
     end = plan.scene.t_end
@@ -40,7 +40,7 @@ def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
     factors = [1.0, *(each for each in (plan.report.frictions[0], plan.report.frictions[-1]) if len(solutions) > 1)]
     for i, (solution, factor) in enumerate(zip(solutions, factors, strict=True)):  # first as it is, then the others
         time = np.asarray(solution.histories["time"].values)
-        label = "as the scene is" if i == 0 else f"friction {100.0 * (factor - 1.0):+.3g} %"
+        label = "friction of the scene" if i == 0 else f"friction {100.0 * (factor - 1.0):+.3g} %"
         line = {"color": style.PALETTE[i], "linestyle": style.LINE_STYLES[i], "label": label}
         turn.plot(time, angle.factor * angles[i], **line)
         slide.plot(time, length.factor * slides[i], **line)

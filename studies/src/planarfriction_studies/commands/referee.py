@@ -123,7 +123,8 @@ def _judged(
 def simulators(engines: tuple[str, ...], cases: tuple[str, ...], file: Path | None) -> int:
     """Compare patch friction in simulators with their own friction, with default and with the best settings.
 
-    This is a view of `planarfriction referee`, in units instead of marks. What --json has is not computed again.
+    This is a view of `planarfriction referee`, in units instead of marks. Results in the --json
+    file are not computed again.
 
     \b
     Examples:

@@ -230,19 +230,20 @@ class Family(NamedTuple):
     """Models of the ladder that are one line."""
 
     words: str
-    rungs: dict[str, tuple[str, tuple[int, int]]]
-    """Model -> what stands beside its marker, and where: its offset from the marker [points]."""
+    rungs: dict[str, str]
+    """Model -> words beside its marker."""
     colour: str
     marker: str
 
 
-_RIGHT, _ABOVE = (4, 5), (5, 5)
+PLACES = (4, 5), (4, -12)
+"""Offset [points] of words from a marker: above and below in turn, since neighbours may be close."""
 
 FAMILIES = (
-    Family("published reduced model", {"published": ("", _RIGHT)}, looks.REDUCED, "^"),
+    Family("published reduced model", {"published": ""}, looks.REDUCED, "^"),
     Family("ReducedModel, 1 disc to one a cell",
-           {name: (str(n), _RIGHT) for n, name in NAMES.items()} | {ALL: ("all", _RIGHT)}, looks.FEW, "o"),
-    Family("distributed, 21 x 21 points", {"full": ("", _ABOVE)}, looks.DISTRIBUTED, "D"),
+           {name: str(n) for n, name in NAMES.items()} | {ALL: "all"}, looks.FEW, "o"),
+    Family("distributed, 21 x 21 points", {"full": ""}, looks.DISTRIBUTED, "D"),
 )  # fmt: skip
 
 ROWS = (
@@ -288,8 +289,8 @@ def draw_ladder(rows: list[Row]) -> PlotFigure:
 
 def _draw_family(axes: Any, family: Family, rows: list[Row], quantity: str) -> None:
     """Draw medians joined by a line, bars from the smallest to the largest, the reference, without errors, dotted."""
-    medians = []
-    for model, (words, place) in family.rungs.items():
+    medians: list[tuple[float, float]] = []
+    for model, words in family.rungs.items():
         found = [row for row in rows if row.model == model]
         if not found:
             continue
@@ -300,6 +301,7 @@ def _draw_family(axes: Any, family: Family, rows: list[Row], quantity: str) -> N
             continue
         middle = float(np.median(errors))
         axes.vlines(cost, errors.min(), errors.max(), color=family.colour, lw=1.6, alpha=0.35)
+        place = PLACES[len(medians) % 2]
         axes.annotate(words, (cost, middle), place, textcoords="offset points", fontsize=9, color=family.colour)
         medians.append((cost, middle))
     if medians:
