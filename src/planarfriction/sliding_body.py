@@ -44,7 +44,7 @@ class SlidingBody(ByValue):
     """Mass [kg]."""
     inertia: float = checked(validation.positive)
     """Moment of inertia about the centre of mass [kg m^2]."""
-    models: FrictionModel | Sequence[FrictionModel]
+    models: FrictionModel | Sequence[FrictionModel]  # pyright: ignore[reportGeneralTypeIssues]
     """Friction model, or a list with one for each patch."""
     positions: np.ndarray = (0.0, 0.0)  # pyright: ignore[reportAssignmentType]
     """Origins of the patches about the centre of mass, in body axes, `[k, 2]` [m]."""

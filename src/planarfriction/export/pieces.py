@@ -180,8 +180,8 @@ def _settled(cell: Any, reference: float, lightest: float) -> Any:
 
     def settled(law: Any, z: Any, u: Any, dt: Any, load: Any) -> Any:
         factor = reference / xp.maximum(load, lightest)
-        new, traction = cell(law, within(law, times(factor, z)), u, factor * dt)
-        return times(1.0 / factor, new), traction
+        new, traction = cell(law, within(law, times(factor, z)), u, factor * dt)  # pyright: ignore[reportCallIssue]
+        return times(1.0 / factor, new), traction  # pyright: ignore[reportCallIssue]
 
     return settled
 

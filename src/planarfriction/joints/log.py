@@ -199,10 +199,11 @@ class JointLog(ByValue):
         values = {each: getattr(self, each, None) for each in ("time", "q", *COLUMNS)}
         fields = {each: value for each, value in values.items() if value is not None}
         bounds = np.linspace(0, len(self.time), parts + 1).astype(int)
-        more = {"drive": self.drive}
         return [
-            JointLog(**{each: value[i:j] for each, value in fields.items()}, **more, name=f"{self.name}, part {k + 1}")
-            for k, (i, j) in enumerate(pairwise(bounds))
+            JointLog(
+                **{key: value[i:j] for key, value in fields.items()}, drive=self.drive, name=f"{self.name}, part {k}"
+            )
+            for k, (i, j) in enumerate(pairwise(bounds), 1)
         ]
 
     @classmethod

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -216,7 +216,7 @@ class Problem:
                 "mu_c": np.sign(v),
                 "sigma_2": v,
             }
-            pushed = log.torque if self.by_torque else (self.torque_gain or 0.0) * log.volts
+            pushed: Any = log.torque if self.by_torque else (self.torque_gain or 0.0) * log.volts
             if not self.by_torque:
                 columns["torque_gain"] = -log.volts
             inertia = (plant.inertia or 0.0) + (plant.mass + (plant.arm_mass or 0.0) / 3.0) * plant.length**2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import KW_ONLY, dataclass
 from typing import Any, ClassVar, Self
 
@@ -118,7 +118,7 @@ def _of_discs(few: ContactPatch, patch: ContactPatch, deflections: np.ndarray, l
     weights, levers, discs = patch.weights(load), patch.levers(), few.levers()
     shares = np.bincount(nearest, weights, few.cells)
 
-    def sums(values: np.ndarray) -> np.ndarray:
+    def sums(values: Iterable[np.ndarray]) -> np.ndarray:
         return np.array([np.bincount(nearest, weights * each, few.cells) for each in values])
 
     state = np.zeros((discs.shape[1], few.cells))

@@ -111,7 +111,7 @@ class ContactPatch(Moments):
             self._set(point_shares=None)
         elif self.point_shares is not None:
             self._set(point_shares=validation.positive_array("point_shares", self.point_shares, (len(positions),)))
-            self.point_shares.setflags(write=False)
+            self.point_shares.setflags(write=False)  # pyright: ignore[reportOptionalMemberAccess]
         for numbers in (self.positions, self.areas, self.radii):
             numbers.setflags(write=False)
         if not law.depends_on_load:

@@ -237,7 +237,7 @@ def _are_labels(cells: Sequence[str]) -> bool:
 
 def _read_tekscan(path: Path, _: MapReading) -> np.ndarray:
     """Read the frames of a Tekscan ASCII export, in which B stands for places without a sensor."""
-    _, mark, body = read_text(path, "a pressure map").partition("ASCII_DATA")
+    mark, body = read_text(path, "a pressure map").partition("ASCII_DATA")[1:]
     if not mark:
         raise FileError(f"pressure map {path}: has no ASCII_DATA, as Tekscan exports have")
     frames: list[list[list[float]]] = []

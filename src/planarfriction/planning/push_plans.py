@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -218,10 +219,11 @@ def _shortest(
     best, found = math.inf, np.zeros(2 * PARTS)
     begins = [np.array([largest * each for each in turns] + [0.4 * far] * PARTS) for turns in _TURNS]
     for begin in begins if known is None else [known]:
-        run = minimize(
-            length, begin, jac=lambda x: slope, method="SLSQP", bounds=bounds,
-            constraints={"type": "eq", "fun": miss}, options={"ftol": 1e-6, "maxiter": 30},
-        )  # fmt: skip
+        with warnings.catch_warnings(action="ignore", category=RuntimeWarning):  # older SciPy rounds beyond the bounds
+            run = minimize(
+                length, begin, jac=lambda x: slope, method="SLSQP", bounds=bounds,
+                constraints={"type": "eq", "fun": miss}, options={"ftol": 1e-6, "maxiter": 30},
+            )  # fmt: skip
         low, high = np.transpose(bounds)
         x = least_squares(miss, np.clip(run.x, low + 1e-9, high - 1e-9), bounds=(low, high), xtol=1e-14, ftol=1e-14).x
         if np.abs(miss(x)).max() < REACHED and length(x) < best:

@@ -62,7 +62,7 @@ def plot_identification(result: pf.identify.Identification) -> style.PlotFigure:
         for column, i in enumerate(shown):
             _draw_held_out(figure.add_subplot(below[0, column]), result, i)
         if rows == 1:
-            _draw_loops(*(figure.add_subplot(below[0, column]) for column in (1, 2)), result, shown[0])
+            _draw_loops(figure.add_subplot(below[0, 1]), figure.add_subplot(below[0, 2]), result, shown[0])
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=2, frameon=False, fontsize="small")
     return figure

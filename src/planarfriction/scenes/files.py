@@ -140,9 +140,13 @@ def _tables(scene: Section, name: str) -> list[Section]:
 
 def _spring(table: Section) -> Spring:
     """Return the spring of a table."""
-    given = {key: table.only(SPRING_KEYS).get(key) for key in SPRING_KEYS if key == "stiffness" or key in table}
+    given: dict[str, Any] = {
+        key: table.only(SPRING_KEYS).get(key) for key in SPRING_KEYS if key == "stiffness" or key in table
+    }
     with table.located():
-        return Spring(**given | ({"anchor": read_signal(table, "anchor")} if "anchor" in table else {}))
+        if "anchor" in table:
+            given["anchor"] = read_signal(table, "anchor")
+        return Spring(**given)
 
 
 def _contacts(scene: Section) -> list[Contact]:

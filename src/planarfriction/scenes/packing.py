@@ -47,7 +47,7 @@ def packed_contact(
     packed = contact.model.packed(loads, between)
     if contact.edge:
         refuse_fixed_stiffness(contact.model.law, "an edge")
-        return under_edge(contact.model.compiled, packed, outline)
+        return under_edge(contact.model.compiled, packed, outline)  # pyright: ignore[reportArgumentType]
     if contact.pressure == "fixed":
         return packed
     refuse_fixed_stiffness(contact.model.law, "a pressure that follows the load")
@@ -224,9 +224,9 @@ class SegmentBatches:
             reference=np.array([model.reference for model in self.models]),
             bristle=np.array([model.bristle for model in self.models]),
         )
-        most = [max(self._pieces.largest(c), 0.0) for c in range(len(contacts))]
-        factors = [float(each.model.law.stiffness_factor(f)) for each, f in zip(contacts, most, strict=True)]
-        self._bends = [1.0 / factor if f > 0.0 else 1.0 for factor, f in zip(factors, most, strict=True)]
+        peaks = [max(self._pieces.largest(c), 0.0) for c in range(len(contacts))]
+        factors = [float(each.model.law.stiffness_factor(f)) for each, f in zip(contacts, peaks, strict=True)]
+        self._bends = [1.0 / factor if f > 0.0 else 1.0 for factor, f in zip(factors, peaks, strict=True)]
         """Deflections at the largest loads, as multiples of those that the laws name: 1 but for a fixed stiffness."""
         self._length = min(b * each.model.law.largest_deflection for b, each in zip(self._bends, contacts, strict=True))
         self._laws = [contact.model.law.numbers for contact in contacts]

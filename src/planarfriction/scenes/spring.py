@@ -87,4 +87,6 @@ class Spring(ByValue):
 def pull_on(scene: Any, body: Any, time: float) -> np.ndarray:
     """Return the load `[3]` [N, N, N m] on a body of a scene at rest: applied force, weight, and pull of springs."""
     pull = np.array([*body.gravity, 0.0]) * body.mass + (0.0 if scene.force is None else scene.force(time))
-    return sum((spring.pull(time, [*body.position, body.angle]) for spring in scene.springs), pull)
+    for spring in scene.springs:
+        pull = pull + spring.pull(time, [*body.position, body.angle])
+    return pull

@@ -150,7 +150,7 @@ def integrate(
             raise
         outcome = kernels.PAUSED
     reached = int(at.cursor[1])
-    kept = Output(*(array[:reached] if len(array) else array for array in output[:-1]), output.ended)
+    kept = Output(*(array[:reached] if len(array) else array for array in output[:-1]), ended=output.ended)
     status, message = _MESSAGES[int(outcome)]
     statistics = Statistics(*at.statistics.tolist(), wall_time=wall_time, compile_time=compile_time)
     return Integration(kept, status, message, statistics)

@@ -71,7 +71,7 @@ def _numbers(shape: Cells) -> tuple[Any, Any]:
     return lever, None if count < 7 else Vector(shape.levers[-2:])
 
 
-def _bristle(xp, name: str, law: LawNumbers, shape: Cells, z, u, *dt):
+def _bristle(xp, name: str, law: Any, shape: Cells, z, u, *dt):
     """Return two arrays `[..., d, N]`, the results of a function of the bristles."""
     kind, (_, asymmetry) = KINDS[len(shape.levers)], _numbers(shape)
     vector = Vector if kind.bristles == 2 else split  # the source of discs names components

@@ -25,7 +25,8 @@ from planarfriction.tensors.elements import Vector, joined, over, split
 class PublishedNumbers(NamedTuple):
     """A `PublishedShape` as arrays."""
 
-    shape: PublishedPatch
+    shape: Any
+    """`PublishedPatch` of arrays."""
     surface: Callable[..., Any]
     """`u = h(V) |V_S|` of the scaled twist `[..., 3]` and its norm `[..., 1]`."""
     root: Any = None

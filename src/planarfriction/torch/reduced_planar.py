@@ -118,8 +118,8 @@ class ReducedPlanarLuGre(ReducedModelPublished):
 
         Raises InvalidValueError for what is not a tensor of numbers.
         """
-        law, speed = self._contact_at(None).law, self._number("speed", speed)
-        return formulas.stribeck(xp, speed[..., None, None].abs(), law)[..., 0, 0]
+        law, given = self._contact_at(None).law, self._number("speed", speed)
+        return formulas.stribeck(xp, given[..., None, None].abs(), law)[..., 0, 0]
 
     def steady_state_z(self, v_scaled: Tensor) -> Tensor:
         """Return the bristles of steady sliding, `z_ss = S h g/sigma_0` `[..., 3]`, zero at rest.

@@ -97,7 +97,7 @@ _SHARED = {
 
 
 def _functions() -> Any:
-    folder = Path(mujoco.__file__).parent
+    folder = Path(mujoco.__path__[0])
     path = next(each for name in _FILES for each in folder.glob(name))
     library, names = ctypes.CDLL(str(path)), records.Functions._fields
     found = (getattr(library, name, None) for name in names)

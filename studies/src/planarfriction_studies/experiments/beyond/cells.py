@@ -104,7 +104,7 @@ def wandering(rng: np.random.Generator, r: float) -> np.ndarray:
     """Return a twist `[SAMPLES, 3]` that never stops and whose centre of rotation wanders through the patch."""
     t = np.linspace(0.0, 1.0, SAMPLES)[:, None]
     waves, phases = rng.uniform(0.5, 3.0, (2, 2)), rng.uniform(0.0, 2.0 * np.pi, (2, 2))
-    centre = 0.7 * r * sum(np.sin(2.0 * np.pi * waves[i] * t + phases[i]) for i in range(2))
+    centre = 0.7 * r * np.sum([np.sin(2.0 * np.pi * waves[i] * t + phases[i]) for i in range(2)], axis=0)
     spin = rng.choice([-1.0, 1.0]) * SPEED / r * np.minimum(40.0 * t, 1.0)
     return spin * np.hstack([centre[:, 1:], -centre[:, :1], np.ones_like(t)])
 

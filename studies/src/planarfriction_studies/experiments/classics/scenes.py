@@ -130,6 +130,6 @@ def friction_lag(
     step = 2.0 * np.pi / PER_PERIOD / validation.positive("frequency", frequency)
     phase = 2.0 * np.pi * np.arange(PER_PERIOD * validation.count("periods", periods) + 1) / PER_PERIOD
     velocity = (speed + amplitude * np.sin(phase))[:, None] * [1.0, 0.0, 0.0]
-    moved, options = Signal(step * np.arange(len(phase)), velocity, "linear"), FINE | {"save_every": step}
-    t_end = float(moved.times[-1])
-    return Scene(None, _contact(model, normal_force), t_end, velocity=moved, name="friction lag", **options)
+    moved = Signal(step * np.arange(len(phase)), velocity, "linear")
+    contact, t_end = _contact(model, normal_force), float(moved.times[-1])
+    return Scene(None, contact, t_end, velocity=moved, name="friction lag", save_every=step, **FINE)

@@ -66,7 +66,8 @@ def run(work: Work) -> Result:
     found = work.pieces(moves, lambda key: f"drift, {', '.join(key)}")
     straight = work.piece("drift, straight ramp", lambda: _straight_ramp(rtol, atol))
     fixed = work.piece("drift, fixed stiffness", lambda: _fixed_stiffness(rtol, atol))
-    numbers = _numbers(found, straight) | {"swing": _swings({"grows": found["normal", "d_ep"], "fixed": fixed})}
+    numbers = _numbers(found, straight)
+    numbers["swing"] = _swings({"grows": found["normal", "d_ep"], "fixed": fixed})
     creep = numbers["creep"]
     grown = creep["normal force"]
     moved = {f"{what}; {WORDS[model]}": each for what, models in creep.items() for model, each in models.items()}
