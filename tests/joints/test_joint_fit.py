@@ -54,7 +54,7 @@ def test_six_parameters_come_back_from_a_noisy_torque():
         {n: getattr(LUGRE, n) for n in names}, rel=0.01
     )
     assert fit.unit == "N m" and fit.error < 0.01
-    (log,), friction = fit.trial.problem.logs, fit.friction
+    (log,), friction = fit.problem.logs, fit.friction
     upper, lower, side = (axes.get_lines() for axes in fit.plot().axes)
     np.testing.assert_allclose(upper[0].get_ydata(), log.torque)
     np.testing.assert_allclose(upper[2].get_ydata(), fit.torque(log))
@@ -71,7 +71,7 @@ def test_a_load_is_claimed_where_there_is_one(load, monkeypatch):
     truth = SERVO | ({"load": load} if load else {})
     fit = identify_joint(servo_logs(truth), PENDULUM)
     assert fit.terms == (("load",) if load else ())
-    assert fit.error < 2e-3 and fit.trial.errors.mean() <= fit.baseline.errors.mean()
+    assert fit.error < 2e-3 and fit.errors.mean() <= fit.baseline.errors.mean()
     for name in ("inertia", "torque_gain", "back_emf"):
         assert fit.values[name] == pytest.approx(truth[name], rel=0.05)
     text = words(fit)
@@ -112,13 +112,15 @@ def test_a_late_speed_is_measured():
 
 
 def test_a_term_must_gain_more_than_its_scatter():
-    def trial(errors):
-        return Trial(None, {}, (), np.array(errors), np.array(errors))
+    def trial(errors, first=None):
+        errors = np.array(errors)
+        return Trial(None, {}, (), {}, errors, errors, (errors[:2] if first is None else np.array(first), errors[2:]))
 
     base = trial([1.0, 2.0, 1.0, 3.0])
     assert improves(trial([0.8, 1.7, 0.8, 2.4]), base)
     assert not improves(trial([0.5, 2.4, 0.6, 3.3]), base)  # two better, two worse
     assert not improves(trial([0.9, 1.8, 0.9, 2.7]), base)  # evenly, but as little as a wrong term may
+    assert not improves(trial([0.8, 1.7, 0.8, 2.4], first=[0.9, 1.9]), base)  # little where the last two were fitted
 
 
 def test_spreads_intervals_and_words_have_their_numbers():
@@ -128,13 +130,16 @@ def test_spreads_intervals_and_words_have_their_numbers():
         values | {"mu_c": each, "sigma_0": 5e3 * each, "sigma_1": 2.0 + 50.0 * each} for each in (0.01, 0.02, 0.03)
     ]
     errors, less = np.array([1.0, 1.0, 1.0]), np.exp([0.2, 0.3, 0.4])
-    kept = Trial(Problem((log,), PENDULUM, None, ()), values, tuple(folds), errors, errors)
+    again = values | {"sigma_2": 0.006}  # the same but for one, that is shifted by 0.001
+    kept = Trial(Problem((log,), PENDULUM, None, ()), values, tuple(folds), again, errors, errors, ())
     # jackknife: sqrt((n - 1)/n sum of squares); 4.30265 and 2.91999 are quantiles 0.975 and 0.95 of Student's t
     assert kept.spread["mu_c"] == pytest.approx(0.02 / np.sqrt(3.0), rel=1e-12)
+    assert kept.spread["sigma_2"] == pytest.approx(0.001, rel=1e-9)
     far = 4.30265 * 0.02 / np.sqrt(3.0)
     assert kept.interval("mu_c") == pytest.approx((1e-9, 0.02 + far), rel=1e-5)  # not below the least value
     assert kept.interval("sigma_0") == pytest.approx(100.0 * np.exp([-50.0 * far, 50.0 * far]), rel=1e-4)
-    assert kept.gain(Trial(None, {}, (), less, less)) == pytest.approx((0.3, 2.91999 * 0.1 / np.sqrt(3.0)), rel=1e-5)
+    gain, scatter, halves = kept.gains(Trial(None, {}, (), {}, less, less, ()))
+    assert (gain, scatter) == pytest.approx((0.3, 2.91999 * 0.1 / np.sqrt(3.0)), rel=1e-5) and halves == []
     said = "\n".join(map(str, judge(kept, {})))
     assert "kt/R = 0.1 N m/V; with the drive off: kt = 0.3 N m/A, R = 3 Ohm" in said  # 0.03/0.1 and 0.03/0.1^2
     assert "all torques grow by 1.2 % for each 10 g" in said  # half of 10 g over 400 g

@@ -27,7 +27,7 @@ def servo(terms):
 def test_slopes_are_those_of_the_run(terms, span):
     problem = servo(terms)
     values = {name: VALUES[name] for name in problem.names}
-    slopes = problem.slopes(values, span)
+    slopes = problem.slopes(values, span)[0]
     for i, name in enumerate(problem.names):
         step = 1e-6 * abs(values[name])
         more, less = (problem.errors({**values, name: values[name] + way}, span)[0] for way in (step, -step))

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +19,9 @@ from planarfriction.reading import Table
 
 GRAVITY = 9.81
 """Standard acceleration of gravity of the fits [m/s^2]."""
+
+LEAST_INERTIA = 1e-12
+"""Inertia that stands for none [kg m^2]."""
 
 ALIASES = {
     **{"time": "t", "position": "q", "angle": "q", "theta": "q", "tau": "torque", "speed": "dq", "velocity": "dq"},
@@ -95,6 +97,13 @@ class Plant(Checked):
         if not self.mass:
             self._set(arm_mass=self.arm_mass or 0.0, offset=self.offset or 0.0)
 
+    @property
+    def numbers(self) -> tuple[float, float, float]:
+        """Moment of inertia [kg m^2], largest torque of gravity [N m], and offset [rad]; 0 for what is not known."""
+        arm, offset = self.arm_mass or 0.0, self.offset or 0.0
+        inertia = (self.inertia or 0.0) + (self.mass + arm / 3.0) * self.length**2
+        return max(inertia, LEAST_INERTIA), (self.mass + 0.5 * arm) * GRAVITY * self.length, offset
+
 
 @dataclass(frozen=True, eq=False)
 class JointLog(ByValue):
@@ -125,29 +134,12 @@ class JointLog(ByValue):
     name: str = "joint"
     """Name for messages and plots."""
 
-    if TYPE_CHECKING:  # what is given may be more than what is kept
-
-        def __init__(
-            self,
-            time: ArrayLike,
-            q: ArrayLike,
-            torque: ArrayLike | None = None,
-            dq: ArrayLike | None = None,
-            enabled: ArrayLike | None = None,
-            goal: ArrayLike | None = None,
-            voltage: ArrayLike | None = None,
-            external: ArrayLike | None = None,
-            drive: Drive | None = None,
-            name: str = "joint",
-        ) -> None: ...
-
     def __post_init__(self) -> None:
         validation.instance("name", self.name, str, "a text")
         time = increasing(self.time, f"time of {self.name}", LEAST_SAMPLES)
-        given = {name: getattr(self, name) for name in ("q", *COLUMNS) if hasattr(self, name)}
-        self._set(time=time, **{
-            name: validation.array(name, value, (len(time),)) for name, value in given.items() if value is not None
-        })  # fmt: skip
+        given = {each: getattr(self, each, None) for each in ("q", *COLUMNS)}
+        columns = {each: value for each, value in given.items() if value is not None}
+        self._set(time=time, **{each: validation.array(each, columns[each], (len(time),)) for each in columns})
         if self.drive is not None:
             validation.instance("drive", self.drive, Drive, "a Drive")
         if self.torque is None and self.voltage is None and (self.goal is None or self.drive is None):
@@ -189,21 +181,6 @@ class JointLog(ByValue):
         if self.goal is None or self.drive is None:
             raise InvalidValueError(self.name, "hold a voltage, or a goal with a drive", "neither")
         return self.on * self.drive.voltage(self.drive.duty(self.goal - self.q))
-
-    def cut(self, parts: int) -> list[JointLog]:
-        """Cut the log into parts of like length.
-
-        Raises InvalidValueError for parts of fewer than ten samples.
-        """
-        parts = validation.count("parts", parts, at_most=len(self.time) // LEAST_SAMPLES)
-        values = {each: getattr(self, each, None) for each in ("time", "q", *COLUMNS)}
-        fields = {each: value for each, value in values.items() if value is not None}
-        bounds = np.linspace(0, len(self.time), parts + 1).astype(int)
-        more = {"drive": self.drive}
-        return [
-            JointLog(**{each: value[i:j] for each, value in fields.items()}, **more, name=f"{self.name}, part {k + 1}")
-            for k, (i, j) in enumerate(pairwise(bounds))
-        ]
 
     @classmethod
     def from_csv(cls, path: str | Path, *, drive: Drive | None = None) -> JointLog:
