@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planarfriction.errors import FileError, InvalidValueError
-from planarfriction.joints import Drive, JointFriction, JointLog, Plant, identify_joint
+from planarfriction.joints import Drive, JointFit, JointFriction, JointLog, Plant, identify_joint
 from planarfriction.joints.fit import improves
 from planarfriction.joints.loops.runs import run_measured
 from planarfriction.joints.problem import Problem
@@ -38,7 +38,7 @@ def servo_logs(values, count=4, off=True):
         on = np.where((t > 1.2) & (t < 2.2) & off & (i % 2 == 0), 0.0, 1.0)
         drive = Drive(float([100, 400, 200, 800][i % 4]), 7.3, 0.0029, 0.25)
         log = JointLog(t, np.zeros(len(t)), goal=wave, enabled=on, drive=drive, name=f"log {i}")
-        q = Problem((log,), PENDULUM, None, ("load",) if "load" in values else ()).simulated(values, log)[:, 0]
+        q = Problem((log,), PENDULUM, None, ("load",) if "load" in values else ()).simulated(values, [log])[0][:, 0]
         logs.append(dataclasses.replace(log, q=np.round(q * 4096 / (2.0 * np.pi)) * 2.0 * np.pi / 4096))
     return logs
 
@@ -140,7 +140,11 @@ def test_spreads_intervals_and_words_have_their_numbers():
     assert kept.interval("sigma_0") == pytest.approx(100.0 * np.exp([-50.0 * far, 50.0 * far]), rel=1e-4)
     gain, scatter, halves = kept.gains(Trial(None, {}, (), {}, less, less, ()))
     assert (gain, scatter) == pytest.approx((0.3, 2.91999 * 0.1 / np.sqrt(3.0)), rel=1e-5) and halves == []
-    said = "\n".join(map(str, judge(kept, {})))
+    wide = dataclasses.replace(kept, problem=kept.problem.with_terms(["load"]), values=values | {"mu_c": 0.05})
+    fit = JointFit(**vars(kept), baseline=kept, trials={}, verdicts=())
+    shifted = dataclasses.replace(fit, trials={"load": (wide, kept)}).spread  # by a fit with one term more
+    assert shifted["mu_c"] == pytest.approx(np.hypot(0.02 / np.sqrt(3.0), 0.03), rel=1e-12)
+    said = words(dataclasses.replace(fit, verdicts=judge(fit)))
     assert "kt/R = 0.1 N m/V; with the drive off: kt = 0.3 N m/A, R = 3 Ohm" in said  # 0.03/0.1 and 0.03/0.1^2
     assert "all torques grow by 1.2 % for each 10 g" in said  # half of 10 g over 400 g
     assert "lags by 20 ms (20 to 20)" in said

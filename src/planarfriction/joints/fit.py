@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -154,10 +155,14 @@ def identify_joint(
             continue
         more = attempt(*with_term(kept.problem, kept.values, term), progress)
         pairs[term] = more, kept
-        kept = more if improves(more, kept) else kept
+        if term == "load" and not improves(more, kept):  # motor and load may have different shares
+            both = attempt(*with_term(more.problem, more.values, "directional"), progress)
+            pairs[term] = (both, kept) if improves(both, kept) else pairs[term]
+        kept = more if improves(*pairs[term]) else kept
     for term in kept.problem.terms[:-1] if auto else ():  # what came later may explain what came before
         rest = base.with_terms([each for each in kept.problem.terms if each != term and NEEDS.get(each) != term])
         less = attempt(rest, minimise(rest, {name: kept.values[name] for name in rest.names}), progress)
         pairs[term] = kept, less
         kept = kept if improves(kept, less) else less
-    return JointFit(**vars(kept), baseline=first, trials=pairs, verdicts=judge(kept, pairs))
+    fit = JointFit(**vars(kept), baseline=first, trials=pairs, verdicts=())
+    return replace(fit, verdicts=judge(fit))

@@ -20,9 +20,6 @@ from planarfriction.reading import Table
 GRAVITY = 9.81
 """Standard acceleration of gravity of the fits [m/s^2]."""
 
-LEAST_INERTIA = 1e-12
-"""Inertia that stands for none [kg m^2]."""
-
 ALIASES = {
     **{"time": "t", "position": "q", "angle": "q", "theta": "q", "tau": "torque", "speed": "dq", "velocity": "dq"},
     **{"omega": "dq", "tau_external": "external"},
@@ -96,13 +93,6 @@ class Plant(Checked):
             raise InvalidValueError("length", "be positive with a mass, and only then", self.length)
         if not self.mass:
             self._set(arm_mass=self.arm_mass or 0.0, offset=self.offset or 0.0)
-
-    @property
-    def numbers(self) -> tuple[float, float, float]:
-        """Moment of inertia [kg m^2], largest torque of gravity [N m], and offset [rad]; 0 for what is not known."""
-        arm, offset = self.arm_mass or 0.0, self.offset or 0.0
-        inertia = (self.inertia or 0.0) + (self.mass + arm / 3.0) * self.length**2
-        return max(inertia, LEAST_INERTIA), (self.mass + 0.5 * arm) * GRAVITY * self.length, offset
 
 
 @dataclass(frozen=True, eq=False)

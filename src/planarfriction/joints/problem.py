@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction.joints.friction import JointFriction
-from planarfriction.joints.log import JointLog, Plant
-from planarfriction.joints.loops.plant import VARIED, PlantNumbers, run_plant
+from planarfriction.joints.log import GRAVITY, JointLog, Plant
+from planarfriction.joints.loops.plant import PlantNumbers, run_plant
 from planarfriction.joints.loops.runs import run_measured
 
 
@@ -53,6 +53,9 @@ TERMS: dict[str, tuple[str, ...]] = {
 UNKNOWN = ("inertia", "arm_mass", "offset")
 """Numbers of a plant that are estimated where they are not given."""
 
+LEAST_INERTIA = 1e-12
+"""Inertia that stands for none [kg m^2]."""
+
 NEEDS = {"directional": "load"}
 """Terms that stand beside another alone."""
 
@@ -62,8 +65,8 @@ STEP = 2e-3
 SHORT = 0.2
 """Time after which a simulated run begins again where terms are judged [s]."""
 
-DIFFERENCE = 1e-3
-"""Step of differences of torques, over the size of a parameter."""
+DIFFERENCE = 1e-5
+"""Step of differences, over the size of a parameter."""
 
 MOVING = 0.05
 """Share of the largest speed above which the torque balance counts a joint as moving."""
@@ -122,35 +125,29 @@ class Problem:
 
     def plant_numbers(self, values: Mapping[str, float], log: JointLog) -> PlantNumbers:
         """Return what the loops read of plant and drive."""
-        plant, drive = self.settled(values), log.drive if log.voltage is None else None
+        plant, drive = self.plant, log.drive if log.voltage is None else None
+        inertia, arm, offset = (values.get(each, getattr(plant, each) or 0.0) for each in UNKNOWN)
+        inertia += (plant.mass + arm / 3.0) * plant.length**2
+        moment = (plant.mass + 0.5 * arm) * GRAVITY * plant.length
         gain, back_emf = values.get("torque_gain", self.torque_gain or 0.0), values.get("back_emf", 0.0)
         servo = (0.0, 0.0, 0.0) if drive is None else (drive.kp * drive.gain, drive.supply, drive.sag)
-        return PlantNumbers(*plant.numbers, gain, back_emf, *servo)
+        return PlantNumbers(max(inertia, LEAST_INERTIA), moment, offset, gain, back_emf, *servo)
 
     # ------------------------------------------------------------------ errors
 
-    def simulated(self, values: Mapping[str, float], log: JointLog, span: float = np.inf) -> np.ndarray:
-        """Simulate q and dq `[T, 2]` from goal or voltage; the run begins at the measured motion every `span` [s]."""
-        return self._run(values, log, span, np.empty((len(VARIED), 0)))[0]
+    def simulated(
+        self, values: Mapping[str, float], logs: Sequence[JointLog], span: float = np.inf
+    ) -> list[np.ndarray]:
+        """Simulate q and dq `[T, 2]` of logs from goal or voltage.
 
-    def _run(
-        self, values: Mapping[str, float], log: JointLog, span: float, seeds: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return q and dq `[T, 2]`, and the slopes of q by P parameters `[T, P]`, of whose numbers `seeds` are."""
-        motion, slopes = np.empty((len(log.time), 2)), np.empty((len(log.time), seeds.shape[1]))
-        again = int(min(max(2.0, span * len(log.time) / (log.time[-1] - log.time[0])), 1e9))
-        joint, plant = self.friction(values).rigid_numbers, self.plant_numbers(values, log)
-        given, lanes = log.goal if log.voltage is None else log.voltage, np.empty((9, seeds.shape[1]))
-        run_plant(
-            joint, plant, log.time, given, log.on, log.outside, log.motion, again, STEP, seeds, lanes, motion, slopes
-        )
-        return motion, slopes
-
-    def _numbers(self, values: Mapping[str, float]) -> np.ndarray:
-        """Return `VARIED` at parameters by name: linear in each of them."""
-        joint, plant = self.friction(values).rigid_numbers, self.plant_numbers(values, self.logs[0])
-        named = {**joint.law._asdict(), **joint._asdict(), **plant._asdict()}
-        return np.array([named[each] for each in VARIED])
+        Runs begin again at the measured motion every `span` [s].
+        """
+        motions, joint = [np.empty((len(log.time), 2)) for log in logs], self.friction(values).rigid_numbers
+        for log, motion in zip(logs, motions, strict=True):
+            plant, given = self.plant_numbers(values, log), log.goal if log.voltage is None else log.voltage
+            again = int(min(max(2.0, span * len(log.time) / (log.time[-1] - log.time[0])), 1e9))
+            run_plant(joint, plant, log.time, given, log.on, log.outside, log.motion, again, STEP, motion)
+        return motions
 
     def torque(self, values: Mapping[str, float], log: JointLog) -> np.ndarray:
         """Compute the torque [N m] that the measured motion of a log takes, `[T]`."""
@@ -163,24 +160,21 @@ class Problem:
         """Compute the errors of each group of samples [rad], or [N m]."""
         if self.by_torque:
             return self._groups([self.torque(values, log) - log.torque for log in self.logs])
-        return self._groups([self.simulated(values, log, span)[:, 0] - log.q for log in self.logs])
+        runs = zip(self.simulated(values, self.logs, span), self.logs, strict=True)
+        return self._groups([motion[:, 0] - log.q for motion, log in runs])
 
     def costs(self, values: Mapping[str, float], span: float = np.inf) -> np.ndarray:
         """Compute the mean absolute error of each group, [rad] or [N m]."""
         return np.array([np.abs(each).mean() for each in self.errors(values, span)])
 
     def slopes(self, values: Mapping[str, float], span: float = np.inf) -> list[np.ndarray]:
-        """Compute the slopes of each group's errors by the parameters, `[T, P]`: of torques by differences."""
-        if self.by_torque:
-            here, columns = self.errors(values), []
-            for name in self.names:
-                step = DIFFERENCE * max(abs(values[name]), PARAMETERS[name].scale)
-                more = self.errors({**values, name: values[name] + step})
-                columns.append([(far - near) / step for far, near in zip(more, here, strict=True)])
-            return [np.column_stack(each) for each in zip(*columns, strict=True)]
-        here = self._numbers(values)
-        seeds = np.column_stack([self._numbers({**values, name: values[name] + 1.0}) - here for name in self.names])
-        return self._groups([self._run(values, log, span, seeds)[1] for log in self.logs])
+        """Compute the slopes of each group's errors by the parameters by differences, `[T, P]`."""
+        here, columns = self.errors(values, span), []
+        for name in self.names:
+            step = DIFFERENCE * max(abs(values[name]), PARAMETERS[name].scale)
+            more = self.errors({**values, name: values[name] + step}, span)
+            columns.append([(far - near) / step for far, near in zip(more, here, strict=True)])
+        return [np.column_stack(each) for each in zip(*columns, strict=True)]
 
     def _groups(self, rows: list[np.ndarray]) -> list[np.ndarray]:
         """Cut the rows of each log into its groups."""

@@ -27,7 +27,7 @@ class Trial:
     folds: tuple[dict[str, float], ...]
     """Estimates without each group."""
     again: dict[str, float]
-    """Estimates by runs that begin again every `SHORT`; terms that are missing shift them by another amount."""
+    """Estimates by runs that begin again every `SHORT`."""
     errors: np.ndarray
     """Mean absolute error of each left-out group [rad], or [N m]."""
     short: np.ndarray
@@ -51,13 +51,18 @@ class Trial:
         return float(falls.mean()), float(scatter), [float(each.mean()) for each in halves]
 
     @property
+    def others(self) -> list[dict[str, float]]:
+        """Estimates of other fits, which terms that are missing shift by other amounts."""
+        return [self.again]
+
+    @property
     def spread(self) -> dict[str, float]:
-        """Standard error of each estimate: by leaving out groups (jackknife), and its shift to `again`."""
-        n = len(self.folds)
-        table = np.array([[fold[name] for name in self.values] for fold in self.folds])
-        jackknife = np.sqrt((n - 1) / n * ((table - table.mean(axis=0)) ** 2).sum(axis=0))
-        shifts = [self.again[name] - value for name, value in self.values.items()]
-        return dict(zip(self.values, np.hypot(jackknife, shifts).tolist(), strict=True))
+        """Standard error of each estimate: by leaving out groups (jackknife), and the largest shift to `others`."""
+        n, names = len(self.folds), list(self.values)
+        table = np.array([[each[name] for name in names] for each in (self.values, *self.others, *self.folds)])
+        folds, shifts = table[-n:], table[:-n] - table[0]
+        jackknife = np.sqrt((n - 1) / n * ((folds - folds.mean(axis=0)) ** 2).sum(axis=0))
+        return dict(zip(names, np.hypot(jackknife, np.abs(shifts).max(axis=0)).tolist(), strict=True))
 
     def interval(self, name: str) -> tuple[float, float]:
         """Compute the 95 % interval of an estimate from its spread; factors for those searched by logarithm."""
@@ -102,7 +107,7 @@ class Trial:
 
     def simulate(self, log: JointLog) -> np.ndarray:
         """Simulate q and dq `[T, 2]` of a log from its goal or voltage."""
-        return self.problem.simulated(self.values, log)
+        return self.problem.simulated(self.values, [log])[0]
 
     def torque(self, log: JointLog) -> np.ndarray:
         """Compute the torque `[T]` [N m] that the measured motion of a log takes."""
@@ -120,6 +125,11 @@ class JointFit(Trial):
     """Trials with and without a term, by the term."""
     verdicts: tuple[Verdict, ...]
     """Findings in words, each with its number."""
+
+    @property
+    def others(self) -> list[dict[str, float]]:
+        """Estimates by runs that begin again every `SHORT`, and with terms that were tried besides."""
+        return [self.again, *(more.values for more, _ in self.trials.values() if {*self.terms} < {*more.terms})]
 
     def table(self) -> str:
         """Return estimates, left-out errors and verdicts as text."""

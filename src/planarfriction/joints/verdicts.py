@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
 from planarfriction.identify.verdicts import Verdict
 from planarfriction.joints.log import JointLog
-from planarfriction.joints.result import Trial
+from planarfriction.joints.result import JointFit
 
 LAGS = np.arange(-20, 61) * 1e-3
 """Delays of a reported speed that are tried [s]."""
@@ -31,29 +31,29 @@ WORDS = {
 """Meaning of a term that was kept, and of one that was not."""
 
 
-def judge(kept: Trial, trials: Mapping[str, tuple[Trial, Trial]]) -> tuple[Verdict, ...]:
+def judge(fit: JointFit) -> tuple[Verdict, ...]:
     """Return all verdicts on a fit."""
-    return (*_on_terms(kept, trials), *_on_drive(kept), *_on_logs(kept))
+    return (*_on_terms(fit), *_on_drive(fit), *_on_logs(fit))
 
 
-def _on_terms(kept: Trial, trials: Mapping[str, tuple[Trial, Trial]]) -> Iterator[Verdict]:
-    for term, (trial, without) in trials.items():
+def _on_terms(fit: JointFit) -> Iterator[Verdict]:
+    for term, (trial, without) in fit.trials.items():
         gain, scatter, halves = trial.gains(without)
         ratio, low, high, *both = np.exp([-gain, -gain - scatter, -gain + scatter, *np.negative(halves)])
         numbers = f"errors of left-out logs are {ratio:.2f} ({low:.2f} to {high:.2f}) of those without it"
         numbers += f", {both[0]:.2f} and {both[1]:.2f} if half of the logs are fitted"
-        good = term in kept.terms
+        good = term in fit.terms
         if term == "load":
             numbers += f", b = {trial.values['load']:.2g}"
         yield Verdict(term, good, f"{WORDS[term][0 if good else 1]} ({numbers})")
-    for name, error in kept.spread.items():
-        value = kept.values[name]
+    for name, error in fit.spread.items():
+        value = fit.values[name]
         if name in ("sigma_0", "sigma_1", "v_s", "rise") and not 2.0 * error < value:
             yield Verdict(name, False, f"spread {error:.2g} of {value:.2g} between fits")
 
 
-def _on_drive(kept: Trial) -> Iterator[Verdict]:
-    problem, values, gain = kept.problem, kept.values, kept.torque_gain
+def _on_drive(fit: JointFit) -> Iterator[Verdict]:
+    problem, values, gain = fit.problem, fit.values, fit.torque_gain
     if gain is None:
         return
     if "back_emf" in values:
@@ -92,20 +92,20 @@ def standing(log: JointLog) -> np.ndarray:
     return mask
 
 
-def _on_logs(kept: Trial) -> Iterator[Verdict]:
-    lags = [speed_lag(log) for log in kept.problem.logs if log.dq is not None]
+def _on_logs(fit: JointFit) -> Iterator[Verdict]:
+    lags = [speed_lag(log) for log in fit.problem.logs if log.dq is not None]
     if lags and abs(lag := float(np.median(lags))) > LATE:
         text = f"the reported speed lags by {1e3 * lag:.0f} ms ({1e3 * min(lags):.0f} to {1e3 * max(lags):.0f})"
         yield Verdict("dq", False, f"{text}: the slope of q was used")
-    for i, log in enumerate(() if kept.problem.by_torque else kept.problem.logs):
+    for i, log in enumerate(() if fit.problem.by_torque else fit.problem.logs):
         if (mask := standing(log)).any():
-            yield from _on_standing(kept, i, mask)
+            yield from _on_standing(fit, i, mask)
 
 
-def _on_standing(kept: Trial, i: int, mask: np.ndarray) -> Iterator[Verdict]:
+def _on_standing(fit: JointFit, i: int, mask: np.ndarray) -> Iterator[Verdict]:
     """Compare a log that stands at full duty with what the others say: it must lie within the level of friction."""
-    log, values = kept.problem.logs[i], kept.folds[i * kept.problem.parts]
-    plant, joint = kept.problem.plant_numbers(values, log), kept.problem.friction(values)
+    log, values = fit.problem.logs[i], fit.folds[i * fit.problem.parts]
+    plant, joint = fit.problem.plant_numbers(values, log), fit.problem.friction(values)
     driven = plant.torque_gain * log.volts[mask]
     outside = (log.outside - plant.moment * np.sin(log.q - plant.offset))[mask]
     most = joint.mu_s + np.abs(joint.load_motor * driven - joint.load_external * outside)
