@@ -178,10 +178,18 @@ def test_logs_are_read_and_refused(tmp_path):
     file.write_text("t,x,torque\n0,0,0\n")
     with pytest.raises(FileError, match="no column q"):
         JointLog.from_csv(file)
+    file.write_text("t [s],q [deg],torque [N m]\n0,0,0\n")
+    with pytest.raises(FileError, match=r"q must be in rad, got the column 'q \[deg\]'"):
+        JointLog.from_csv(file)
 
 
-def test_what_leaves_the_scale_open_is_refused():
+def test_other_units_and_what_leaves_the_scale_open_are_refused():
     logs = servo_logs(SERVO, 1)
+    log = logs[0]
+    with pytest.raises(InvalidValueError, match="time of log 0 must be in s, got steps of 5"):
+        identify_joint(dataclasses.replace(log, time=1e3 * log.time), PENDULUM)
+    with pytest.raises(InvalidValueError, match="q of log 0 must be in rad, got a swing of "):
+        identify_joint(dataclasses.replace(log, q=np.degrees(log.q)), PENDULUM)
     with pytest.raises(InvalidValueError, match="plant must have a mass or an inertia"):
         identify_joint(logs, Plant())
     with pytest.raises(InvalidValueError, match="terms must have load with directional"):

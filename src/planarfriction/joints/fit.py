@@ -126,13 +126,13 @@ def identify_joint(
     by that much also in either half of the logs if the other half is fitted. Fewer than four logs are cut into parts
     that are left out in turn. `progress` is told each step; what it raises, and Ctrl-C, end the fit.
 
-    Raises InvalidValueError for unknown terms, logs of both kinds, and a plant and drive that leave the scale of the
-    torques open.
+    Raises InvalidValueError for unknown terms, logs of both kinds, in ms or degrees, and a plant and drive that leave
+    the scale of the torques open.
     """
     if progress is not None and not callable(progress):
         raise InvalidValueError("progress", "be a function of words, or None", progress)
-    logs, progress = as_joint_logs(logs), progress or (lambda words: None)
     plant = validation.instance("plant", plant, Plant, "a Plant")
+    logs, progress = as_joint_logs(logs, plant), progress or (lambda words: None)
     gain = None if torque_gain is None else validation.positive("torque_gain", torque_gain)
     auto = isinstance(terms, str) and terms == "auto"
     chosen = () if auto else tuple(validation.choices("terms", terms, TERMS))

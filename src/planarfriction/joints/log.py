@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,8 +27,17 @@ ALIASES = {
 }
 """Other names of columns, in small letters."""
 
-COLUMNS = ("torque", "dq", "enabled", "goal", "duty", "voltage", "supply", "external")
-"""Columns beside t and q."""
+COLUMNS = {
+    **{"torque": "Nm", "dq": "rad/s", "enabled": "", "goal": "rad", "duty": "", "voltage": "V", "supply": "V"},
+    "external": "Nm",
+}
+"""Columns beside t and q, with their units."""
+
+UNITS = {"t": "s", "q": "rad", **COLUMNS}
+"""Units of all columns."""
+
+SLOW, TURNS = 0.1, 2.0
+"""Time between samples [s] from which on it is taken for ms, and turns of a pendulum for degrees."""
 
 
 @dataclass(frozen=True)
@@ -186,8 +196,12 @@ class JointLog(ByValue):
         table = Table(path)
         headings: dict[str, str] = {}
         for heading in table.names:
-            word = heading.split("[")[0].split("(")[0].strip().lower()
-            headings.setdefault(ALIASES.get(word, word), heading)
+            word, *unit = re.split(r"[\[(]", heading.lower())
+            name = ALIASES.get(word.strip(), word.strip())
+            headings.setdefault(name, heading)
+            wanted = UNITS.get(name, "")
+            if unit and wanted and re.sub(r"[^a-z/]", "", unit[0]) != wanted.lower():
+                raise FileError(f"{path}: {name} must be in {wanted}, got the column {heading!r}")
         if missing := [each for each in ("t", "q") if each not in headings]:
             raise FileError(f"{path}: no column {missing[0]} (t, q, and torque, voltage or goal)")
         names = ["t", "q", *(each for each in COLUMNS if each in headings)]
@@ -203,11 +217,16 @@ class JointLog(ByValue):
             raise FileError(f"{path}: {error}") from None
 
 
-def as_joint_logs(logs: JointLog | Sequence[JointLog]) -> tuple[JointLog, ...]:
-    """Return one log or several as a tuple, or raise InvalidValueError."""
+def as_joint_logs(logs: JointLog | Sequence[JointLog], plant: Plant) -> tuple[JointLog, ...]:
+    """Return one log or several as a tuple, or raise InvalidValueError, for other units than s and rad too."""
     result = (logs,) if isinstance(logs, JointLog) else tuple(logs) if isinstance(logs, Sequence) else ()
     if not result or not all(isinstance(each, JointLog) for each in result):
         raise InvalidValueError("logs", "be a JointLog or a list of them", logs)
     if len({each.torque is None for each in result}) > 1:
         raise InvalidValueError("logs", "all hold a torque, or none", "some do")
+    for log in result:
+        if (step := float(np.median(np.diff(log.time)))) > SLOW:
+            raise InvalidValueError(f"time of {log.name}", "be in s", f"steps of {step:.3g}: is it in ms?")
+        if plant.mass and (swing := float(np.ptp(log.q))) > TURNS * 2.0 * np.pi:
+            raise InvalidValueError(f"q of {log.name}", "be in rad", f"a swing of {swing:.3g}: is it in degrees?")
     return result
