@@ -27,7 +27,7 @@ def test_a_load_explains_the_logs(logs):
     """0.045 rad without, below 0.031 with a load, when all eight are fitted."""
     plain, loaded = (identify_joint(logs, PENDULUM, terms=terms) for terms in ((), ("load",)))
     assert plain.error == pytest.approx(0.0447, abs=1e-3) and loaded.error < 0.031
-    assert loaded.trial.errors.mean() < 0.8 * plain.trial.errors.mean()
+    assert loaded.errors.mean() < 0.8 * plain.errors.mean()
     assert np.isclose(loaded.values["load"], 0.19, atol=0.03)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planarfriction.errors import FileError, InvalidValueError
-from planarfriction.joints import Drive, JointFriction, JointLog, Plant, identify_joint
+from planarfriction.joints import Drive, JointFit, JointFriction, JointLog, Plant, identify_joint
 from planarfriction.joints.fit import improves
 from planarfriction.joints.loops.runs import run_measured
 from planarfriction.joints.problem import Problem
@@ -38,7 +38,7 @@ def servo_logs(values, count=4, off=True):
         on = np.where((t > 1.2) & (t < 2.2) & off & (i % 2 == 0), 0.0, 1.0)
         drive = Drive(float([100, 400, 200, 800][i % 4]), 7.3, 0.0029, 0.25)
         log = JointLog(t, np.zeros(len(t)), goal=wave, enabled=on, drive=drive, name=f"log {i}")
-        q = Problem((log,), PENDULUM, None, ("load",) if "load" in values else ()).simulated(values, log)[:, 0]
+        q = Problem((log,), PENDULUM, None, ("load",) if "load" in values else ()).simulated(values, [log])[0][:, 0]
         logs.append(dataclasses.replace(log, q=np.round(q * 4096 / (2.0 * np.pi)) * 2.0 * np.pi / 4096))
     return logs
 
@@ -54,7 +54,7 @@ def test_six_parameters_come_back_from_a_noisy_torque():
         {n: getattr(LUGRE, n) for n in names}, rel=0.01
     )
     assert fit.unit == "N m" and fit.error < 0.01
-    (log,), friction = fit.trial.problem.logs, fit.friction
+    (log,), friction = fit.problem.logs, fit.friction
     upper, lower, side = (axes.get_lines() for axes in fit.plot().axes)
     np.testing.assert_allclose(upper[0].get_ydata(), log.torque)
     np.testing.assert_allclose(upper[2].get_ydata(), fit.torque(log))
@@ -71,7 +71,7 @@ def test_a_load_is_claimed_where_there_is_one(load, monkeypatch):
     truth = SERVO | ({"load": load} if load else {})
     fit = identify_joint(servo_logs(truth), PENDULUM)
     assert fit.terms == (("load",) if load else ())
-    assert fit.error < 2e-3 and fit.trial.errors.mean() <= fit.baseline.errors.mean()
+    assert fit.error < 2e-3 and fit.errors.mean() <= fit.baseline.errors.mean()
     for name in ("inertia", "torque_gain", "back_emf"):
         assert fit.values[name] == pytest.approx(truth[name], rel=0.05)
     text = words(fit)
@@ -112,13 +112,15 @@ def test_a_late_speed_is_measured():
 
 
 def test_a_term_must_gain_more_than_its_scatter():
-    def trial(errors):
-        return Trial(None, {}, (), np.array(errors), np.array(errors))
+    def trial(errors, first=None):
+        errors = np.array(errors)
+        return Trial(None, {}, (), {}, errors, errors, (errors[:2] if first is None else np.array(first), errors[2:]))
 
     base = trial([1.0, 2.0, 1.0, 3.0])
     assert improves(trial([0.8, 1.7, 0.8, 2.4]), base)
     assert not improves(trial([0.5, 2.4, 0.6, 3.3]), base)  # two better, two worse
     assert not improves(trial([0.9, 1.8, 0.9, 2.7]), base)  # evenly, but as little as a wrong term may
+    assert not improves(trial([0.8, 1.7, 0.8, 2.4], first=[0.9, 1.9]), base)  # little where the last two were fitted
 
 
 def test_spreads_intervals_and_words_have_their_numbers():
@@ -128,14 +130,21 @@ def test_spreads_intervals_and_words_have_their_numbers():
         values | {"mu_c": each, "sigma_0": 5e3 * each, "sigma_1": 2.0 + 50.0 * each} for each in (0.01, 0.02, 0.03)
     ]
     errors, less = np.array([1.0, 1.0, 1.0]), np.exp([0.2, 0.3, 0.4])
-    kept = Trial(Problem((log,), PENDULUM, None, ()), values, tuple(folds), errors, errors)
+    again = values | {"sigma_2": 0.006}  # the same but for one, that is shifted by 0.001
+    kept = Trial(Problem((log,), PENDULUM, None, ()), values, tuple(folds), again, errors, errors, ())
     # jackknife: sqrt((n - 1)/n sum of squares); 4.30265 and 2.91999 are quantiles 0.975 and 0.95 of Student's t
     assert kept.spread["mu_c"] == pytest.approx(0.02 / np.sqrt(3.0), rel=1e-12)
+    assert kept.spread["sigma_2"] == pytest.approx(0.001, rel=1e-9)
     far = 4.30265 * 0.02 / np.sqrt(3.0)
     assert kept.interval("mu_c") == pytest.approx((1e-9, 0.02 + far), rel=1e-5)  # not below the least value
     assert kept.interval("sigma_0") == pytest.approx(100.0 * np.exp([-50.0 * far, 50.0 * far]), rel=1e-4)
-    assert kept.gain(Trial(None, {}, (), less, less)) == pytest.approx((0.3, 2.91999 * 0.1 / np.sqrt(3.0)), rel=1e-5)
-    said = "\n".join(map(str, judge(kept, {})))
+    gain, scatter, halves = kept.gains(Trial(None, {}, (), {}, less, less, ()))
+    assert (gain, scatter) == pytest.approx((0.3, 2.91999 * 0.1 / np.sqrt(3.0)), rel=1e-5) and halves == []
+    wide = dataclasses.replace(kept, problem=kept.problem.with_terms(["load"]), values=values | {"mu_c": 0.05})
+    fit = JointFit(**vars(kept), baseline=kept, trials={}, verdicts=())
+    shifted = dataclasses.replace(fit, trials={"load": (wide, kept)}).spread  # by a fit with one term more
+    assert shifted["mu_c"] == pytest.approx(np.hypot(0.02 / np.sqrt(3.0), 0.03), rel=1e-12)
+    said = words(dataclasses.replace(fit, verdicts=judge(fit)))
     assert "kt/R = 0.1 N m/V; with the drive off: kt = 0.3 N m/A, R = 3 Ohm" in said  # 0.03/0.1 and 0.03/0.1^2
     assert "all torques grow by 1.2 % for each 10 g" in said  # half of 10 g over 400 g
     assert "lags by 20 ms (20 to 20)" in said
@@ -169,10 +178,18 @@ def test_logs_are_read_and_refused(tmp_path):
     file.write_text("t,x,torque\n0,0,0\n")
     with pytest.raises(FileError, match="no column q"):
         JointLog.from_csv(file)
+    file.write_text("t [s],q [deg],torque [N m]\n0,0,0\n")
+    with pytest.raises(FileError, match=r"q must be in rad, got the column 'q \[deg\]'"):
+        JointLog.from_csv(file)
 
 
-def test_what_leaves_the_scale_open_is_refused():
+def test_other_units_and_what_leaves_the_scale_open_are_refused():
     logs = servo_logs(SERVO, 1)
+    log = logs[0]
+    with pytest.raises(InvalidValueError, match="time of log 0 must be in s, got steps of 5"):
+        identify_joint(dataclasses.replace(log, time=1e3 * log.time), PENDULUM)
+    with pytest.raises(InvalidValueError, match="q of log 0 must be in rad, got a swing of "):
+        identify_joint(dataclasses.replace(log, q=np.degrees(log.q)), PENDULUM)
     with pytest.raises(InvalidValueError, match="plant must have a mass or an inertia"):
         identify_joint(logs, Plant())
     with pytest.raises(InvalidValueError, match="terms must have load with directional"):

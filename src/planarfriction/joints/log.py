@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,8 +27,17 @@ ALIASES = {
 }
 """Other names of columns, in small letters."""
 
-COLUMNS = ("torque", "dq", "enabled", "goal", "duty", "voltage", "supply", "external")
-"""Columns beside t and q."""
+COLUMNS = {
+    **{"torque": "Nm", "dq": "rad/s", "enabled": "", "goal": "rad", "duty": "", "voltage": "V", "supply": "V"},
+    "external": "Nm",
+}
+"""Columns beside t and q, with their units."""
+
+UNITS = {"t": "s", "q": "rad", **COLUMNS}
+"""Units of all columns."""
+
+SLOW, TURNS = 0.1, 2.0
+"""Time between samples [s] from which on it is taken for ms, and turns of a pendulum for degrees."""
 
 
 @dataclass(frozen=True)
@@ -125,29 +134,12 @@ class JointLog(ByValue):
     name: str = "joint"
     """Name for messages and plots."""
 
-    if TYPE_CHECKING:  # what is given may be more than what is kept
-
-        def __init__(
-            self,
-            time: ArrayLike,
-            q: ArrayLike,
-            torque: ArrayLike | None = None,
-            dq: ArrayLike | None = None,
-            enabled: ArrayLike | None = None,
-            goal: ArrayLike | None = None,
-            voltage: ArrayLike | None = None,
-            external: ArrayLike | None = None,
-            drive: Drive | None = None,
-            name: str = "joint",
-        ) -> None: ...
-
     def __post_init__(self) -> None:
         validation.instance("name", self.name, str, "a text")
         time = increasing(self.time, f"time of {self.name}", LEAST_SAMPLES)
-        given = {name: getattr(self, name) for name in ("q", *COLUMNS) if hasattr(self, name)}
-        self._set(time=time, **{
-            name: validation.array(name, value, (len(time),)) for name, value in given.items() if value is not None
-        })  # fmt: skip
+        given = {each: getattr(self, each, None) for each in ("q", *COLUMNS)}
+        columns = {each: value for each, value in given.items() if value is not None}
+        self._set(time=time, **{each: validation.array(each, columns[each], (len(time),)) for each in columns})
         if self.drive is not None:
             validation.instance("drive", self.drive, Drive, "a Drive")
         if self.torque is None and self.voltage is None and (self.goal is None or self.drive is None):
@@ -190,22 +182,6 @@ class JointLog(ByValue):
             raise InvalidValueError(self.name, "hold a voltage, or a goal with a drive", "neither")
         return self.on * self.drive.voltage(self.drive.duty(self.goal - self.q))
 
-    def cut(self, parts: int) -> list[JointLog]:
-        """Cut the log into parts of like length.
-
-        Raises InvalidValueError for parts of fewer than ten samples.
-        """
-        parts = validation.count("parts", parts, at_most=len(self.time) // LEAST_SAMPLES)
-        values = {each: getattr(self, each, None) for each in ("time", "q", *COLUMNS)}
-        fields = {each: value for each, value in values.items() if value is not None}
-        bounds = np.linspace(0, len(self.time), parts + 1).astype(int)
-        return [
-            JointLog(
-                **{key: value[i:j] for key, value in fields.items()}, drive=self.drive, name=f"{self.name}, part {k}"
-            )
-            for k, (i, j) in enumerate(pairwise(bounds), 1)
-        ]
-
     @classmethod
     def from_csv(cls, path: str | Path, *, drive: Drive | None = None) -> JointLog:
         """Read a log from a CSV file with a heading: t [s], q [rad], and any of torque [N m], dq [rad/s], enabled,
@@ -220,8 +196,12 @@ class JointLog(ByValue):
         table = Table(path)
         headings: dict[str, str] = {}
         for heading in table.names:
-            word = heading.split("[")[0].split("(")[0].strip().lower()
-            headings.setdefault(ALIASES.get(word, word), heading)
+            word, *unit = re.split(r"[\[(]", heading.lower())
+            name = ALIASES.get(word.strip(), word.strip())
+            headings.setdefault(name, heading)
+            wanted = UNITS.get(name, "")
+            if unit and wanted and re.sub(r"[^a-z/]", "", unit[0]) != wanted.lower():
+                raise FileError(f"{path}: {name} must be in {wanted}, got the column {heading!r}")
         if missing := [each for each in ("t", "q") if each not in headings]:
             raise FileError(f"{path}: no column {missing[0]} (t, q, and torque, voltage or goal)")
         names = ["t", "q", *(each for each in COLUMNS if each in headings)]
@@ -237,11 +217,16 @@ class JointLog(ByValue):
             raise FileError(f"{path}: {error}") from None
 
 
-def as_joint_logs(logs: JointLog | Sequence[JointLog]) -> tuple[JointLog, ...]:
-    """Return one log or several as a tuple, or raise InvalidValueError."""
+def as_joint_logs(logs: JointLog | Sequence[JointLog], plant: Plant) -> tuple[JointLog, ...]:
+    """Return one log or several as a tuple, or raise InvalidValueError, for other units than s and rad too."""
     result = (logs,) if isinstance(logs, JointLog) else tuple(logs) if isinstance(logs, Sequence) else ()
     if not result or not all(isinstance(each, JointLog) for each in result):
         raise InvalidValueError("logs", "be a JointLog or a list of them", logs)
     if len({each.torque is None for each in result}) > 1:
         raise InvalidValueError("logs", "all hold a torque, or none", "some do")
+    for log in result:
+        if (step := float(np.median(np.diff(log.time)))) > SLOW:
+            raise InvalidValueError(f"time of {log.name}", "be in s", f"steps of {step:.3g}: is it in ms?")
+        if plant.mass and (swing := float(np.ptp(log.q))) > TURNS * 2.0 * np.pi:
+            raise InvalidValueError(f"q of {log.name}", "be in rad", f"a swing of {swing:.3g}: is it in degrees?")
     return result

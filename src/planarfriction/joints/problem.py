@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from planarfriction.joints.friction import JointFriction
 from planarfriction.joints.log import GRAVITY, JointLog, Plant
-from planarfriction.joints.loops.plant import VARIED, PlantNumbers, run_plant
+from planarfriction.joints.loops.plant import PlantNumbers, run_plant
 from planarfriction.joints.loops.runs import run_measured
 
 
@@ -50,14 +50,23 @@ TERMS: dict[str, tuple[str, ...]] = {
 }
 """Terms beside Coulomb and viscous friction, in the order in which they are tried, with their parameters."""
 
+UNKNOWN = ("inertia", "arm_mass", "offset")
+"""Numbers of a plant that are estimated where they are not given."""
+
+LEAST_INERTIA = 1e-12
+"""Inertia that stands for none [kg m^2]."""
+
 NEEDS = {"directional": "load"}
 """Terms that stand beside another alone."""
 
 STEP = 2e-3
 """Longest step of a simulated run [s]: a tenth of it moves positions by 4e-5 rad on average, with bristles by 5e-4."""
 
-DIFFERENCE = 1e-3
-"""Step of differences of torques, over the size of a parameter."""
+SHORT = 0.2
+"""Time after which a simulated run begins again where terms are judged [s]."""
+
+DIFFERENCE = 1e-5
+"""Step of differences, over the size of a parameter."""
 
 MOVING = 0.05
 """Share of the largest speed above which the torque balance counts a joint as moving."""
@@ -73,7 +82,7 @@ class Problem:
     """Known kt/R [N m/V], or None."""
     terms: tuple[str, ...]
     parts: int = 1
-    """Parts of a log with a measured torque that count as groups; other logs are cut before."""
+    """Parts of each log that count as groups."""
 
     @property
     def by_torque(self) -> bool:
@@ -81,26 +90,21 @@ class Problem:
         return self.logs[0].torque is not None
 
     @property
-    def seen_off(self) -> bool:
-        """True if a log moves while the drive is off."""
-        return any((moving(log) & (log.on == 0.0)).any() for log in self.logs)
-
-    @property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters that are estimated, `[P]`.
 
         Without a torque, the mass of an arm would only scale all torques: it is then none.
         """
-        unknown = [each for each in ("inertia", "arm_mass", "offset") if getattr(self.plant, each) is None]
-        if self.by_torque:
-            return (*unknown, "mu_c", "sigma_2", *self._more)
-        unknown = [each for each in unknown if each != "arm_mass"]
-        gain = ["torque_gain"] if self.torque_gain is None else []
-        return (*unknown, *gain, *(["back_emf"] if self.seen_off else []), "mu_c", "sigma_2", *self._more)
+        names = [each for each in UNKNOWN if getattr(self.plant, each) is None]
+        if not self.by_torque:
+            names = [each for each in names if each != "arm_mass"]
+            names += ["torque_gain"] if self.torque_gain is None else []
+            names += ["back_emf"] if any((moving(log) & (log.on == 0.0)).any() for log in self.logs) else []
+        return (*names, "mu_c", "sigma_2", *self._more)
 
     @property
-    def _more(self) -> Iterator[str]:
-        return (name for term in self.terms for name in TERMS[term])
+    def _more(self) -> list[str]:
+        return [name for term in self.terms for name in TERMS[term]]
 
     def with_terms(self, terms: Sequence[str]) -> Problem:
         """Return the problem with other terms."""
@@ -117,43 +121,33 @@ class Problem:
 
     def settled(self, values: Mapping[str, float]) -> Plant:
         """Make the plant of parameters by name."""
-        known = {each: getattr(self.plant, each) for each in ("inertia", "arm_mass", "offset")}
-        return replace(self.plant, **{each: values.get(each, value or 0.0) for each, value in known.items()})
+        return replace(self.plant, **{each: values.get(each, getattr(self.plant, each) or 0.0) for each in UNKNOWN})
 
     def plant_numbers(self, values: Mapping[str, float], log: JointLog) -> PlantNumbers:
         """Return what the loops read of plant and drive."""
-        plant, drive = self.settled(values), log.drive if log.voltage is None else None
-        arm = plant.arm_mass or 0.0
-        inertia = (plant.inertia or 0.0) + (plant.mass + arm / 3.0) * plant.length**2
+        plant, drive = self.plant, log.drive if log.voltage is None else None
+        inertia, arm, offset = (values.get(each, getattr(plant, each) or 0.0) for each in UNKNOWN)
+        inertia += (plant.mass + arm / 3.0) * plant.length**2
         moment = (plant.mass + 0.5 * arm) * GRAVITY * plant.length
-        gain = values.get("torque_gain", self.torque_gain or 0.0)
+        gain, back_emf = values.get("torque_gain", self.torque_gain or 0.0), values.get("back_emf", 0.0)
         servo = (0.0, 0.0, 0.0) if drive is None else (drive.kp * drive.gain, drive.supply, drive.sag)
-        return PlantNumbers(max(inertia, 1e-12), moment, plant.offset or 0.0, gain, values.get("back_emf", 0.0), *servo)
+        return PlantNumbers(max(inertia, LEAST_INERTIA), moment, offset, gain, back_emf, *servo)
 
     # ------------------------------------------------------------------ errors
 
-    def simulated(self, values: Mapping[str, float], log: JointLog, span: float = np.inf) -> np.ndarray:
-        """Simulate q and dq `[T, 2]` from goal or voltage; the run begins at the measured motion every `span` [s]."""
-        return self._run(values, log, span, np.empty((len(VARIED), 0)))[0]
+    def simulated(
+        self, values: Mapping[str, float], logs: Sequence[JointLog], span: float = np.inf
+    ) -> list[np.ndarray]:
+        """Simulate q and dq `[T, 2]` of logs from goal or voltage.
 
-    def _run(
-        self, values: Mapping[str, float], log: JointLog, span: float, seeds: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return q and dq `[T, 2]`, and the slopes of q by P parameters `[T, P]`, of whose numbers `seeds` are."""
-        motion, slopes = np.empty((len(log.time), 2)), np.empty((len(log.time), seeds.shape[1]))
-        again = int(min(max(2.0, span * len(log.time) / (log.time[-1] - log.time[0])), 1e9))
-        joint, plant = self.friction(values).rigid_numbers, self.plant_numbers(values, log)
-        given, lanes = log.goal if log.voltage is None else log.voltage, np.empty((9, seeds.shape[1]))
-        run_plant(
-            joint, plant, log.time, given, log.on, log.outside, log.motion, again, STEP, seeds, lanes, motion, slopes
-        )
-        return motion, slopes
-
-    def _numbers(self, values: Mapping[str, float]) -> np.ndarray:
-        """Return `VARIED` at parameters by name: linear in each of them."""
-        joint, plant = self.friction(values).rigid_numbers, self.plant_numbers(values, self.logs[0])
-        named = {**joint.law._asdict(), **joint._asdict(), **plant._asdict()}
-        return np.array([named[each] for each in VARIED])
+        Runs begin again at the measured motion every `span` [s].
+        """
+        motions, joint = [np.empty((len(log.time), 2)) for log in logs], self.friction(values).rigid_numbers
+        for log, motion in zip(logs, motions, strict=True):
+            plant, given = self.plant_numbers(values, log), log.goal if log.voltage is None else log.voltage
+            again = int(min(max(2.0, span * len(log.time) / (log.time[-1] - log.time[0])), 1e9))
+            run_plant(joint, plant, log.time, given, log.on, log.outside, log.motion, again, STEP, motion)
+        return motions
 
     def torque(self, values: Mapping[str, float], log: JointLog) -> np.ndarray:
         """Compute the torque [N m] that the measured motion of a log takes, `[T]`."""
@@ -162,37 +156,35 @@ class Problem:
         run_measured(self.friction(values).numbers, log.time, log.speed, log.torque, outside, taken)
         return plant.inertia * log.acceleration - outside + taken
 
-    def errors(self, values: Mapping[str, float], span: float = np.inf, without: int = -1) -> list[np.ndarray]:
-        """Compute the errors of each group of samples [rad], or [N m]; empty for the group that is left out."""
+    def errors(self, values: Mapping[str, float], span: float = np.inf) -> list[np.ndarray]:
+        """Compute the errors of each group of samples [rad], or [N m]."""
         if self.by_torque:
-            whole = [self.torque(values, log) - log.torque for log in self.logs]
-            groups = [each for log in whole for each in np.array_split(log, self.parts)]
-            return [each[:0] if i == without else each for i, each in enumerate(groups)]
-        return [
-            np.empty(0) if i == without else self.simulated(values, log, span)[:, 0] - log.q
-            for i, log in enumerate(self.logs)
-        ]
+            return self._groups([self.torque(values, log) - log.torque for log in self.logs])
+        runs = zip(self.simulated(values, self.logs, span), self.logs, strict=True)
+        return self._groups([motion[:, 0] - log.q for motion, log in runs])
 
-    def slopes(self, values: Mapping[str, float], span: float = np.inf, without: int = -1) -> np.ndarray:
-        """Compute the slopes of all errors by the parameters, `[T, P]`: of runs exactly, of torques by differences."""
-        if self.by_torque:
-            here, columns = np.concatenate(self.errors(values, span, without)), []
-            for name in self.names:
-                step = DIFFERENCE * max(abs(values[name]), PARAMETERS[name].scale)
-                more = self.errors({**values, name: values[name] + step}, span, without)
-                columns.append((np.concatenate(more) - here) / step)
-            return np.column_stack(columns)
-        here = self._numbers(values)
-        seeds = np.column_stack([self._numbers({**values, name: values[name] + 1.0}) - here for name in self.names])
-        logs = (log for i, log in enumerate(self.logs) if i != without)
-        return np.concatenate([self._run(values, log, span, seeds)[1] for log in logs])
+    def costs(self, values: Mapping[str, float], span: float = np.inf) -> np.ndarray:
+        """Compute the mean absolute error of each group, [rad] or [N m]."""
+        return np.array([np.abs(each).mean() for each in self.errors(values, span)])
+
+    def slopes(self, values: Mapping[str, float], span: float = np.inf) -> list[np.ndarray]:
+        """Compute the slopes of each group's errors by the parameters by differences, `[T, P]`."""
+        here, columns = self.errors(values, span), []
+        for name in self.names:
+            step = DIFFERENCE * max(abs(values[name]), PARAMETERS[name].scale)
+            more = self.errors({**values, name: values[name] + step}, span)
+            columns.append([(far - near) / step for far, near in zip(more, here, strict=True)])
+        return [np.column_stack(each) for each in zip(*columns, strict=True)]
+
+    def _groups(self, rows: list[np.ndarray]) -> list[np.ndarray]:
+        """Cut the rows of each log into its groups."""
+        return [each for log in rows for each in np.array_split(log, self.parts)]
 
     @property
     def groups(self) -> list[str]:
         """Names of the groups that are left out in turn."""
-        if not self.by_torque or self.parts == 1:
-            return [log.name for log in self.logs]
-        return [f"{log.name}, part {k + 1}" for log in self.logs for k in range(self.parts)]
+        parts = [f", part {k + 1}" for k in range(self.parts)] if self.parts > 1 else [""]
+        return [log.name + part for log in self.logs for part in parts]
 
     # ------------------------------------------------------------------ start
 
@@ -201,38 +193,28 @@ class Problem:
 
         `I a - tau_e + mu_c sign(v) + sigma_2 v = kt/R V - back_emf v`, or a measured torque.
         """
-        names = [each for each in self.names if each in ("inertia", "arm_mass", "offset", "torque_gain", "back_emf")]
-        names += ["mu_c", "sigma_2"]
-        rows, right = [], []
+        names = [each for each in self.names if each not in self._more]
+        zero, rows, right = dict.fromkeys(names, 0.0), [], []
         for log in self.logs:
-            v, a, plant = log.speed, log.acceleration, self.plant
-            on, moves = log.on, moving(log)
-            weight = GRAVITY * plant.length * np.sin(log.q - (plant.offset or 0.0))
-            columns = {
-                "inertia": a,
-                "arm_mass": plant.length**2 / 3.0 * a + 0.5 * weight,
-                "offset": -plant.mass * GRAVITY * plant.length * np.cos(log.q),
-                "back_emf": on * v,
-                "mu_c": np.sign(v),
-                "sigma_2": v,
-            }
-            pushed: Any = log.torque if self.by_torque else (self.torque_gain or 0.0) * log.volts
-            if not self.by_torque:
-                columns["torque_gain"] = -log.volts
-            inertia = (plant.inertia or 0.0) + (plant.mass + (plant.arm_mass or 0.0) / 3.0) * plant.length**2
-            known = inertia * a + (plant.mass + 0.5 * (plant.arm_mass or 0.0)) * weight - log.outside
-            rows.append(np.column_stack([columns[each] for each in names])[moves])
-            right.append((pushed - known)[moves])
+            here, moves = self._balance(zero, log), moving(log)
+            columns = [(self._balance({**zero, name: PARAMETERS[name].scale}, log) - here) for name in names]
+            rows.append(np.column_stack(columns)[moves] / [PARAMETERS[name].scale for name in names])
+            right.append(-here[moves])
         table = np.concatenate(rows)
         size = np.maximum(np.abs(table).max(axis=0), 1e-300)
-        found = dict(
-            zip(names, np.linalg.lstsq(table / size, np.concatenate(right), rcond=1e-8)[0] / size, strict=True)
-        )
-        speeds = np.concatenate([np.abs(log.speed) for log in self.logs])
+        found = np.linalg.lstsq(table / size, np.concatenate(right), rcond=1e-8)[0] / size
+        fast = max(np.abs(log.speed).max() for log in self.logs)
         forces = np.abs(np.concatenate(right))
-        least = {"mu_c": 0.05 * np.median(forces) + 1e-6, "sigma_2": 0.01 * forces.max() / max(speeds.max(), 1e-9)}
-        found = {each: max(value, least.get(each, PARAMETERS[each].low)) for each, value in found.items()}
-        return {each: min(value, PARAMETERS[each].high) for each, value in found.items()}
+        least = {"mu_c": 0.05 * np.median(forces) + 1e-6, "sigma_2": 0.01 * forces.max() / max(fast, 1e-9)}
+        bounds = ((each, least.get(each, PARAMETERS[each].low), PARAMETERS[each].high) for each in names)
+        return {each: float(np.clip(value, low, high)) for value, (each, low, high) in zip(found, bounds, strict=True)}
+
+    def _balance(self, values: Mapping[str, float], log: JointLog) -> np.ndarray:
+        """Compute the torque that is missing in the balance of rigid friction [N m], `[T]`."""
+        plant, v = self.plant_numbers(values, log), log.speed
+        driven = log.torque if self.by_torque else plant.torque_gain * log.volts - plant.back_emf * log.on * v
+        outside = log.outside - plant.moment * np.sin(log.q - plant.offset)
+        return plant.inertia * log.acceleration - outside + values["mu_c"] * np.sign(v) + values["sigma_2"] * v - driven
 
     def guesses(self, term: str, values: Mapping[str, float]) -> list[dict[str, float]]:
         """Return starts of a term beside the values of a fit without it; the first changes little."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
 from planarfriction.identify.verdicts import Verdict
 from planarfriction.joints.log import JointLog
-from planarfriction.joints.result import Trial
+from planarfriction.joints.result import JointFit
 
 LAGS = np.arange(-20, 61) * 1e-3
 """Delays of a reported speed that are tried [s]."""
@@ -20,51 +20,42 @@ FULL, STANDING, LONG = 0.999, 0.02, 0.1
 """Duty that counts as full, share of the largest speed below which a joint stands, and time that it stands [s]."""
 
 WORDS = {
-    "load": "the level grows with the torque through the gears",
-    "stribeck": "friction falls with speed from rest on",
-    "bristles": "the joint bends before it slips",
-    "directional": "torque of the motor and of the load raise the level by different shares",
+    "load": ("the level grows with the torque through the gears", "not load-dependent as far as these logs tell"),
+    "stribeck": ("friction falls with speed from rest on", "no fall of friction with speed was seen"),
+    "bristles": ("the joint bends before it slips", "give rigid friction, or measure slow reversals"),
+    "directional": (
+        "torque of the motor and of the load raise the level by different shares",
+        "no difference between motor and load driving was seen",
+    ),
 }
-"""Meaning of each term."""
-
-NOT = {
-    "load": "not load-dependent as far as these logs tell",
-    "stribeck": "no fall of friction with speed was seen",
-    "bristles": "bristles not identifiable: give rigid friction, or measure slow reversals",
-    "directional": "no difference between motor and load driving was seen",
-}
-"""Meaning of a term that was not kept."""
+"""Meaning of a term that was kept, and of one that was not."""
 
 
-def judge(kept: Trial, trials: Mapping[str, tuple[Trial, Trial]]) -> tuple[Verdict, ...]:
+def judge(fit: JointFit) -> tuple[Verdict, ...]:
     """Return all verdicts on a fit."""
-    return (*_on_terms(kept, trials), *_on_drive(kept), *_on_logs(kept))
+    return (*_on_terms(fit), *_on_drive(fit), *_on_logs(fit))
 
 
-def _on_terms(kept: Trial, trials: Mapping[str, tuple[Trial, Trial]]) -> Iterator[Verdict]:
-    for term, (trial, without) in trials.items():
-        gain, scatter = trial.gain(without)
-        ratio, low, high = np.exp([-gain, -gain - scatter, -gain + scatter])
+def _on_terms(fit: JointFit) -> Iterator[Verdict]:
+    for term, (trial, without) in fit.trials.items():
+        gain, scatter, halves = trial.gains(without)
+        ratio, low, high, *both = np.exp([-gain, -gain - scatter, -gain + scatter, *np.negative(halves)])
         numbers = f"errors of left-out logs are {ratio:.2f} ({low:.2f} to {high:.2f}) of those without it"
-        good = term in kept.problem.terms
+        numbers += f", {both[0]:.2f} and {both[1]:.2f} if half of the logs are fitted"
+        good = term in fit.terms
         if term == "load":
             numbers += f", b = {trial.values['load']:.2g}"
-        yield Verdict(term, good, f"{WORDS[term] if good else NOT[term]} ({numbers})")
-    yield from _on_bounds(kept)
-
-
-def _on_bounds(kept: Trial) -> Iterator[Verdict]:
-    for name, error in kept.spread.items():
-        value = kept.values[name]
+        yield Verdict(term, good, f"{WORDS[term][0 if good else 1]} ({numbers})")
+    for name, error in fit.spread.items():
+        value = fit.values[name]
         if name in ("sigma_0", "sigma_1", "v_s", "rise") and not 2.0 * error < value:
-            yield Verdict(name, False, f"spread {error:.2g} of {value:.2g} between left-out logs")
+            yield Verdict(name, False, f"spread {error:.2g} of {value:.2g} between fits")
 
 
-def _on_drive(kept: Trial) -> Iterator[Verdict]:
-    problem, values = kept.problem, kept.values
-    if problem.by_torque:
+def _on_drive(fit: JointFit) -> Iterator[Verdict]:
+    problem, values, gain = fit.problem, fit.values, fit.torque_gain
+    if gain is None:
         return
-    gain = values.get("torque_gain", problem.torque_gain or 0.0)
     if "back_emf" in values:
         emf = values["back_emf"]
         kt, resistance = emf / gain, emf / gain**2
@@ -101,30 +92,26 @@ def standing(log: JointLog) -> np.ndarray:
     return mask
 
 
-def _on_logs(kept: Trial) -> Iterator[Verdict]:
-    problem = kept.problem
-    lags = [speed_lag(log) for log in problem.logs if log.dq is not None]
+def _on_logs(fit: JointFit) -> Iterator[Verdict]:
+    lags = [speed_lag(log) for log in fit.problem.logs if log.dq is not None]
     if lags and abs(lag := float(np.median(lags))) > LATE:
         text = f"the reported speed lags by {1e3 * lag:.0f} ms ({1e3 * min(lags):.0f} to {1e3 * max(lags):.0f})"
         yield Verdict("dq", False, f"{text}: the slope of q was used")
-    if problem.by_torque:
-        return
-    for i, log in enumerate(problem.logs):
-        mask = standing(log)
-        if mask.any():
-            yield from _on_standing(kept, i, mask)
+    for i, log in enumerate(() if fit.problem.by_torque else fit.problem.logs):
+        if (mask := standing(log)).any():
+            yield from _on_standing(fit, i, mask)
 
 
-def _on_standing(kept: Trial, i: int, mask: np.ndarray) -> Iterator[Verdict]:
+def _on_standing(fit: JointFit, i: int, mask: np.ndarray) -> Iterator[Verdict]:
     """Compare a log that stands at full duty with what the others say: it must lie within the level of friction."""
-    log, values = kept.problem.logs[i], kept.folds[i]
-    plant, joint = kept.problem.plant_numbers(values, log), kept.problem.friction(values)
+    log, values = fit.problem.logs[i], fit.folds[i * fit.problem.parts]
+    plant, joint = fit.problem.plant_numbers(values, log), fit.problem.friction(values)
     driven = plant.torque_gain * log.volts[mask]
     outside = (log.outside - plant.moment * np.sin(log.q - plant.offset))[mask]
     most = joint.mu_s + np.abs(joint.load_motor * driven - joint.load_external * outside)
     over = float(np.median(np.abs(driven + outside) - most))
-    seconds = float(mask.sum() * np.median(np.diff(log.time)))
-    where = f"{log.name}: saturated and standing for {seconds:.2g} s at {np.median(log.q[mask]):.2f} rad"
     if over > 0.0:
-        text = f"this log contradicts the others, by which {over:.2g} N m are left over to move it"
-        yield Verdict("fit", False, f"{where}: {text}; look for a current limit, heat or a stop")
+        seconds = float(mask.sum() * np.median(np.diff(log.time)))
+        text = f"{log.name}: saturated and standing for {seconds:.2g} s at {np.median(log.q[mask]):.2f} rad"
+        text += f": this log contradicts the others, by which {over:.2g} N m are left over to move it"
+        yield Verdict("fit", False, f"{text}; look for a current limit, heat or a stop")

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction.joints import JointLog
-from planarfriction.joints.loops.plant import VARIED, run_plant
+from planarfriction.joints.loops.plant import run_plant
 from planarfriction.joints.problem import TERMS, Problem
 from planarfriction_studies.measured.joints import PENDULUM, read_logs
 
@@ -82,8 +82,6 @@ def _moved(
     for i, step in enumerate(steps):
         keep = np.exp(-step / MEMORY)
         wander[i + 1] = keep * wander[i] + kick * np.sqrt(1.0 - keep**2) * rng.normal()
-    motion, none = np.empty((len(log.time), 2)), np.empty((len(VARIED), 0))
-    start = log.motion * [1.0, 0.0]
-    run_plant(joint, plant, log.time, log.goal, log.on, wander, start, 10**9, STEP, none, np.empty((9, 0)), motion,
-              np.empty((len(log.time), 0)))  # fmt: skip
+    motion, start = np.empty((len(log.time), 2)), log.motion * [1.0, 0.0]
+    run_plant(joint, plant, log.time, log.goal, log.on, wander, start, 10**9, STEP, motion)
     return dataclasses.replace(log, q=np.round(motion[:, 0] / ENCODER) * ENCODER, dq=None)
