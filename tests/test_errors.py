@@ -50,9 +50,9 @@ def test_what_cannot_travel_stays_behind():
 
 
 def test_packages_that_lack_are_named_and_errors_of_our_own_are_not_hidden():
-    with pytest.raises(errors.MissingExtraError, match=r"^torch is not installed: .*\[torch\]'; for the processor"):
-        with errors.needing("torch", "torch"):
-            raise ImportError("no", name="torch._C")
+    told = r"^torch is not installed: .*\[torch\]'; for the processor"
+    with pytest.raises(errors.MissingExtraError, match=told), errors.needing("torch", "torch"):
+        raise ImportError("no", name="torch._C")
     with pytest.raises(errors.MissingExtraError, match=r"\[jax\]'$"), errors.needing("jax", "jax"):
         raise ImportError("no", name="jaxlib")
     with pytest.raises(ImportError, match="gone") as caught, errors.needing("jax", "jax"):
