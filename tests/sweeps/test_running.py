@@ -250,7 +250,7 @@ def test_a_sweep_goes_on_where_another_has_ended(tmp_path):
 
 def test_progress_is_told_twice_a_second_and_at_the_end(monkeypatch):
     clock, told = [100.0], []
-    monkeypatch.setattr(running.time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(running, "time", SimpleNamespace(monotonic=lambda: clock[0]))
     grid = SimpleNamespace(size=8)
     book = SimpleNamespace(found=2, new=0, failed=1, damaged=0)
     going = running.Sweeping(None, grid, None, None, book, told.append)  # pyright: ignore
