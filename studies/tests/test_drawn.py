@@ -317,7 +317,7 @@ def test_times_over_errors_have_bars_from_quartile_to_quartile():
     (bar,) = axes.collections[0].get_segments()
     assert bar[:, 1] == pytest.approx([0.018, 0.025])
     table = timing._points_table(problem, {"RODAS4": [entry]})
-    assert table.rows[0] == ("RODAS4, 1e-06", "2.0e-07", "20 (18 to 25)", 321, 5) and "12 states" in table.note
+    assert list(table.rows[0]) == ["RODAS4, 1e-06", "2.0e-07", "20 (18 to 25)", 321, 5] and "12 states" in table.note
     data = timing._dataset({"RODAS4": [entry]})
     assert float(data["time"][0]) == 0.02 and data["solver"].values.tolist() == ["RODAS4"]
 

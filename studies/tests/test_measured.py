@@ -610,6 +610,24 @@ def test_regions_hold_ends_at_every_level_in_each_third():
             sized.radii(moved, level)
 
 
+def test_a_check_has_half_axes_in_order_and_shares_of_ends(cases, monkeypatch):
+    test, sizes = cases["slides"][:9], np.linspace(0.1, 1.0, 10)
+    model = contactnets.TossModel(sized=EndRegions(sizes=np.stack([sizes, 2.0 * sizes], axis=1)))
+    region = np.array([[5.0, 3.0, 0.0], [3.0, 5.0, 0.0], [0.0, 0.0, 400.0]]) * 1e-6  # 2 and 8 mm^2 along diagonals
+    far = np.linspace(0.05, 0.85, 9)[:, None] * [1.0, 4.0]
+    monkeypatch.setattr(contactnets.TossModel, "regions", lambda self, questions: np.repeat(region[None], 9, axis=0))
+    monkeypatch.setattr(contactnets.TossModel, "distances", lambda self, cases: far)
+    ends = np.array([case.answer[-1] for case in test])
+    monkeypatch.setattr(contactnets.TossModel, "ends", lambda self, questions: (ends, None))
+    found = model.check(test)
+    assert found["half axis along the path, median [mm]"] == pytest.approx(np.sqrt(8.0))
+    assert found["half axis across it, median [mm]"] == pytest.approx(np.sqrt(2.0))
+    assert found["half width of the interval, median [deg]"] == pytest.approx(np.degrees(0.02))
+    # of ten errors that of rank 6 for half: 0.6 and 1.2, which 6 of 9 and 3 of 9 are within
+    assert found["places inside 50% regions [%]"][0] == pytest.approx(100.0 * 6 / 9)
+    assert found["angles inside 50% regions [%]"][0] == pytest.approx(100.0 * 3 / 9)
+
+
 def test_a_toss_that_was_pushed_is_left_out(tmp_path):
     table = pd.read_csv(shipped() / TABLES["slides"])
     rows = table.toss == table.toss.iloc[0]

@@ -350,6 +350,32 @@ def test_the_worst_time_step_counts():
     assert verdict.dt == 4e-3 and verdict.error / verdict.allowed == pytest.approx(4.0)
 
 
+def test_the_command_judges_with_its_time_step(monkeypatch, capsys, tmp_path):
+    asked = []
+    monkeypatch.setattr(engines, "installed", lambda left_out: iter([Fake(0.5)]))
+    monkeypatch.setattr(Apart, "judge", lambda self, *given: asked.append(given[2]) or judge(*given))
+    for step in ([], ["--step", "0.004"]):
+        assert main(["referee", "--case", "stop", *step]) == 0
+    assert asked == [None, (0.004,)]
+
+
+def test_an_interrupt_tells_how_much_is_done(monkeypatch, capsys, tmp_path):
+    judged = []
+
+    def stop(self, *given):
+        if len(judged) == 3:
+            raise KeyboardInterrupt
+        judged.append(judge(*given))
+        return judged[-1]
+
+    monkeypatch.setattr(engines, "installed", lambda left_out: iter([Fake(0.5), Fake(2.0, name="other")]))
+    monkeypatch.setattr(Apart, "judge", stop)
+    file = str(tmp_path / "referee.json")
+    assert main(["referee", "--case", "stop", "--case", "disc", "--json", file]) == 130
+    told = " ".join(capsys.readouterr().err.split())
+    assert "interrupted: 3 of 4 results are finished: the same command continues from there" in told
+
+
 def test_what_is_done_is_kept(tmp_path):
     def stop(done, of, words):
         assert of == 2

@@ -16,15 +16,19 @@ import pytest
 from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.laws import LAWS, Dahl
 from planarfriction.planning import holding_load
+from planarfriction_explorer import pictures
 from planarfriction_explorer.drawing import Drawing
 from planarfriction_explorer.state import PRESETS, State, answer, to_json, to_link
 
 pn = pytest.importorskip("panel", reason="needs Panel, the extra [explore]")
 
+from bokeh import events  # noqa: E402
+
 from planarfriction_explorer.controls import CHANGED, OWN  # noqa: E402
 from planarfriction_explorer.live import GivenUp, Live  # noqa: E402
 from planarfriction_explorer.page import Page  # noqa: E402
 from planarfriction_explorer.server import open_server  # noqa: E402
+from planarfriction_explorer.views import MapView, SectionView  # noqa: E402
 
 
 @pytest.fixture
@@ -238,6 +242,34 @@ def test_a_scene_file_is_offered_and_a_wrong_one_is_one_line(page):
     assert scenes.scene.value == "mine.toml" and not scenes.model.visible and not page.message.visible
     scenes.scene.value = "free-slide"
     assert scenes.model.visible
+
+
+def test_the_map_has_room_around_it_and_shows_each_picture():
+    places: list[tuple[float, float] | str] = []
+    view = MapView(lambda x, y: places.append((x, y)), lambda: places.append("released"))
+    view.draw(OTHER.drawing)
+    assert [(axis.start, axis.end) for axis in (view.figure.x_range, view.figure.y_range)] == [
+        (pytest.approx(-3.6), pytest.approx(3.6))
+    ] * 2  # 0.6 of 6 mm x 4 mm
+    view.move(OTHER, found := answer(OTHER))
+    shown = {name: dict(source.data) for name, source in view._sources.items()}
+    assert shown["slip"] == pictures.slip_arrows(OTHER) and shown["wrench"] == pictures.wrench_arrows(OTHER, found)
+    assert shown["centre"] == pictures.points_of_interest(OTHER) and "image" in shown["map"]
+    for event in (events.Pan(view.figure, x=2.0, y=-1.0), events.Tap(view.figure, x=3.0, y=4.0)):
+        view.figure._trigger_event(event)
+    assert places[:2] == [pytest.approx((0.002, -0.001)), pytest.approx((0.003, 0.004))] and places[2:] == ["released"]
+
+
+def test_the_section_is_that_of_the_friction_or_is_not_seen():
+    view, found = SectionView(), answer(OTHER)
+    view.move(OTHER, found)
+    angle, lines = pictures.section_lines(OTHER, found)
+    assert view._plot.xaxis[0].axis_label == f"force at {angle:.0f}° to x [N]" and view.layout.visible
+    for name, points in lines.items():
+        data = view._sources[name].data
+        np.testing.assert_array_equal(np.stack([data["force"], data["torque"]], -1), points)
+    view.move(OTHER, None)
+    assert not view.layout.visible
 
 
 # ---------------------------------------------------------------------- work in the background

@@ -67,6 +67,9 @@ def test_errors_of_cells_as_discs_stand_beside_those_of_points():
         for name in ("force", "torque", "breakaway"):
             assert getattr(error.as_discs, name) < 0.9 * getattr(error, name)
         assert str(error).endswith(f"; as discs {error.as_discs}".partition(" (")[0])
+    coarse, fine = patch.grid_error(), patch.grid_error(refined=3)
+    assert fine.as_discs.cells == 27 and fine.as_discs.force < 0.5 * coarse.as_discs.force
+    assert fine.as_discs.torque == pytest.approx(patch.refined(3).discs().grid_error().torque, rel=1e-6)
 
 
 def test_a_shape_that_follows_its_load_is_compared_at_that_load():

@@ -17,6 +17,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ import pytest
 import planarfriction as pf
 from planarfriction import sweeps
 from planarfriction.errors import FileError, SweepError, SweepInterrupted
-from planarfriction.sweeps import bookkeeping, keys, records
+from planarfriction.sweeps import bookkeeping, keys, records, running
 from planarfriction.sweeps.quantities import grid_of
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
@@ -245,6 +246,21 @@ def test_a_sweep_goes_on_where_another_has_ended(tmp_path):
     assert data.identical(reference())  # whichever came from files
     assert told[-1][:5] == (6, 6, 4, 0, 0) and str(told[-1]) == "6 of 6 runs (4 found)"
     assert kept(tmp_path).keys() == set(data.run.values.ravel().tolist())
+
+
+def test_progress_is_told_twice_a_second_and_at_the_end(monkeypatch):
+    clock, told = [100.0], []
+    monkeypatch.setattr(running, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+    grid = SimpleNamespace(size=8)
+    book = SimpleNamespace(found=2, new=0, failed=1, damaged=0)
+    going = running.Sweeping(None, grid, None, None, book, told.append)  # pyright: ignore
+    for passed, at_once, count in ((0.4, False, 0), (0.2, False, 1), (0.4, False, 1), (0.1, False, 2), (0.1, True, 3)):
+        clock[0] += passed
+        book.new += 1
+        going._tell(at_once)
+        assert len(told) == count
+    assert told[0][:5] == (8, 4, 2, 1, 0) and told[0].left == pytest.approx(0.6 / 2 * 4)
+    assert told[2].left == pytest.approx(1.2 / 5 * 1)
 
 
 def test_damaged_files_do_not_count(tmp_path):
