@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 
 import numpy as np
@@ -19,8 +20,11 @@ from tests.support.identification_logs import truth
 RATE, DURATION = 200.0, 6.0
 
 
-def random_case(seed: int):
-    """A log of a random contact on a line, about a pivot, or in the plane; its patch, its law and its model."""
+def random_case(seed: int, varying: bool = False):
+    """A log of a random contact on a line, about a pivot, or in the plane; its patch, its law and its model.
+
+    A load that varies does so by 30 to 100 %, and the stiffness follows it or not.
+    """
     draw = np.random.default_rng(seed)
     kind, model = (
         draw.choice(["line", "line", "pivot", "plane", "plane"]),
@@ -46,9 +50,13 @@ def random_case(seed: int):
             grown = np.exp(3.5 * (t / t[-1] - 1.0))
             rates = draw.uniform(0.3, 3.0, 2)
             twist[:, k] = scale * grown * (np.sin(2 * np.pi * rates[0] * t) + 0.3 * np.sin(2 * np.pi * rates[1] * t))
+    if varying:
+        model, rate = "reduced", draw.uniform(0.2, 1.5)
+        load = load * (1.0 + draw.uniform(0.3, 1.0) * (0.5 - 0.5 * np.cos(2.0 * np.pi * rate * t)))
+        law = dataclasses.replace(law, reference_load=None if draw.random() < 0.5 else float(load.mean()))
     prediction = Prediction(SIMULATORS[model](patch, law), Log(t, twist, np.ones_like(twist), load), twist, refine=16)
-    vector = parameters_of(pf.ReducedModelPublished(patch, law))
-    if model == "distributed":
+    vector = parameters_of(pf.ReducedModelPublished(patch, dataclasses.replace(law, reference_load=None)))
+    if model != "reduced-published":
         vector[8] = patch.contact_radius()
     size, u = draw.choice([0.0, 0.0, 1.0, 6.0]), 2.0 * t / t[-1] - 1.0
     sizes = size * draw.standard_normal(8)
@@ -58,15 +66,15 @@ def random_case(seed: int):
     wrench += draw.uniform(0.003, 0.03) * wrench.std(axis=0) * draw.standard_normal(wrench.shape)
     wrench = np.where(np.isin(np.arange(3), columns), wrench, 0.0)
     true = {
-        **truth(law, patch),
-        **({"contact_radius": float(patch.contact_radius())} if model == "distributed" else {}),
+        **truth(dataclasses.replace(law, reference_load=None), patch),
+        **({"contact_radius": float(patch.contact_radius())} if model != "reduced-published" else {}),
     }
     return Log(t, twist, wrench, load, f"{kind} {seed}"), patch, law, model, true, size
 
 
-def judged(seed: int, model: str | None = None):
+def judged(seed: int, model: str | None = None, varying: bool = False):
     """Fit a random log; returns the result and the errors over standard errors of what is called identified."""
-    log, patch, _, own, true, _ = random_case(seed)
+    log, patch, _, own, true, _ = random_case(seed, varying)
     found = identify_lugre(log, patch, model=model or own)
     inside, off = {}, {}
     for name, (low, high) in found.intervals().items():
@@ -91,6 +99,20 @@ def test_a_rejected_kind_of_bristles_gives_way_to_one_that_explains_the_data():
     found, inside, _ = judged(301, "auto")
     assert not found.scores[0].rejected and any(each.rejected for each in found.scores)
     assert inside["sigma_0"] and not found.identifiable("mu_c")
+
+
+@pytest.mark.slow
+def test_loads_that_vary_within_a_log_tell_the_kind_of_stiffness():
+    inside, off = [], []
+    for seed in range(6):
+        found, hits, away = judged(seed, varying=True)
+        law = random_case(seed, varying=True)[2]
+        assert (found.law.reference_load is None) == (law.reference_load is None), seed
+        inside += hits.values()
+        off += away.values()
+    assert len(inside) > 15
+    assert np.mean(inside) > 0.8  # three standard deviations below 95 % of so few
+    assert max(off) < 4.5
 
 
 if __name__ == "__main__":

@@ -290,7 +290,7 @@ def test_a_search_ends_where_kept_derivatives_promise_what_is_not_there():
         seen.append(x)
         return noise + slopes @ x, kept
 
-    descent = search._Descent(residuals, np.ones(3), 1e-6)
+    descent = search.Descent(residuals, np.ones(3), 1e-6)
     descent.run((np.full(3, -np.inf), np.full(3, np.inf)))
     left = np.linalg.lstsq(slopes, -noise, rcond=None)[1][0]
     assert descent.cost == pytest.approx(0.5 * left, rel=1e-4)

@@ -7,13 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from planarfriction.identify.search import _Descent, _stiffnesses
+from planarfriction.identify.search import Descent, _stiffnesses
 
 SHARE, LEFT = 1e-6, 3.0
 ANYWHERE = np.array([-np.inf]), np.array([np.inf])
 
 
-def descend(promised: float) -> tuple[_Descent, list[float]]:
+def descend(promised: float) -> tuple[Descent, list[float]]:
     """Search for the number 1 beside a residual that nothing changes, whose derivative promises a change."""
     tried = []
 
@@ -21,7 +21,7 @@ def descend(promised: float) -> tuple[_Descent, list[float]]:
         tried.append(float(x[0]))
         return np.array([x[0] - 1.0, LEFT]), np.array([[1.0], [promised]])
 
-    descent = _Descent(residuals, np.array([5.0]), SHARE)
+    descent = Descent(residuals, np.array([5.0]), SHARE)
     descent.run(ANYWHERE)
     return descent, tried
 

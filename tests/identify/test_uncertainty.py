@@ -5,7 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from planarfriction.identify.uncertainty import LONGEST, Uncertainty, _over_time, uncertainty_over_slides
+from planarfriction.identify.uncertainty import (
+    FOLDS,
+    LONGEST,
+    Uncertainty,
+    _held_out,
+    _over_time,
+    uncertainty_over_slides,
+)
 
 
 def test_votes_at_lags_count_with_weights_that_fall_linearly():
@@ -24,13 +31,31 @@ def test_votes_at_lags_count_with_weights_that_fall_linearly():
 
 @pytest.mark.parametrize(
     ("chi2", "strain", "held_out", "rejected"),
-    [(1.0, 2.9, 2.9, False), (1.6, 0.0, 1.0, True), (1.0, 3.1, 1.0, True), (1.0, 0.0, 25.0, True)],
+    [(1.0, 2.9, 1.9, False), (1.6, 0.0, 1.0, True), (1.0, 3.1, 1.0, True), (1.0, 0.0, 2.1, True)],
 )
 def test_what_rejects_a_fit(chi2, strain, held_out, rejected):
     """More than noise, a disturbance that no rig has, or parts that it misses where it did not see them."""
     empty, strains = np.zeros((0, 0)), [(strain, "load_drift 0.2")]
     tests = Uncertainty(empty, empty, empty, chi2, 1.5, strains, 0.0, np.full(5, held_out), np.zeros(0))
     assert tests.rejected == rejected
+
+
+def test_held_out_errors_count_by_what_noise_explains():
+    """A value that only the first samples show is lost without them: errors are large, but noise is all there is."""
+    random, samples = np.random.default_rng(0), 400
+    slopes = random.normal(size=(samples, 3, 2))
+    slopes[:, :, 1] = 0.0
+    slopes[:3, :, 1], slopes[150, :, 1] = 100.0, 1.0
+    slopes = slopes.reshape(-1, 2)
+    noise = random.normal(size=3 * samples)
+    residual = noise - slopes @ np.linalg.lstsq(slopes, noise, rcond=None)[0]
+    log = SimpleNamespace(channels=np.full(3, True))
+    problem = SimpleNamespace(by_log=lambda rows: [rows.reshape(-1, 3, 1)], logs=[log])
+    fit = SimpleNamespace(problem=problem, values=np.zeros(2))
+    found, unseen = _held_out(fit, residual, slopes, np.zeros((2, 2)))
+    assert np.sqrt(np.mean(unseen**2)) > 3.0
+    assert found == pytest.approx(np.ones(FOLDS), abs=0.2)  # four standard deviations of chance
+    assert (_held_out(fit, 3.0 * residual, slopes, np.zeros((2, 2)))[0] > 2.4).all()
 
 
 def test_slides_vote_as_one_observation_each():

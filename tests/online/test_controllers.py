@@ -120,6 +120,26 @@ def test_a_slip_sensor_that_dies_in_a_slip_drops_nothing(kind, goal, centre):
     assert (gripper.normal_force > 1.5 * control.state["load"] / 0.52).all()
 
 
+@pytest.mark.parametrize("fault", ["dies", "tap"])
+def test_a_hinge_whose_slip_sensor_dies_drops_nothing(fault):
+    """It says 0 from a share of the turn on, another of each part; a tap is no such fault."""
+    taps = {"tap": (0.3, 0.3, 2e-3), "tap_time": 2.2} if fault == "tap" else {"tap": (0.0, 0.0, 0.0)}
+    parts = few(centre=((0.0, -0.045),) * COUNT, tilt=1.3, tilt_time=0.5, tilt_duration=2.0, **taps)
+    gripper = Gripper(parts, 30.0, seed=1)
+    control, dead = Hinge(FrictionObserver(known_model(), batch=COUNT)), np.zeros(COUNT, bool)
+    for sample in gripper.empty_hand():
+        control.observer.update(sample)
+    sample = gripper.measurement
+    for _ in range(3500):
+        dead |= (fault == "dies") & (gripper.slip[:, 2] / -1.3 > np.linspace(0.1, 0.7, COUNT))
+        sample.slip_velocity[dead] *= 0.0
+        sample = gripper.step(control.update(sample))
+    assert dead.all() == control.blind.all() == (fault == "dies")
+    assert np.hypot(*gripper.slip[:, :2].T).max() < 0.03
+    assert np.abs(gripper.slip[:, 2]).max() < 1.5
+    assert np.abs(gripper.twist).max() < 1e-2  # creep of bristles near the limit
+
+
 @pytest.mark.parametrize("kind", [SlideBy, TurnBy, Hinge])
 def test_no_slip_sensor_no_slip_on_purpose(kind):
     own = FrictionObserver(known_model(), batch=COUNT, sensors=Sensors(slip_rate=0.0))

@@ -89,7 +89,7 @@ class _SettledError(Exception):
     """The cost changes no more."""
 
 
-class _Descent:
+class Descent:
     """Search from one start, and the best point that it has found.
 
     It ends where a try changes the cost by less than `share` of it, up or down. `least_squares` alone continues until
@@ -143,7 +143,7 @@ def _best(
         return residuals(x)
 
     for point in points:
-        found.append(_Descent(told, point, share))
+        found.append(Descent(told, point, share))
         found[-1].run(bounds)
     best = min(found, key=lambda each: each.cost)
     agreeing = sum(each.cost <= best.cost * (1.0 + SAME_COST) for each in found)

@@ -21,9 +21,9 @@ EXCESS = 1.25
 CHANCE = 4.0
 """Standard deviations of the reduced chi-square, for independent residuals, that are put down to chance."""
 
-STRAIN, HELD_OUT = 3.0, 3.0
-"""Standard deviations a priori of a disturbance of the rig, and root mean square of held-out residuals over the noise,
-above which a fit is rejected."""
+STRAIN, HELD_OUT = 3.0, 2.0
+"""Standard deviations a priori of a disturbance of the rig, and errors on held-out parts over those that the noise
+explains, above which a fit is rejected."""
 
 BLOCKS, FOLDS = 20, 5
 """Number of blocks that each log is cut into, every fifth of which is held out in turn."""
@@ -58,7 +58,7 @@ class Uncertainty:
     neighbours: float
     """Correlation of residuals one sample apart [-]."""
     held_out: np.ndarray
-    """Root mean square over the noise of the residuals of each fold for a fit without it [-], `[FOLDS]`."""
+    """Errors on each fold of a fit without it, over those that the noise explains [-], `[FOLDS]`."""
     unseen: np.ndarray
     """Scaled residuals `[M]` of each sample for a fit without its fold."""
 
@@ -74,7 +74,7 @@ class Uncertainty:
 
     @property
     def score(self) -> float:
-        """Root mean square over the noise of the held-out residuals [-]."""
+        """Errors on held-out parts over those that the noise explains [-]."""
         return float(np.sqrt(np.mean(self.held_out**2)))
 
 
@@ -90,7 +90,7 @@ def uncertainty(fit: Fit) -> Uncertainty:
     reduced_chi2, neighbours = _left(fit, residual)
     used = zip(problem.logs, problem.used, strict=True)
     measured = sum(int(log.channels.sum()) * len(log.time[rows]) for log, rows in used)
-    inverse = _covariance(fit, np.concatenate([jacobian, pull]), free)
+    inverse = covariance_of(fit, np.concatenate([jacobian, pull]), free)
     plain, bread = inverse * max(reduced_chi2, 1.0), np.where(np.isfinite(inverse), inverse, 0.0)
     factor = np.sqrt(np.maximum(_over_time(fit, residual, jacobian, pull, neighbours, bread) / np.diag(plain), 1.0))
     factor = np.where(np.isfinite(factor), factor, 1.0)
@@ -115,7 +115,7 @@ def uncertainty_over_slides(fit: Fit) -> tuple[np.ndarray, np.ndarray, np.ndarra
     """
     residual, jacobian = fit.problem.linearised(fit.values, fit.sigma)
     votes = np.array([rows.sum(axis=(0, 1)) for rows in fit.problem.by_log(jacobian * residual[:, None])])
-    bread = _covariance(fit, jacobian, ~fit.at_bound)
+    bread = covariance_of(fit, jacobian, ~fit.at_bound)
     if not np.isfinite(bread).all():
         return bread, np.zeros_like(votes), jacobian
     counted = sum(bool(np.isfinite(each).all()) for each in fit.sigma)
@@ -132,7 +132,7 @@ def _pull(fit: Fit) -> np.ndarray:
     return result
 
 
-def _covariance(fit: Fit, rows: np.ndarray, free: np.ndarray) -> np.ndarray:
+def covariance_of(fit: Fit, rows: np.ndarray, free: np.ndarray) -> np.ndarray:
     """Compute the covariance of the values with the `free` coordinates; infinite where the data say nothing."""
     slopes = fit.coordinates.slopes(fit.x)
     inner = np.minimum(covariance(rows @ slopes, free), HUGE)
@@ -184,7 +184,11 @@ def _of_twists(fit: Fit, jacobian: np.ndarray, bread: np.ndarray) -> np.ndarray:
 
 
 def _held_out(fit: Fit, residual, jacobian, pull) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the residuals of each fold for a fit of the others, to first order: root mean squares, and all `[M]`."""
+    """Compute the errors on each fold of a fit of the others, to first order, and all residuals `[M]` of such fits.
+
+    Noise leaves residuals `r` of covariance `I - H` in a fold of M, and `e = (I - H)^-1 r` if it is held out, so that
+    `r' e/M` is 1 in the mean: also if little but this fold shows a parameter, and `e` is large.
+    """
     fold, seen = [], []
     for rows, log in zip(fit.problem.by_log(residual[:, None]), fit.problem.logs, strict=True):
         place = np.arange(len(rows)) * BLOCKS // len(rows) % FOLDS
@@ -200,7 +204,7 @@ def _held_out(fit: Fit, residual, jacobian, pull) -> tuple[np.ndarray, np.ndarra
         kept = whole - slopes[out].T @ slopes[out]
         move = np.linalg.lstsq(kept, slopes[out].T @ residual[out], rcond=None)[0]
         unseen[out] = residual[out] + slopes[out] @ move
-        result.append(np.sqrt(np.mean(unseen[out & seen] ** 2)))
+        result.append(np.sqrt(max(np.mean((residual * unseen)[out & seen]), 0.0)))
     return np.array(result), unseen
 
 

@@ -118,7 +118,7 @@ class ModelScore:
     bristles: str
     """Its kind of bristles, in words."""
     held_out: float
-    """Root mean square of the residuals of held-out parts over the noise [-]; 1 is noise alone."""
+    """Errors on held-out parts over those that the noise explains [-]; 1 is noise alone."""
     reduced_chi2: float
     """Mean square of the residuals over that of the noise [-]."""
     rejected: bool
@@ -233,7 +233,7 @@ def judge(
     if len(candidates) > 1:
         scores = sorted((each.score for each in candidates if each is not best), key=lambda each: each.held_out)
         rest = ", ".join(f"{each.held_out:.3g} times for {each}" for each in scores)
-        text = f"on held-out parts of the logs, its errors are {chosen.held_out:.3g} times the noise ({rest})"
+        text = f"on held-out parts of the logs, its errors are {chosen.held_out:.3g} times what noise explains ({rest})"
         verdicts.append(Verdict("fit", True, text))
     verdicts += _on_data(evidence, u) + [Verdict("fit", each.agrees, str(each)) for each in held]
     if skipped:
@@ -263,7 +263,7 @@ def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
         most = f"at most {np.sqrt(u.limit):.2f} times can be chance"
         text.append(f"its residuals are {size:.2f} times the noise of the sensors ({most})")
     if u.score > HELD_OUT:
-        text.append(f"its errors on held-out parts of the logs are {u.score:.1f} times the noise")
+        text.append(f"its errors on held-out parts of the logs are {u.score:.1f} times what noise explains")
     if u.strain > STRAIN:
         text.append(f"it needs {u.strains[0][1]}, {u.strain:.1f} times the usual error of such a rig")
     if u.neighbours > CORRELATED:

@@ -21,6 +21,7 @@ from planarfriction.identify.loss import SPOILED
 from planarfriction.identify.options import FitOptions
 from planarfriction.identify.parameters import fitted_law, scaled_patch
 from planarfriction.identify.problem import LogProblem
+from planarfriction.identify.profile import stretches
 from planarfriction.identify.result import Identification
 from planarfriction.identify.rig import CHANNELS, Nuisance, first_noise
 from planarfriction.identify.search import guess_starts, interruptible, multistart, refine, warm_start
@@ -209,6 +210,8 @@ def _identification(
     count, logs = len(problem.names), problem.logs
     values, rig = problem.split(fit.values)
     errors = np.sqrt(np.diag(u.covariance))
+    if not u.rejected:
+        errors[:count] *= stretches(fit, u)
     histories = _histories(best)
     evidence = _evidence(best, errors[:count], histories)
     law = fitted_law(problem.law, problem.by_name(values))

@@ -135,8 +135,11 @@ def _median(row, count):
 
 
 @kernel
-def _follow(c, e, least_load):
-    """Take in what an observer found; return the grip at mu = 1 that holds the present load, and the time step."""
+def _follow(c, e, least_load, turns):
+    """Take in what an observer found; return the grip at mu = 1 that holds the present load, and the time step.
+
+    `turns` is the share of the torque that counts in the wrench that the part bears.
+    """
     if c.age < 0.0 and e.normal_force <= least_load:
         return 0.0, 0.0  # nothing begins before the hand grips
     dt = min(e.dt, PAUSE) if c.age >= 0.0 else 0.0  # the first sample has none
@@ -163,7 +166,7 @@ def _follow(c, e, least_load):
     share = min(dt / LATE, 1.0)
     if needed > 0.0:
         c.lately += share * (min(needed, 1.5 * c.lately) - c.lately)
-    size = math.hypot(math.hypot(e.wrench[0], e.wrench[1]), e.wrench[2] / e.radius)
+    size = math.hypot(math.hypot(e.wrench[0], e.wrench[1]), turns * e.wrench[2] / e.radius)
     if xp.in_range(size):
         c.borne += (share if c.age >= SETTLED else 1.0) * (size - c.borne)
     return needed, dt
@@ -178,7 +181,8 @@ def _unsure(c, e, dt, seeks, lost):
     if not seeks or c.age < SETTLED:
         c.stood = c.borne
     elif c.blind < LATE:
-        c.weight, c.stood = max(c.weight, c.lately), max(c.stood, c.borne)
+        c.weight = max(c.weight, c.lately)
+        c.stood += max(c.borne - c.stood, 0.0) * dt / LOAD_TIME  # not by a tap
         c.blind = c.blind + dt if c.quiet > LATE and c.borne < (1.0 - lost) * c.stood else 0.0
     return c.blind >= LATE or e.flags >= NO_SIGN or max(c.span, c.age if c.span < 0.0 else 0.0) >= PAUSE
 
@@ -203,7 +207,7 @@ def hold(states, found, least_load, most, least_mu, z, reserve, gain, explore):
     """Set the grips of `Hold` in states `[P]` from what an observer found `[P]`; `z` is the quantile of mu_c."""
     for p in range(states.shape[0]):
         c, e = states[p], found[p]
-        _, dt = _follow(c, e, least_load)
+        _, dt = _follow(c, e, least_load, 1.0)
         slips, slid, v = e.slip > 0.5, c.slid, c.velocity
         path = math.hypot(slid[0], slid[1]) + e.radius * abs(slid[2])
         if slips and c.age >= SETTLED and (e.determined[0] > 0 or path >= explore):
@@ -227,7 +231,7 @@ def slip(states, found, least_load, most, least_mu, axis, tolerance, duration, a
     """Set the grips of `SlideBy` (axis 1) and `TurnBy` (axis 2) in states `[P]` from what an observer found `[P]`."""
     for p in range(states.shape[0]):
         c, e = states[p], found[p]
-        needed, dt = _follow(c, e, least_load)
+        needed, dt = _follow(c, e, least_load, 1.0)
         slips, goal = e.slip > 0.5, abs(c.goal)
         sign = 1.0 if c.goal > 0.0 else -1.0
         v, x = sign * c.velocity[axis] if slips else 0.0, sign * c.slid[axis]
@@ -281,7 +285,7 @@ def hinge(states, found, least_load, most, least_mu, reserve, gain):
     """Set the grips of `Hinge` in states `[P]` from what an observer found `[P]`."""
     for p in range(states.shape[0]):
         c, e = states[p], found[p]
-        _, dt = _follow(c, e, least_load)
+        _, dt = _follow(c, e, least_load, 1.0 - c.found)  # a part that is to turn loses torque, but carries its weight
         force, torque = math.hypot(e.wrench[0], e.wrench[1]), e.wrench[2]
         if xp.in_range(force) and xp.in_range(torque):
             share = dt / FORCE_TIME
@@ -292,13 +296,14 @@ def hinge(states, found, least_load, most, least_mu, reserve, gain):
             c.found = 1.0
         moves = slips and (v[0] != 0.0 or v[1] != 0.0 or v[2] != 0.0)  # near the surface a slip is probable, unseen
         c.since = 0.0 if moves else c.since + dt
-        eases = c.since > STICKS and abs(c.torque) > HANGS * e.radius * c.force
-        rate = REGRIP if moves else (-RELEASE if eases else 0.0)
+        sticks, brakes = c.since > STICKS + BRAKES, c.found > 0.0 and STICKS < c.since < STICKS + BRAKES
+        eases = sticks and abs(c.torque) > HANGS * e.radius * c.force
+        rate = -RELEASE if eases else (REGRIP if moves or sticks else 0.0)
         c.eased = min(c.eased * math.exp(rate * dt), 1.0)
         start = _begin(c, 2.5 * c.load / e.mu_c, most)
         speed = math.hypot(v[0], v[1]) if slips else 0.0
-        carried = reserve * c.eased * c.force / e.mu_c + gain * speed
+        carried = reserve * (BRAKE if brakes else c.eased) * c.force / e.mu_c + gain * speed
         asked = carried if c.found > 0.0 else min(start, c.grip * math.exp(-RELEASE * dt))
-        if _unsure(c, e, dt, c.found == 0.0, LOST):
+        if _unsure(c, e, dt, c.found == 0.0 or c.since > SURE, LOST if c.found == 0.0 else LOSES):
             asked = UNSURE * max(c.load, c.weight) / least_mu
         _set(c, asked, most)
