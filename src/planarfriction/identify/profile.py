@@ -14,7 +14,7 @@ REACH, NEAR, ROUNDS = 2.0, 0.8, 3
 """Standard errors at which the cost is looked at, share of the rise it should have there from which on no further
 value is tried, and most values that are tried on a side."""
 
-SURE = 0.05
+SURE = 0.02
 """Standard error, as a share of the estimate, below which a ridge looks straight."""
 
 STIFF, SETTLED = 1e4, 0.02
