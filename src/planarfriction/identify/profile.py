@@ -44,16 +44,17 @@ def _stretch(fit: Fit, i: int, way: np.ndarray, sign: float) -> float:
     problem, coordinates = fit.problem, fit.coordinates
     residuals, share = problem.residuals(coordinates, fit.sigma), way[i] / fit.values[i]
     own = ALL[problem.names[i]]
-    factor, wanted = 1.0, 0.5 * REACH**2
+    factor: float = 1.0
+    wanted = 0.5 * REACH**2
     for _ in range(ROUNDS):
         by = np.exp(sign * factor * share) if own.logarithmic else 1.0 + sign * factor * share
         target = fit.values[i] * by
         if not own.low < target < own.high:
             break
 
-        def held(x: np.ndarray, target: float = target) -> tuple[np.ndarray, np.ndarray]:
+        def held(x: np.ndarray, at: float = target) -> tuple[np.ndarray, np.ndarray]:
             rows, slopes = residuals(x)
-            off, slope = coordinates.values(x)[i] / target - 1.0, coordinates.slopes(x)[i] / target
+            off, slope = coordinates.values(x)[i] / at - 1.0, coordinates.slopes(x)[i] / at
             return np.append(rows, STIFF * off), np.concatenate([slopes, STIFF * slope[None]])
 
         start = fit.values + way * (target - fit.values[i]) / way[i]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -53,7 +54,7 @@ def _rest(groups: list[np.ndarray], without: Sequence[int]) -> np.ndarray:
 
 
 def _least(
-    problem: Problem, values: Mapping[str, float], span: float, without: Sequence[int], **loss: object
+    problem: Problem, values: Mapping[str, float], span: float, without: Sequence[int], **loss: Any
 ) -> dict[str, float]:
     from scipy.optimize import least_squares
 
@@ -70,12 +71,15 @@ def _least(
         return np.where(log, np.log(np.where(log, numbers, 1.0)), numbers)
 
     low, high = (coordinates([getattr(each, end) for each in kinds]) for end in ("low", "high"))
+    slopes: Any = lambda x: _rest(problem.slopes(by_name(x), span), without) * factor(x)  # noqa: E731
+    settings: Any = {"x_scale": "jac", "ftol": FINE, "max_nfev": MOST, **loss}
     found = least_squares(
         lambda x: _rest(problem.errors(by_name(x), span), without),
         np.clip(coordinates([values[each] for each in problem.names]), low, high),
-        lambda x: _rest(problem.slopes(by_name(x), span), without) * factor(x),
-        (low, high), x_scale="jac", ftol=FINE, max_nfev=MOST, **loss,
-    )  # fmt: skip
+        slopes,
+        (low, high),
+        **settings,
+    )
     return by_name(found.x)
 
 
@@ -96,11 +100,11 @@ def attempt(problem: Problem, values: dict[str, float], progress: Callable[[str]
         folds.append(minimise(problem, values, (), [i]))
         errors.append(problem.costs(folds[i])[i])
         short.append(problem.costs(folds[i], SHORT)[i])
-    for half in np.array_split(np.arange(len(folds)), 2):
+    for half in (each.tolist() for each in np.array_split(np.arange(len(folds)), 2)):
         progress(f"{words}; left out: {len(half)} of {len(folds)}")
         halves.append(problem.costs(minimise(problem, values, (), half), SHORT)[half])
     again = _least(problem, values, SHORT, ())
-    return Trial(problem, values, tuple(folds), again, *map(np.array, (errors, short)), tuple(halves))
+    return Trial(problem, values, tuple(folds), again, np.array(errors), np.array(short), tuple(halves))
 
 
 def improves(more: Trial, less: Trial) -> bool:

@@ -110,9 +110,10 @@ class ContactPatch(Moments):
         if type(law) is not Uniform:  # other pressures keep their ratios
             self._set(point_shares=None)
         elif self.point_shares is not None:
-            self._set(point_shares=validation.positive_array("point_shares", self.point_shares, (len(positions),)))
-            self.point_shares.setflags(write=False)  # pyright: ignore[reportOptionalMemberAccess]
-        for numbers in (self.positions, self.areas, self.radii):
+            shares = validation.positive_array("point_shares", self.point_shares, (len(positions),))
+            shares.setflags(write=False)
+            self._set(point_shares=shares)
+        for numbers in (self.positions, self.areas, np.asarray(self.radii)):
             numbers.setflags(write=False)
         if not law.depends_on_load:
             fixed = self._shares(self.pressure.relative(self.positions))
