@@ -60,7 +60,7 @@ def _stretch(fit: Fit, i: int, way: np.ndarray, sign: float) -> float:
         start = fit.values + way * (target - fit.values[i]) / way[i]
         search = Descent(held, coordinates.of(start), SETTLED / max(fit.cost, 1.0))
         search.run(coordinates.bounds())
-        rise = search.cost - fit.cost
+        rise: float = search.cost - fit.cost
         factor *= min(max(np.sqrt(wanted / max(rise, 1e-9)), 1.0), 2.0)
         if rise > NEAR * wanted:
             break
