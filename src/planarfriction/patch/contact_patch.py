@@ -110,9 +110,8 @@ class ContactPatch(Moments):
         if type(law) is not Uniform:  # other pressures keep their ratios
             self._set(point_shares=None)
         elif self.point_shares is not None:
-            shares = validation.positive_array("point_shares", self.point_shares, (len(positions),))
-            shares.setflags(write=False)
-            self._set(point_shares=shares)
+            self._set(point_shares=validation.positive_array("point_shares", self.point_shares, (len(positions),)))
+            np.asarray(self.point_shares).setflags(write=False)
         for numbers in (self.positions, self.areas, np.asarray(self.radii)):
             numbers.setflags(write=False)
         if not law.depends_on_load:
