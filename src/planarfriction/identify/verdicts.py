@@ -163,14 +163,13 @@ def dependence(name: str, interval: tuple[float, float], others: Sequence[ModelS
 
 
 def rivals(best: Candidate, candidates: Sequence[Candidate]) -> list[ModelScore]:
-    """Return the other models that fit: none is rejected, and bristles of another kind come close to the best ones."""
-    least = best.cost(best.fit.sigma)
+    """Return the other candidates that fit: none is rejected, and over the noise of the best one they fit as well."""
+    most = best.cost(best.fit.sigma) + SLIPPED
     return [
         each.score
         for each in candidates
-        if each is not best and not each.uncertainty.rejected
-        and (each.score.model != best.score.model or each.cost(best.fit.sigma) < least + SLIPPED)
-    ]  # fmt: skip
+        if each is not best and not each.uncertainty.rejected and each.cost(best.fit.sigma) < most
+    ]
 
 
 # ---------------------------------------------------------------------- rules
