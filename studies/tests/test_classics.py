@@ -8,11 +8,16 @@ from planarfriction_studies.experiments import runs
 from planarfriction_studies.experiments.classics import run as classics
 from planarfriction_studies.experiments.classics import scenes
 from planarfriction_studies.experiments.experiment import Work
+from tests.support.subjects import check
 
 
 @pytest.fixture(scope="module")
 def result():
     return classics.run(Work(quick=True))
+
+
+def test_all_that_it_shows_is_as_recorded(result):
+    check("classics", result)
 
 
 def test_all_comparisons_hold(result):

@@ -12,11 +12,16 @@ from planarfriction_studies.experiments import facts
 from planarfriction_studies.experiments.convergence import run as convergence
 from planarfriction_studies.experiments.convergence import runs
 from planarfriction_studies.experiments.experiment import Work
+from tests.support.subjects import check
 
 
 @pytest.fixture(scope="module")
 def result():
     return convergence.run(Work(quick=True))
+
+
+def test_all_that_it_shows_is_as_recorded(result):
+    check("convergence", result)
 
 
 def test_all_comparisons_hold(result):

@@ -18,11 +18,16 @@ from planarfriction_studies.experiments.in_hand.runs import (
     with_friction,
 )
 from planarfriction_studies.experiments.runs import LAW, simulated
+from tests.support.subjects import check
 
 
 @pytest.fixture(scope="module")
 def result() -> Result:
     return run(Work(quick=True))
+
+
+def test_all_that_it_shows_is_as_recorded(result):
+    check("in-hand", result)
 
 
 def test_all_comparisons_hold(result):

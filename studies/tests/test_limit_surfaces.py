@@ -16,11 +16,16 @@ from planarfriction_studies.experiments.experiment import Work
 from planarfriction_studies.experiments.limit_surfaces import run as limit_surfaces
 from planarfriction_studies.experiments.limit_surfaces.patches import half_load_cell, linear_line, patch_comparisons
 from planarfriction_studies.experiments.runs import SIX_SHAPES
+from tests.support.subjects import check
 
 
 @pytest.fixture(scope="module")
 def result():
     return limit_surfaces.run(Work(quick=True))
+
+
+def test_all_that_it_shows_is_as_recorded(result):
+    check("limit-surfaces", result)
 
 
 def test_all_comparisons_hold(result):

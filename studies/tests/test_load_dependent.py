@@ -24,11 +24,16 @@ from planarfriction_studies.experiments.load_dependent.run import (
     soft_scene,
 )
 from planarfriction_studies.experiments.runs import simulated
+from tests.support.subjects import check
 
 
 @pytest.fixture(scope="module")
 def result() -> Result:
     return run(Work(quick=True))
+
+
+def test_all_that_it_shows_is_as_recorded(result):
+    check("load-dependent", result)
 
 
 def test_all_comparisons_hold_and_cover_the_references(result):

@@ -13,11 +13,16 @@ from planarfriction_studies.experiments.experiment import Work
 from planarfriction_studies.experiments.runs import published_model
 from planarfriction_studies.experiments.timing import run as timing
 from planarfriction_studies.experiments.timing import runs
+from tests.support.subjects import check
 
 
 @pytest.fixture(scope="module")
 def result():
     return timing.run(Work(quick=True))
+
+
+def test_all_that_it_shows_is_as_recorded(result):
+    check("timing", result)
 
 
 def reduced_scene():

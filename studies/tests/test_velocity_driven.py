@@ -9,11 +9,16 @@ from planarfriction_studies.experiments import facts
 from planarfriction_studies.experiments.experiment import Work
 from planarfriction_studies.experiments.velocity_driven import boxes
 from planarfriction_studies.experiments.velocity_driven import run as velocity_driven
+from tests.support.subjects import check
 
 
 @pytest.fixture(scope="module")
 def result():
     return velocity_driven.run(Work(quick=True))
+
+
+def test_all_that_it_shows_is_as_recorded(result):
+    check("velocity-driven", result)
 
 
 def wrench(result, shape: str, model: str, component: str) -> np.ndarray:
