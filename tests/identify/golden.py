@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 import planarfriction as pf
+from planarfriction.geometry import rotate
 from planarfriction.identify import (
     FitOptions,
     Log,
@@ -24,6 +25,7 @@ from planarfriction.identify import (
     fit_start,
     predict_slide,
 )
+from planarfriction.identify.checks import check_logs, check_sampling, size_of, with_findings
 from planarfriction.identify.decimation import decimated, redrawn, samples_of
 from planarfriction.identify.fit import Fit
 from planarfriction.identify.motion import SlideProblem
@@ -35,7 +37,8 @@ from planarfriction.identify.search import guess_starts, misfit
 from planarfriction.identify.slides import start_of, start_slopes
 from planarfriction.identify.uncertainty import uncertainty
 from planarfriction.identify.verdicts import Candidate
-from planarfriction.identify.wrenches import _identification
+from planarfriction.identify.wrenches import _identification, _start_laws
+from planarfriction.scenes import driven
 from tests.identify.test_motion import BODY, ellipsoid, slides
 from tests.identify.test_motion import LAW as SLIDING
 from tests.identify.test_motion import PATCH as STANDING
@@ -181,6 +184,61 @@ def numbers_of_windows() -> dict[str, Any]:
     }  # fmt: skip
 
 
+def findings(given: Log) -> list[str]:
+    """Return what is odd about a log on the patch."""
+    try:
+        return [str(each) for each in check_logs([given], PATCH)]
+    except pf.FrictionError as error:
+        return [str(error)]
+
+
+def numbers_of_logs() -> dict[str, Any]:
+    """Compute logs from other measurements, what is odd about logs that were misread, and laws to start from."""
+    given, size = STILL[0], float(PATCH.contact_radius())
+    time, twist, wrench, load = given.time, given.twist, given.wrench, given.normal_force
+    pose = np.cumsum(twist, axis=0) * given.interval * [1.0, 1.0, 3.0]
+    turned = np.column_stack([pose[:, :2], np.mod(pose[:, 2], 2.0 * np.pi)])
+    scene = driven(pf.ReducedModelPublished(PATCH, LAW), normal_force=2.0, t_end=0.7)
+    solution = pf.simulate(scene, save_every=0.05)
+    made = {
+        "motion": Log.from_motion(time, turned, wrench, load, name="turned"),
+        "axis": Log.from_axis(time, wrench[:, 1], load, position=pose[:, 1], axis="y", window=5),
+        "joint": Log.from_axis(time, wrench[:, 2], load, velocity=twist[:, 2], axis="theta"),
+        "solution": Log.from_solution(solution),
+    }
+    misread = {
+        "as it is": given,
+        "pushes": (twist, -wrench, load),
+        "turned": (twist, rotate(wrench, np.full(len(time), 1.0)), load),
+        "down": (twist, wrench * [1.0, -1.0, -1.0], load),
+        "torque turned": (twist, wrench * [1.0, 1.0, -1.0], load),
+        "wide": (twist, wrench * [1.0, 1.0, 10.0], load),
+        "mm": (1e3 * twist, wrench, load),
+        "kN": (twist, wrench, 1e-3 * load),
+        "N mm": (twist, wrench * [1e-3, 1e-3, 1e3], load),
+        "offset": (twist, wrench, np.where(np.arange(len(time)) % 2 < 1, 0.0, load)),
+    }
+    logs = {name: each if isinstance(each, Log) else Log(time, *each, name) for name, each in misread.items()}
+    fit = fit_at(LogProblem(*PROBLEMS["near"]))
+    best = Candidate(fit, uncertainty(fit))
+    base = _identification(best, [best], [], (1, 1))
+    few = Log(time[::25], twist[::25], wrench[::25], load[::25], "few")
+    starts = [
+        _start_laws(*each)
+        for each in [(None, "auto", ()), ({"mu_s": 0.4, "sigma_0": 1e3}, None, ()), (LAW, "auto", ()),
+                     ({"breakaway_ratio": 0.7}, "auto", ()), ({"mu_c": 2.0}, "auto", ("breakaway_ratio",))]
+    ]  # fmt: skip
+    return {
+        **{f"log, {name}": [each.name, each.time, each.twist, each.wrench, each.normal_force, each.turns, each.held]
+           for name, each in made.items()},
+        "findings": {name: findings(each) for name, each in logs.items()},
+        "ms": findings(Log(1e3 * time, 10.0 * twist, wrench, load, "slow")),
+        "sampling": str(check_sampling(few, 2e4, 30.0)), "enough": check_sampling(given, 2e4, 30.0) is None,
+        "verdicts": [str(each) for each in with_findings(base, [few], check_logs([logs["down"]], PATCH)).verdicts],
+        "size": [size, size_of(given, PATCH)], "starts": [[list(map(str, laws)), fields] for laws, fields in starts],
+    }  # fmt: skip
+
+
 def numbers_of_slides() -> dict[str, Any]:
     """Compute the result of slides near the values that made them, and the prediction of one."""
     some = slides(4)
@@ -210,6 +268,7 @@ SOURCES: dict[str, Any] = {
     **{f"problem, {name}": (lambda given=given: numbers_of_problem(given)) for name, given in PROBLEMS.items()},
     "plan": numbers_of_plan,
     "windows": numbers_of_windows,
+    "logs": numbers_of_logs,
     "slides": numbers_of_slides,
 }
 """What is computed, by name."""
