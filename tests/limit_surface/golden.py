@@ -33,7 +33,6 @@ SURFACES: dict[str, Any] = {
     "table by load": lambda: pf.LimitSurfaceTable(TIP, normal_force=1.0).at(3.0),
     "their table": lambda: pf.LimitSurfaceTablePublished(LEVEL),
     "ellipsoid": lambda: pf.LimitSurfaceEllipsoid(LEVEL),
-    "quartic": lambda: pf.LimitSurfaceQuartic(BOX),
 }
 
 
