@@ -43,7 +43,7 @@ from tests.identify.test_motion import BODY, ellipsoid, slides
 from tests.identify.test_motion import LAW as SLIDING
 from tests.identify.test_motion import PATCH as STANDING
 from tests.support.identification_logs import LAW, PATCH, clean_log, excitation, noisy
-from tests.support.recorded import plain
+from tests.support.written import plain
 
 FILE = Path(__file__).with_name("golden.json")
 FINGER = pf.ContactPatch.disc(0.012, cells=9, pressure=pf.SoftFinger(c=0.006, n=0.3, k=2.5))

@@ -17,7 +17,7 @@ from planarfriction.joints.fit import attempt, improves, minimise, with_term
 from planarfriction.joints.problem import Problem, moving
 from planarfriction.joints.verdicts import judge
 from tests.joints.test_joint_fit import PENDULUM, SERVO, servo_logs, torque_log
-from tests.support.recorded import plain
+from tests.support.written import plain
 
 FILE = Path(__file__).with_name("golden.json")
 TERMS = ("load", "stribeck", "bristles", "directional")

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from tests.joints import golden
-from tests.support.recorded import differences, plain
+from tests.support.written import differences, plain
 
 
 @pytest.mark.parametrize("name", golden.SOURCES)

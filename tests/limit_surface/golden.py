@@ -12,7 +12,7 @@ import planarfriction as pf
 from planarfriction.limit_surface.comparison import directions
 from tests.models.golden import GRAIN, LAWS, PATCHES, TIP
 from tests.support.rate_laws import BoucWen
-from tests.support.recorded import plain
+from tests.support.written import plain
 
 FILE = Path(__file__).with_name("golden.json")
 RING = pf.ContactPatch.ring(0.006, 0.01, cells=9)

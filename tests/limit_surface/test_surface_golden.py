@@ -7,7 +7,7 @@ import json
 import pytest
 
 from tests.limit_surface import golden
-from tests.support.recorded import differences, plain
+from tests.support.written import differences, plain
 
 
 @pytest.mark.parametrize("name", golden.SOURCES)
