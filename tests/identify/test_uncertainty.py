@@ -11,6 +11,7 @@ from planarfriction.identify.uncertainty import (
     Uncertainty,
     _held_out,
     _over_time,
+    covariance,
     uncertainty_over_slides,
 )
 
@@ -75,3 +76,10 @@ def test_slides_vote_as_one_observation_each():
     np.testing.assert_allclose(moved, votes @ bread, rtol=1e-9)
     fit.sigma = [np.ones((2, 3))] + [np.full((2, 3), np.inf)] * 3
     np.testing.assert_allclose(uncertainty_over_slides(fit)[0], bread, rtol=1e-9)
+
+
+@pytest.mark.parametrize("small", [0.0, 1e-310, 1e-160, 1e-155])
+def test_a_value_that_moves_next_to_nothing_has_an_infinite_variance(small):
+    rows = np.array([[1.0, small], [2.0, 0.0], [0.5, small]])
+    found = covariance(rows, np.full(2, True))
+    np.testing.assert_allclose(found, [[1.0 / 5.25, 0.0], [0.0, np.inf]], rtol=1e-12)

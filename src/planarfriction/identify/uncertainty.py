@@ -221,6 +221,7 @@ def covariance(jacobian: np.ndarray, free: np.ndarray) -> np.ndarray:
     count = jacobian.shape[1]
     jacobian = np.asarray(np.linalg.qr(jacobian, mode="r"))
     size = np.linalg.norm(jacobian, axis=0)
+    size = np.where(size**2 * HUGE > 1.0, size, 0.0)
     seen = free & (size > 0.0)
     result = np.zeros((count, count))
     result[np.diag_indices(count)] = np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0) ** 2, np.inf)

@@ -1,0 +1,37 @@
+"""Models that compete with the best one: they count where they fit as well over its noise."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import planarfriction as pf
+from planarfriction.identify import Log, identify_lugre
+from planarfriction.identify.verdicts import SLIPPED, rivals
+from planarfriction.scenes import driven
+
+
+def test_rivals_fit_as_well_over_the_noise_of_the_best():
+    def candidate(model: str, cost: float, rejected: bool = False) -> SimpleNamespace:
+        return SimpleNamespace(
+            score=SimpleNamespace(model=model),
+            uncertainty=SimpleNamespace(rejected=rejected),
+            fit=SimpleNamespace(sigma=model),
+            cost=lambda sigma: cost if sigma == "best" else 0.0,
+        )
+
+    best, near, same = candidate("best", 100.0), candidate("other", 99.0 + SLIPPED), candidate("best", 99.0 + SLIPPED)
+    far = candidate("other", 101.0 + SLIPPED), candidate("best", 101.0 + SLIPPED), candidate("third", 100.0, True)
+    assert rivals(best, [near, best, *far, same]) == [near.score, same.score]
+
+
+def test_a_run_without_noise_shows_all_but_the_damping_of_bristles():
+    """The log of the first page: other models leave less than sensors' noise, but far more than the right one."""
+    patch, law = pf.ContactPatch.disc(0.01), pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
+    log = Log.from_solution(pf.simulate(driven(pf.DistributedModel(patch, law))))
+    found = identify_lugre(log, patch)
+    assert found.chosen == "distributed"
+    names = ("mu_c", "mu_s", "v_s", "gamma", "sigma_0", "sigma_2", "contact_radius")
+    assert tuple(name for name in found.names if found.identifiable(name)) == names
+    for name in names:
+        low, high = found.intervals()[name]
+        assert low < (patch.contact_radius() if name == "contact_radius" else getattr(law, name)) < high
