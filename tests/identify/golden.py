@@ -6,7 +6,6 @@ The values at which they are taken are fixed, without a search, so that rounding
 from __future__ import annotations
 
 import dataclasses
-import json
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +42,7 @@ from tests.identify.test_motion import BODY, ellipsoid, slides
 from tests.identify.test_motion import LAW as SLIDING
 from tests.identify.test_motion import PATCH as STANDING
 from tests.support.identification_logs import LAW, PATCH, clean_log, excitation, noisy
+from tests.support.recorded import lines
 from tests.support.written import plain
 
 FILE = Path(__file__).with_name("golden.json")
@@ -276,7 +276,7 @@ SOURCES: dict[str, Any] = {
 
 def main() -> None:
     """Write all numbers and texts."""
-    FILE.write_text(json.dumps({name: plain(of()) for name, of in SOURCES.items()}, indent=0) + "\n", encoding="utf-8")
+    FILE.write_text(lines({name: plain(of()) for name, of in SOURCES.items()}), encoding="utf-8")
 
 
 if __name__ == "__main__":

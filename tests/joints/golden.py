@@ -6,7 +6,6 @@ The values at which they are taken are fixed, or a few steps of a search away.
 from __future__ import annotations
 
 import dataclasses
-import json
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from planarfriction.joints.fit import attempt, improves, minimise, with_term
 from planarfriction.joints.problem import Problem, moving
 from planarfriction.joints.verdicts import judge
 from tests.joints.test_joint_fit import PENDULUM, SERVO, servo_logs, torque_log
+from tests.support.recorded import lines
 from tests.support.written import plain
 
 FILE = Path(__file__).with_name("golden.json")
@@ -145,7 +145,7 @@ SOURCES: dict[str, Any] = {
 
 def main() -> None:
     """Write all numbers and texts."""
-    FILE.write_text(json.dumps({name: plain(of()) for name, of in SOURCES.items()}, indent=0) + "\n", encoding="utf-8")
+    FILE.write_text(lines({name: plain(of()) for name, of in SOURCES.items()}), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import planarfriction as pf
 from planarfriction.limit_surface.comparison import directions
 from tests.models.golden import GRAIN, LAWS, PATCHES, TIP
 from tests.support.rate_laws import BoucWen
+from tests.support.recorded import lines
 from tests.support.written import plain
 
 FILE = Path(__file__).with_name("golden.json")
@@ -76,7 +76,7 @@ SOURCES: dict[str, Any] = {
 
 def main() -> None:
     """Write all numbers."""
-    FILE.write_text(json.dumps({name: plain(of()) for name, of in SOURCES.items()}, indent=0) + "\n", encoding="utf-8")
+    FILE.write_text(lines({name: plain(of()) for name, of in SOURCES.items()}), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ and `…` in texts.
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -140,6 +141,21 @@ def panel(axes: Any) -> dict[str, Any]:
 
 def _outline(area: Any) -> np.ndarray:
     return area.get_patch_transform().transform_path(area.get_path()).vertices
+
+
+def lines(value: Any) -> str:
+    """Return JSON with a line for each part."""
+    parts = [f"{json.dumps(name)}: {_lines(each)}" for name, each in value.items()]
+    return "{\n" + ",\n".join(parts) + "\n}\n"
+
+
+def _lines(value: Any) -> str:
+    one = json.dumps(value, ensure_ascii=False)
+    if len(one) < 200 or not isinstance(value, (dict, list)):
+        return one
+    if isinstance(value, dict):
+        return "{\n" + ",\n".join(f"{json.dumps(name)}: {_lines(each)}" for name, each in value.items()) + "\n}"
+    return "[\n" + ",\n".join(map(_lines, value)) + "\n]"
 
 
 # ---------------------------------------------------------------------- values that two runs share

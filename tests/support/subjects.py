@@ -363,22 +363,7 @@ def main(names: list[str]) -> None:
 
     for name in names or SUBJECTS:
         found = json.loads(json.dumps(told(name, SUBJECTS[name]()), ensure_ascii=False))
-        (Path(folder) / f"{name}.json").write_text(lines(rounded(written(name, found))), encoding="utf-8")
-
-
-def lines(value: Any) -> str:
-    """Return JSON with a line for each part."""
-    parts = [f"{json.dumps(name)}: {_lines(each)}" for name, each in value.items()]
-    return "{\n" + ",\n".join(parts) + "\n}\n"
-
-
-def _lines(value: Any) -> str:
-    one = json.dumps(value, ensure_ascii=False)
-    if len(one) < 200 or not isinstance(value, (dict, list)):
-        return one
-    if isinstance(value, dict):
-        return "{\n" + ",\n".join(f"{json.dumps(name)}: {_lines(each)}" for name, each in value.items()) + "\n}"
-    return "[\n" + ",\n".join(map(_lines, value)) + "\n]"
+        (Path(folder) / f"{name}.json").write_text(recorded.lines(rounded(written(name, found))), encoding="utf-8")
 
 
 def rounded(value: Any) -> Any:
