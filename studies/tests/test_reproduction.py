@@ -5,6 +5,7 @@ The experiments here are made up; the real ones have tests of their own.
 
 from __future__ import annotations
 
+import base64
 import dataclasses
 import json
 import re
@@ -12,6 +13,7 @@ import re
 import numpy as np
 import pytest
 from jinja2 import UndefinedError
+from PIL import Image
 
 from planarfriction.cli import main
 from planarfriction.errors import InvalidValueError
@@ -28,7 +30,7 @@ from planarfriction_studies.experiments.experiment import (
     dataset,
     table,
 )
-from planarfriction_studies.experiments.report import name_to_html, to_html, write_report
+from planarfriction_studies.experiments.report import WIDEST, _image, name_to_html, to_html, write_report
 from planarfriction_studies.experiments.reproduction import Reproduction
 from planarfriction_studies.experiments.wording import environment, fmt, number, power, report, short, span
 
@@ -353,3 +355,11 @@ def test_a_full_disk_ends_in_one_line_and_keeps_what_was_there(tmp_path, monkeyp
     assert len(list(tmp_path.iterdir())) == 1
     again = Work(folder=tmp_path, fingerprint="one").piece("a piece", dict)
     assert np.array_equal(again["x"], kept["x"])
+
+
+@pytest.mark.parametrize(("pixels", "share"), [(WIDEST // 2, 50), (WIDEST // 3, 33), (2000, 100)])
+def test_pictures_of_the_report_have_letters_of_one_size(pixels, share, tmp_path):
+    Image.new("1", (pixels, 10)).save(tmp_path / "picture.png")
+    shown = _image(tmp_path / "picture.png")
+    assert shown["width"] == share
+    assert base64.b64decode(shown["source"].partition(",")[2]) == (tmp_path / "picture.png").read_bytes()

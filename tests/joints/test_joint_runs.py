@@ -1,5 +1,7 @@
 """Runs of a joint: smooth in its numbers, the instant at which they turn round, and that finer steps change little."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -34,6 +36,15 @@ def test_a_run_is_smooth_in_its_numbers(terms, span):
         more, less = (problem.errors({**values, name: values[name] + way}, span)[0] for way in (step, -step))
         off = np.abs((more - less) / (2.0 * step) - slopes[:, i])
         assert np.mean(off < 1e-3 * np.abs(slopes[:, i]).max()) > 0.97, name
+
+
+def test_a_log_may_begin_at_any_time():
+    """Runs that begin again every 0.2 s do so at the same samples."""
+    problem = servo(("load",))
+    later = dataclasses.replace(problem.logs[0], time=problem.logs[0].time + 100.0)
+    values = {name: VALUES[name] for name in problem.names}
+    moved = problem.simulated(values, (later,), 0.2)[0]
+    assert moved == pytest.approx(problem.simulated(values, problem.logs, 0.2)[0], abs=1e-6)
 
 
 def test_a_joint_turns_round_within_a_step(monkeypatch):

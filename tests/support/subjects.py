@@ -362,7 +362,7 @@ def main(names: list[str]) -> None:
             return recorded.shared(found, again)
 
     for name in names or SUBJECTS:
-        found = json.loads(json.dumps(told(name, SUBJECTS[name]()), ensure_ascii=False))
+        found = rounded(json.loads(json.dumps(told(name, SUBJECTS[name]()), ensure_ascii=False)))
         (Path(folder) / f"{name}.json").write_text(recorded.lines(rounded(written(name, found))), encoding="utf-8")
 
 

@@ -45,7 +45,8 @@ class Friction:
     Either call `step()` instead of `mujoco_warp.step`, or use `with friction.install():`, which adds friction to
     `mujoco_warp.step(friction.model, friction.data)` itself, and to CUDA graphs of it. States are stored in the data,
     in the last numbers of `userdata`, in the same way as by `planarfriction.adapters.mujoco`: `mujoco_warp.reset_data`
-    resets them too, of single worlds if asked.
+    resets them too, of single worlds if asked. Bristles take the time step that `m` has at the start: one that is set
+    later in `friction.model` is not followed.
 
     Raises `InvalidValueError` for an unsuitable integrator or cone, noslip iterations, sleeping, disabled actuation,
     too little user data, names that are not in the model, pairs with friction of their own, and models without source
