@@ -1,7 +1,8 @@
-"""Results of the studies that are recorded: `python -m tests.support.subjects [NAME...]` records them again.
+"""Results that are recorded: `python -m tests.support.subjects [NAME...]` records them again.
 
 Each is computed twice, the second time compiled for a generic processor, and what both agree about is written to
-`studies/tests/recorded/NAME.json`. Before that, read what has changed: it has to be what you meant to change.
+`studies/tests/recorded/NAME.json`, what the library shows to `tests/recorded`. Before that, read what has changed: it
+has to be what you meant to change.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ import numpy as np
 
 from planarfriction_studies import experiments
 from planarfriction_studies.experiments.experiment import Work
-from tests.support import recorded
+from tests.support import recorded, shown
 
 FOLDER = Path(__file__).parents[2] / "studies" / "tests" / "recorded"
 
@@ -54,8 +55,7 @@ def told(name: str, found: Any) -> Any:
 
 def check(name: str, found: Any) -> None:
     """Assert that a result is the recorded one."""
-    kept = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
-    assert [*recorded.differences(told(name, found), kept)][:20] == []
+    recorded.check(FOLDER / f"{name}.json", told(name, found))
 
 
 def experiment(name: str) -> Callable[[], Any]:
@@ -333,6 +333,7 @@ def changed(module: Any, **values: Any) -> Iterator[None]:
         vars(module).update(before)
 
 
+OF_LIBRARY = {"figures": shown.figures, "commands": shown.printed}
 SUBJECTS: dict[str, Callable[[], Any]] = {
     **{name: experiment(name) for name in experiments.EXPERIMENTS},
     "beyond": beyond,
@@ -341,6 +342,7 @@ SUBJECTS: dict[str, Callable[[], Any]] = {
     "replayed": replayed,
     "rig": rig,
     "referee": referee,
+    **OF_LIBRARY,
     **({"mujoco": mujoco} if importlib.util.find_spec("mujoco") else {}),
 }
 """Name of a file -> function that computes what it holds."""
@@ -351,8 +353,7 @@ def main(names: list[str]) -> None:
     if names[:1] == ["--plain"]:
         (folder, *names), written = names[1:], lambda name, found: found
     else:
-        folder = FOLDER
-        FOLDER.mkdir(exist_ok=True)
+        folder = None
         other = tempfile.mkdtemp()
         command = [sys.executable, "-m", "tests.support.subjects", "--plain", other, *names]
         subprocess.run(command, check=True, env=os.environ | GENERIC)
@@ -363,7 +364,8 @@ def main(names: list[str]) -> None:
 
     for name in names or SUBJECTS:
         found = rounded(json.loads(json.dumps(told(name, SUBJECTS[name]()), ensure_ascii=False)))
-        (Path(folder) / f"{name}.json").write_text(recorded.lines(rounded(written(name, found))), encoding="utf-8")
+        place = Path(folder or (shown.FOLDER if name in OF_LIBRARY else FOLDER))
+        (place / f"{name}.json").write_text(recorded.lines(rounded(written(name, found))), encoding="utf-8")
 
 
 def rounded(value: Any) -> Any:
