@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from planarfriction.cli import main
 from planarfriction.joints import identify_joint
 from planarfriction.joints.verdicts import speed_lag
 from planarfriction_studies.measured.joints import PENDULUM, read_logs
@@ -51,3 +52,15 @@ def test_no_term_is_claimed_that_a_joint_has_not(logs, seed):
     fit = identify_joint(joint.logs, PENDULUM)
     assert set(fit.terms) <= set(joint.terms)
     assert ("load" in fit.terms) == ("load" in joint.terms)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("--task nope", "--task must be one of slides, pushes, series, onsets, joints, got 'nope'"),
+        ("--task slides --task joints", "--task must be joints alone, or other tasks, got slides, joints"),
+    ],
+)
+def test_tasks_that_are_not_there_or_run_alone_are_one_line(arguments, message, capsys):
+    assert main(["measured", *arguments.split()]) == 2
+    assert capsys.readouterr().err == f"error: {message}\n"

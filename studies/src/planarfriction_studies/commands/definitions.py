@@ -123,7 +123,7 @@ def measured(
     from planarfriction import validation
     from planarfriction.cli import INTERRUPTED
     from planarfriction.cli.console import note, print_table, work_progress
-    from planarfriction.errors import FrictionError
+    from planarfriction.errors import FrictionError, InvalidValueError
     from planarfriction.writing import make_folder
     from planarfriction_studies.measured import TASKS, Benchmark
     from planarfriction_studies.measured.library import LIBRARY
@@ -136,8 +136,12 @@ def measured(
             "Tasks", ["name", "description"], [*rows, ["joints", "Friction of a servo from its goal and position"]]
         )
         return 0
+    for task in tasks:
+        validation.choice("--task", task, (*TASKS, "joints"))
     if tasks == ("joints",):
         return _joints(tables, folder, as_json)
+    if "joints" in tasks:
+        raise InvalidValueError("--task", "be joints alone, or other tasks", ", ".join(tasks))
     validation.count("--seed", seed, 0)
     models, left_out = _models(only, own)
     if folder is not None:
