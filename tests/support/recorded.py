@@ -41,6 +41,8 @@ def plain(value: Any) -> Any:
     """Tell a value by dictionaries, lists, texts and numbers."""
     if value is None or isinstance(value, (bool, int, str)):
         return value
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        return plain(value[()])
     if isinstance(value, (float, np.generic)):
         number = value.item() if isinstance(value, np.generic) else value
         return number if not isinstance(number, float) or math.isfinite(number) else str(number)

@@ -25,7 +25,7 @@ import numpy as np
 
 from planarfriction_studies import experiments
 from planarfriction_studies.experiments.experiment import Work
-from tests.support import recorded, shown
+from tests.support import computed, recorded, replies, shown
 
 FOLDER = Path(__file__).parents[2] / "studies" / "tests" / "recorded"
 
@@ -333,7 +333,14 @@ def changed(module: Any, **values: Any) -> Iterator[None]:
         vars(module).update(before)
 
 
-OF_LIBRARY = {"figures": shown.figures, "commands": shown.printed}
+OF_LIBRARY: dict[str, Callable[[], Any]] = {
+    "figures": shown.figures,
+    "commands": shown.printed,
+    **{each.__name__: each for each in (
+        computed.patches, computed.pushes, computed.grips, computed.online, computed.scenes, computed.films,
+        replies.replies, replies.swept, replies.explored,
+    )},
+}  # fmt: skip
 SUBJECTS: dict[str, Callable[[], Any]] = {
     **{name: experiment(name) for name in experiments.EXPERIMENTS},
     "beyond": beyond,
