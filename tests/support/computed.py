@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import math
@@ -14,13 +15,26 @@ import planarfriction as pf
 from planarfriction import environments
 from planarfriction.online import FrictionObserver, Hinge, Hold, Measurement, SlideBy, TurnBy
 from planarfriction.patch import PUBLISHED_PATCHES, friction_metric
-from planarfriction.planning import Pusher, Slider, dynamic_holding_load, holding_load, plan_grip, plan_push, push
-from planarfriction.plots import notebook
+from planarfriction.planning import (
+    Pusher,
+    Slider,
+    dynamic_holding_load,
+    holding_load,
+    motion_cone,
+    plan_grip,
+    plan_push,
+    push,
+)
+from planarfriction.planning.contact_modes import TouchPoint
+from planarfriction.planning.pushing import _neighbour
+from planarfriction.plots import interactive_limit_surface, notebook
+from planarfriction.plots.animation import frame_times
 from planarfriction.plots.film import Film
 from planarfriction.plots.track import track_of
-from planarfriction.scenes.signal import displacement
+from planarfriction.scenes.signal import SAME_TIME, breaks_between, displacement, sample_count, sample_times
 from planarfriction_studies.rig import Gripper
 from planarfriction_studies.rig.trials import known_model, random_parts
+from tests.scenes.test_start import held_by_two
 from tests.support import recorded, synthetic
 
 LOADS = np.array([0.0, 0.5, 2.0, 9.0])
@@ -69,7 +83,8 @@ def told_patch(patch: pf.ContactPatch) -> dict[str, Any]:
         "tiles": patch.tile_weights(loads), "pressure": patch.pressure_values(LOADS), "bristles": patch.bristles,
         "centre": patch.centre_of_pressure(LOADS), "radius": patch.contact_radius(LOADS),
         "second moment": patch.second_moment(LOADS), "moments": patch.moments(3, loads),
-        "about": patch.moments(2, loads, about=(1e-3, -2e-3)), "tilted": patch.weights(3.0, moments=moved),
+        "about": patch.moments(2, loads, about=(1e-3, -2e-3)),
+        "tilted": patch.weights(LOADS[:, None], moments=moved),
         "levers": patch.levers(), "lever radii": patch.lever_radii, "asymmetries": patch.asymmetries(),
         "extents": patch.cell_extents(), "finer": as_arrays(finer.to_dict()), "finer weights": finer.weights(2.0),
     }  # fmt: skip
@@ -123,6 +138,13 @@ def pushes() -> dict[str, Any]:
         name: [repr(each), each.time, each.pose, each.pusher_pose, each.mode.tolist(), each.place]
         for name, each in made.items()
     }
+    told["cones"] = [motion_cone(each.surface, (-half, 0.01), (2.0, 0.5), 0.3) for each in (slider, exact)]
+    touch = TouchPoint(np.array([-half, 0.01]), np.array([1.0, 0.0]))
+    told["neighbours"] = [
+        _neighbour(slider, touch, 0.3, np.array([1.0, y, 0.0]), held)
+        for y in (-0.8, 0.0, 0.2, 0.9)
+        for held in ("stick", "slide left", "slide right")
+    ]
     edges = {name: [each.outline, each.along, each.inward, each.size] for name, each in (("a", slider), ("b", exact))}
     return {**told, "edges": edges, "plan": [report, repr(plan), plan.path.to_dict(), plan.push.end]}
 
@@ -213,6 +235,7 @@ def ready() -> dict[str, pf.Scene]:
         "curling": scenes.curling(pf.ReducedModel(pf.ContactPatch.ring(0.06, 0.065, 13), LAW, cells=8), t_end=1.0),
         "two": pf.Scene(plate, two, 0.3, force=[0.1, 0.0, 1e-3], springs=[spring], save_every=0.02, name="two"),
         "held": pf.Scene(plate_at_rest(), two[1:], 0.2, force=[0.3, 0.1, 1e-3], start="equilibrium", name="held"),
+        "bent": held_by_two(),
         "sliding": pf.Scene(plate, tilted, 0.2, start="sliding", name="sliding"),
         "edge": pf.Scene(plate, edge, 0.3, name="edge"),
     }  # fmt: skip
@@ -250,7 +273,9 @@ def scenes() -> dict[str, Any]:
         ends = np.union1d([0.0, 4.0], each.breaks)
         parts = [repr(each), each.to_dict(), each(at), each.left(at), each.breaks, *each.pieces(ends)]
         told[f"signal, {name}"] = [*parts, each.held(0.3).to_dict(), displacement(each, at)]
-    return told
+    about = np.array([0.0, 0.5 * SAME_TIME, 0.1, 0.1 + 0.5 * SAME_TIME, 0.2, 0.3 - 0.5 * SAME_TIME, 0.3, 0.4])
+    counts = [sample_count(1.0, step, "dt") for step in (0.1, 0.3, 1.0)]
+    return told | {"breaks": breaks_between(about, 0.3), "counts": counts, "times": sample_times(0.35, 0.1)}
 
 
 def without_picture(page: str) -> str:
@@ -272,10 +297,25 @@ def films() -> dict[str, Any]:
             frames.append(recorded.figure(film.figure))
         told[name] = [frames, [vars(each) | {"contact": None} for each in track.contacts], film.views]
         told[f"{name}, page"] = re.sub(r"\d+ steps, .* ms", "", without_picture(notebook.solution_html(run)))
+    sampled = np.linspace(0.0, 1.0, 5)
+    paces = [
+        (span, slow, fps)
+        for span in (0.0, 1e-3, 0.7, 4.0, 90.0)
+        for slow in (None, 0.5, 1.0, 4.0)
+        for fps in (12.0, 50.0)
+    ]
+    for span, slow, fps in paces:
+        with contextlib.suppress(pf.FrictionError):
+            times, words = frame_times(0.2 + span * sampled, slow, fps)
+            told[f"{span} s, {slow}, {fps} Hz"] = [len(times), float(times[0]), float(times[-1]), words]
     made = made_patches()
     told["patches"] = {name: without_picture(notebook.patch_html(patch)) for name, patch in made.items()}
     surfaces = [kind(made["corner"]) for kind in (pf.LimitSurfaceExact, pf.LimitSurfaceTable, pf.LimitSurfaceEllipsoid)]
     told["surfaces"] = [without_picture(notebook.surface_html(each)) for each in surfaces]
+    turned = interactive_limit_surface(pf.LimitSurfaceTable(made["corner"]), beside=surfaces[0])
+    told["turned"] = [[each.name, each.type, each.x, each.y, each.z, each.hovertemplate] for each in turned.data]
+    scene = turned.layout.scene
+    told["axes"] = [[axis.title.text, list(axis.range)] for axis in (scene.xaxis, scene.yaxis, scene.zaxis)]
     told["laws"] = [without_picture(notebook.law_html(each)) for each in (LAW, pf.Dahl(0.6))]
     told["models"] = [without_picture(notebook.model_html(each)) for each in _models(made)]
     return told

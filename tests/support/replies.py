@@ -12,16 +12,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
+from scipy.io import savemat
 
 import planarfriction as pf
 from planarfriction import environments, reading, shown, sweeps, validation, writing
-from planarfriction.cli import identify, options
+from planarfriction.cli import doctor, identify, options
 from planarfriction.errors import FrictionError
 from planarfriction.patch import Grid, read_pressure_map
 from planarfriction.scenes import files, ready
 from planarfriction.sweeps import quantities, settings
 from planarfriction_explorer import code, drawing, ladder, looks, pictures, state
-from tests.support import recorded
+from tests.support import recorded, synthetic
 from tests.support.computed import LAW, MAPS, as_arrays
 
 VALUES = (
@@ -109,6 +111,7 @@ TABLES = {
     "ragged.csv": "3,1\n4\n",
     "negative.csv": "3,-1\n4,2\n",
 }
+TEKSCAN = "DATA_TYPE MOVIE\nROWS 2\nASCII_DATA @@\nFrame 1\n1,2,B\n3,4,0\n\nFrame 2\n5,6,7\n8,9,0\n"
 SCENE = """
 t_end = 0.05
 body = {mass = 0.2, size = [0.1, 0.05]}
@@ -150,6 +153,7 @@ def replies() -> dict[str, Any]:
                 reply(lambda path: read_pressure_map(path, header=True, index=True, threshold=0.5), name),
                 reply(lambda path: pf.Signal.from_csv(path, time="t", value="b"), name),
             ]
+        told |= map_files() | stored_solutions()
         for number, (old, new) in enumerate(CHANGES):
             Path("scene.toml").write_text(SCENE.replace(old, new, 1), encoding="utf-8")
             told[f"scene {number}"] = reply(written, "scene.toml")
@@ -161,6 +165,54 @@ def replies() -> dict[str, Any]:
     told["units"] = [shown.unit_for(kind, [0.0, -2.1 * value]) for kind, value in units]
     told["nothing"] = [shown.unit_for(kind) for kind in shown._UNITS]
     return told
+
+
+def map_files() -> dict[str, Any]:
+    """Tell what is read of maps in other files than tables, and of files with several."""
+    pressures = np.round(100.0 * MAPS[4.0])
+    np.save("pad.npy", pressures)
+    np.save("frames.npy", np.stack([pressures, 2.0 * pressures.T]))
+    np.save("texts.npy", np.array(["a"]))
+    np.savez("pad.npz", pad=pressures)
+    np.savez("two.npz", pad=pressures, other=pressures)
+    savemat("pad.mat", {"pad": np.stack([pressures, pressures.T], axis=-1)})
+    Path("pad.asf").write_text(TEKSCAN)
+    Image.fromarray(pressures.astype(np.uint8)).save("pad.png")
+    Image.fromarray((255.0 - pressures).astype(np.uint8)).save("print.png")
+    Image.fromarray(np.stack([pressures.astype(np.uint8)] * 2 + [0 * pressures.astype(np.uint8)], -1)).save(
+        "colour.png"
+    )
+    Path("noise.png").write_bytes(b"noise")
+    names = ("pad.npy", "frames.npy", "texts.npy", "pad.npz", "two.npz", "pad.mat", "pad.asf", "pad.png", "print.png",
+             "colour.png", "noise.png", "pad.xyz", "none.csv")  # fmt: skip
+    given: tuple[dict[str, Any], ...] = (
+        {}, {"frame": 1}, {"frame": 2}, {"invert": True}, {"threshold": 0.3}, {"threshold": 1.0}, {"frames": 1},
+        {"frame_shape": (2, 3)}, {"frame_shape": 3},
+    )  # fmt: skip
+    return {
+        name: [reply(lambda each, name=name: read_pressure_map(name, **each), each) for each in given] for name in names
+    }
+
+
+def stored_solutions() -> dict[str, Any]:
+    """Tell how solutions compare, and what loading says of files that are damaged or other ones."""
+    run, other = synthetic.solution(), synthetic.solution(scale=1.1)
+    content = run.save("run.nc").read_bytes()
+    Path("damaged.nc").write_bytes(content.replace(b"success", b"failure"))
+    Path("short.nc").write_bytes(content[:300])
+    Path("text.nc").write_text("text", encoding="utf-8")
+    pf.scenes.solution.write_dataset(run.data, "plain.nc")
+    again = pf.Solution.load("run.nc")
+    files_ = ("damaged.nc", "short.nc", "text.nc", "plain.nc", "none.nc")
+    return {
+        "same": [again == run, run == other, run == 3, run != again, hash(run) == hash(again)],
+        "loads": [reply(pf.Solution.load, each) for each in files_],
+        "contacts": [reply(run.contact_index, each) for each in (None, "pad", "pud")],
+        "checks": [[each.words, each.expected, each.tolerance] for each in doctor.checks()],
+        "outcomes": [
+            doctor.Check("x", lambda each=each: each, 1.0, 0.1).outcome() for each in (1.0, 1.1, 1.2, "a", np.nan)
+        ],
+    }
 
 
 def written(path: str) -> Any:

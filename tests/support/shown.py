@@ -15,8 +15,12 @@ import planarfriction as pf
 from planarfriction import plots
 from planarfriction.cli import main
 from planarfriction.identify import FitOptions, Identification, identify_lugre
+from planarfriction.joints import Plant
+from planarfriction.joints.problem import Problem
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.planning import Push, Pusher, Slider, push
+from tests.joints import golden as joint_records
+from tests.joints.test_joint_fit import PENDULUM, SERVO, servo_logs, torque_log
 from tests.support import recorded, synthetic
 from tests.support.identification_logs import PATCH, clean_log, excitation, noisy
 
@@ -31,6 +35,29 @@ patch = {shape = "disc", radius = 0.01, cells = 5}
 law = {mu_c = 0.7}
 """
 
+SCENE = """t_end = 0.1
+name = "two pads"
+body = {mass = 0.2, size = [0.1, 0.05], position = [0.01, 0.0]}
+[[contact]]
+name = "pad"
+patch = {shape = "rectangle", width = 0.02, cells = 5}
+law = {mu_c = 0.7}
+normal_force = 1.5
+[[contact]]
+name = "rim"
+model = "reduced"
+patch = {shape = "disc", radius = 0.01, cells = 7}
+law = {mu_c = 0.4, mu_s = 0.5}
+normal_force = 1.0
+position = [0.03, 0.0]
+"""
+
+MEASURE = """
+def way(run):
+    return {"way": float(run.data.y[-1]), "turn": float(run.data.theta[-1])}
+none = 3
+"""
+
 COMMANDS = (
     "run in-hand --model reduced --patch Square --t-end 0.5 --out out",
     "run in-hand --model both --cells 16 --t-end 0.5",
@@ -43,7 +70,33 @@ COMMANDS = (
     "export model.toml --out friction --name pad",
     "identify log.csv --patch disc --width 0.02 --model reduced-published",
     "identify plan --patch disc --start mu_c=0.5 --start sigma_0=2e4 --out next.csv",
-)
+    "identify log.csv --patch disc --width 0.02 --model reduced-published --parameters mu_c,contact_radius --starts 1"
+    " --nuisance none --noise 5e-3,5e-3,5e-5 --start mu_s=0.65 --start v_s=2e-3 --start gamma=1.4 --start sigma_0=2e4"
+    " --start sigma_1=30 --start sigma_2=0.8 --out fit",
+    "run scene.toml --model reduced --patch Line --cells 6 --set body.mass=0.3",
+    "run scene.toml --cells 5 --t-end 0.05 --out again",
+    "run curling --t-end 0.3 --model reduced --cells 4",
+    "run pivot --t-end 0.1 --max-steps 5 --out part",
+    "run free-slide --t-end 0.02 --model reduced --cells 4 --out drawn --plot",
+    "sweep scene.toml --set body.mass=0.1:0.3:2 --set pad.law.mu_c=0.5,0.6 --measure here.py:way --out ways",
+    "sweep free-slide --set mass=0.1:0.3:41 --cells 4 --t-end 0.01 --out many",
+    "sweep free-slide --set mass=0.2,-1 --t-end 0.05 --cells 4 --out failing",
+    "limit-surface --pressure pad.csv --cell-size 0.001 --surface cells --no-header --no-index",
+    "limit-surface --patch ring", "limit-surface --alone", "limit-surface --patch Line --pressure pad.csv",
+    "limit-surface --csv a.txt", "limit-surface --out a.gif", "limit-surface --patch disc --invert",
+    "run in-hand --model distributed --cells 8", "run nothing", "run in-hand --parts 3",
+    "run in-hand --set mass=1,2", "run in-hand --set mas=1", "run scene.toml --width 0.1",
+    "run scene.toml --set pad.mu=1", "run in-hand --t-end -1", "run in-hand --rtol 0", "run in-hand --max-steps 0",
+    "sweep in-hand --set a", "sweep in-hand --set mass=1 --model x",
+    "sweep in-hand --set mass=1 --measure here.py:none",
+    "export scene.toml --out c --contact pud", "export model.toml --out c --contact pad", "export none.toml --out c",
+    "export model.toml --out c --precision half", "export model.toml --out c --name 3d", "export scene.toml --out c",
+    "identify none.csv", "identify log.csv --start mu_c", "identify log.csv --noise 1,2",
+    "identify pad.csv", "identify log.csv --model x",
+    "identify log.csv --parameters mu_x", "identify log.csv --nuisance wind",
+    "identify plan --out a.txt", "identify plan --wanted mu_x", "identify plan --speed 0", "identify joint none.csv",
+    "identify joint log.csv --kp 3", "identify joint log.csv --kp 3 --kp 4 --kp 5 --supply 7", "nothing",
+)  # fmt: skip
 """Calls of `planarfriction`, each in the folder that those before have left."""
 
 
@@ -67,15 +120,30 @@ def figures() -> dict[str, Any]:
         "motion of points": plots.plot_motion(standing),
         "solution": run.plot(),
         "identification": identified().plot(),
+        "identification of two": identified(2).plot(),
         "push": pushed().plot(),
+        **{f"joint {name}": fit.plot() for name, fit in joints().items()},
     }
 
 
-def identified() -> Identification:
-    """Fit two parameters of a noisy log."""
-    log = noisy(clean_log(*excitation(duration=0.5)), 0)
+def identified(logs: int = 1) -> Identification:
+    """Fit two parameters of noisy logs."""
+    given = [noisy(clean_log(*excitation(duration=0.5)), seed) for seed in range(logs)]
     options = FitOptions(nuisance=(), starts=1, refine=4, elasto_plastic=0.9)
-    return identify_lugre(log, PATCH, model="reduced-published", parameters=("mu_c", "mu_s"), options=options)
+    return identify_lugre(given, PATCH, model="reduced-published", parameters=("mu_c", "mu_s"), options=options)
+
+
+def joints() -> dict[str, Any]:
+    """Make fits of joints at fixed values: of goals and of a torque."""
+    logs = tuple(joint_records.shortened(each, 1, 200) for each in servo_logs(SERVO | {"load": 0.1}))
+    torques = (joint_records.shortened(torque_log(), 4, 500),)
+    servo = Problem(logs, PENDULUM, None, ("load",), 2)
+    torque = Problem(torques, Plant(inertia=0.05), None, (), 4)
+    values = {"mu_c": 0.8, "sigma_2": 2.0, "v_s": 0.7, "rise": 0.01}
+    return {
+        "servo": joint_records.made(servo, SERVO | {"load": 0.1}, servo),
+        "torque": joint_records.made(torque.with_terms(("stribeck",)), values, torque),
+    }
 
 
 def pushed() -> Push:
@@ -93,6 +161,9 @@ def printed() -> dict[str, Any]:
     found: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         Path("model.toml").write_text(MODEL, encoding="utf-8")
+        Path("scene.toml").write_text(SCENE, encoding="utf-8")
+        Path("here.py").write_text(MEASURE, encoding="utf-8")
+        Path("pad.csv").write_text("1,2,1\n0,2,0\n", encoding="utf-8")
         log = noisy(clean_log(*excitation(duration=0.5)), 0)
         rows = np.column_stack([log.time, log.twist, log.wrench, np.broadcast_to(log.normal_force, len(log.time))])
         np.savetxt("log.csv", rows, "%.9g", ",", header="time,vx,vy,omega,fx,fy,tau,normal_force", comments="")

@@ -341,6 +341,10 @@ OF_LIBRARY: dict[str, Callable[[], Any]] = {
         replies.replies, replies.swept, replies.explored,
     )},
 }  # fmt: skip
+if importlib.util.find_spec("panel"):
+    from tests.support import paged
+
+    OF_LIBRARY["page"] = paged.page
 SUBJECTS: dict[str, Callable[[], Any]] = {
     **{name: experiment(name) for name in experiments.EXPERIMENTS},
     "beyond": beyond,
