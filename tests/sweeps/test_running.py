@@ -525,7 +525,7 @@ def test_short_runs_are_handed_out_together_and_long_ones_alone():
 def test_batches_become_smaller_towards_the_end():
     with Handed() as pool:
         pf.sweep(grip, {"grip": np.linspace(1.0, 2.0, 40).tolist()}, executor=pool, measure=end)
-    assert pool.batches[-1] == 1 < max(pool.batches)
+    assert pool.batches[-1] <= 2 < max(pool.batches)  # two, if two are left: that hangs on how long the others took
 
 
 class Silent(concurrent.futures.Executor):
