@@ -1,7 +1,7 @@
 """Everything that a result shows, told by plain values, and its comparison with values that were recorded.
 
 An array is told by its shape, its norm and weighted sums, a figure by its words, colours and data. Recorded numbers are
-those that a run for another processor finds too, `within` some scatter; the others (times, rounding) are `null`, `#`
+those that runs for other processors find too, `within` some scatter; the others (times, rounding) are `null`, `#`
 and `…` in texts.
 """
 
@@ -166,54 +166,49 @@ def _lines(value: Any) -> str:
     return "[\n" + ",\n".join(map(_lines, value)) + "\n]"
 
 
-# ---------------------------------------------------------------------- values that two runs share
+# ---------------------------------------------------------------------- values that runs share
 
 
-def shared(one: Any, other: Any) -> Any:
-    """Return what two runs agree about, with `null` for other numbers and `#` for those of texts."""
+def shared(one: Any, *others: Any) -> Any:
+    """Return what all runs agree about, with `null` for other numbers and `#` for those of texts."""
     if isinstance(one, dict):
         if "sums" in one:
-            within = SCATTER * _apart(one, other)
-            if within <= RTOL * one["sums"][0]:
+            within, size = SCATTER * max(_apart(one, other) for other in others), one["sums"][0]
+            if within <= RTOL * size:
                 return one
-            return {
-                "shape": one["shape"],
-                **({"sums": one["sums"], "within": within} if within < MOST * one["sums"][0] else {"sums": None}),
-            }
+            return one | ({"within": within} if within < MOST * size else {"sums": None})
         if "tolerance" in one:
             return one
         timed = "baseline_value" in one  # a line of a benchmark, whose numbers may be times
+        each = {name: (value, *(other[name] for other in others)) for name, value in one.items()}
         return {
-            name: _same(one[name], other[name])
-            if timed and isinstance(one[name], float)
-            else shared(one[name], other[name])
-            for name in one
+            name: _same(*runs) if timed and isinstance(runs[0], float) else shared(*runs) for name, runs in each.items()
         }
     if isinstance(one, list):
-        return [shared(*pair) for pair in zip(one, other, strict=True)]
+        return [shared(*runs) for runs in zip(one, *others, strict=True)]
     if isinstance(one, str):
-        parts = PARTS.split(one), PARTS.split(other)
-        if len(parts[0]) != len(parts[1]):
+        parts = [PARTS.split(each) for each in (one, *others)]
+        if len({len(each) for each in parts}) > 1:
             return "…"
-        return "".join(_shared_part(*pair) for pair in zip(*parts, strict=True))
+        return "".join(_shared_part(*runs) for runs in zip(*parts, strict=True))
     if isinstance(one, float):
-        within = SCATTER * abs(one - other)
+        within = SCATTER * max(abs(one - other) for other in others)
         return (
             one if within <= RTOL * abs(one) else {"near": one, "within": within} if within < MOST * abs(one) else None
         )
-    return one
+    return one if all(one == other for other in others) else None  # such as a number of steps
 
 
-def _same(one: float, other: float) -> float | None:
-    """Return a number that two runs have in common, and no other one, which is a time."""
-    return one if math.isclose(one, other, rel_tol=1e-12) else None
+def _same(one: float, *others: float) -> float | None:
+    """Return a number that all runs have in common, and no other one, which is a time."""
+    return one if all(math.isclose(one, other, rel_tol=1e-12) for other in others) else None
 
 
-def _shared_part(one: str, other: str) -> str:
-    if NUMBER.sub("#", one) != NUMBER.sub("#", other):
+def _shared_part(one: str, *others: str) -> str:
+    if len({NUMBER.sub("#", each) for each in (one, *others)}) > 1:
         return "…"  # such as 10^{-17} beside 3 x 10^{-17}
-    numbers = iter(NUMBER.findall(other))
-    return NUMBER.sub(lambda found: found[0] if found[0] == next(numbers) else "#", one)
+    numbers = zip(*(NUMBER.findall(each) for each in others), strict=True)
+    return NUMBER.sub(lambda found: found[0] if {found[0]} == {*next(numbers)} else "#", one)
 
 
 def _apart(one: Mapping[str, Any], other: Mapping[str, Any]) -> float:

@@ -1,8 +1,8 @@
 """Results that are recorded: `python -m tests.support.subjects [NAME...]` records them again.
 
-Each is computed twice, the second time compiled for a generic processor, and what both agree about is written to
-`studies/tests/recorded/NAME.json`, what the library shows to `tests/recorded`. Before that, read what has changed: it
-has to be what you meant to change.
+Each is computed for this processor and three others, and what all agree about is written to
+`studies/tests/recorded/NAME.json`, of the library to `tests/recorded`. Before that, read what has changed: it has to be
+what you meant to change.
 """
 
 from __future__ import annotations
@@ -29,13 +29,18 @@ from tests.support import computed, recorded, replies, shown
 
 FOLDER = Path(__file__).parents[2] / "studies" / "tests" / "recorded"
 
-GENERIC = {
-    "NUMBA_CPU_NAME": "generic",
-    "NUMBA_CPU_FEATURES": "",
-    "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR",
-    "OPENBLAS_CORETYPE": "Nehalem",
+PLAIN = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+PROCESSORS: dict[str, dict[str, str]] = {
+    "compiled for any": PLAIN,
+    "any": PLAIN | {"NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR", "OPENBLAS_CORETYPE": "Nehalem"},
+    "AVX2": {
+        "NUMBA_CPU_NAME": "haswell",
+        "NUMBA_CPU_FEATURES": "+avx2,+fma,+avx,+sse4.2",
+        "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR",
+        "OPENBLAS_CORETYPE": "Haswell",
+    },
 }
-"""Environment of the second run, without the instructions that processors differ by."""
+"""Environments of other runs, without some of the instructions that processors differ by."""
 
 
 def told(name: str, found: Any) -> Any:
@@ -364,14 +369,14 @@ def main(names: list[str]) -> None:
     if names[:1] == ["--plain"]:
         (folder, *names), written = names[1:], lambda name, found: found
     else:
-        folder = None
-        other = tempfile.mkdtemp()
-        command = [sys.executable, "-m", "tests.support.subjects", "--plain", other, *names]
-        subprocess.run(command, check=True, env=os.environ | GENERIC)
+        folder, others = None, [tempfile.mkdtemp() for _ in PROCESSORS]
+        for other, processor in zip(others, PROCESSORS.values(), strict=True):
+            command = [sys.executable, "-m", "tests.support.subjects", "--plain", other, *names]
+            subprocess.run(command, check=True, env=os.environ | processor)
 
         def written(name: str, found: Any) -> Any:
-            again = json.loads((Path(other) / f"{name}.json").read_text(encoding="utf-8"))
-            return recorded.shared(found, again)
+            again = [json.loads((Path(other) / f"{name}.json").read_text(encoding="utf-8")) for other in others]
+            return recorded.shared(found, *again)
 
     for name in names or SUBJECTS:
         found = rounded(json.loads(json.dumps(told(name, SUBJECTS[name]()), ensure_ascii=False)))
