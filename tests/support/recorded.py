@@ -135,8 +135,7 @@ def panel(axes: Any) -> dict[str, Any]:
         "words": [[text.get_text(), *(plain(each) for each in text.get_position())] for text in axes.texts],
         "lines": [[str(line.get_label()), *look(line), array(line.get_xydata())] for line in axes.lines],
         "areas": [[str(each.get_label()), *look(each), array(_outline(each))] for each in axes.patches],
-        "sets": [[*look(each), array(each.get_offsets()), [array(path.vertices) for path in each.get_paths()[:9]],
-                  None if each.get_array() is None else array(each.get_array())] for each in axes.collections],
+        "sets": [faces(each) if axes.name == "3d" else points(each) for each in axes.collections],
         "images": [[array(each.get_array()), array(each.get_extent())] for each in axes.images],
         "legend": legend(axes.get_legend()) if axes.get_legend() else [],
     }  # fmt: skip
@@ -145,6 +144,20 @@ def panel(axes: Any) -> dict[str, Any]:
         if isinstance(formatter, FixedFormatter):
             told[name] = [array(axis.get_ticklocs()), list(formatter.seq)]
     return told
+
+
+def points(shown: Any) -> list[Any]:
+    """Tell a set of markers or shapes by its colours, places, first outlines and values."""
+    outlines = [array(path.vertices) for path in shown.get_paths()[:9]]
+    values = shown.get_array()
+    return [*look(shown), array(shown.get_offsets()), outlines, None if values is None else array(values)]
+
+
+def faces(shown: Any) -> list[Any]:
+    """Tell what a surface or lines in three dimensions cover, in no order: those equally deep change places."""
+    corners = [path.vertices for path in shown.get_paths()] or [np.empty((0, 2))]
+    colours = np.reshape(shown.get_facecolor(), (-1, 4))
+    return [array(np.sort(each, axis=0)) for each in (np.concatenate(corners), colours)]
 
 
 def _outline(area: Any) -> np.ndarray:

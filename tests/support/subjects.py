@@ -1,6 +1,6 @@
 """Results that are recorded: `python -m tests.support.subjects [NAME...]` records them again.
 
-Each is computed for this processor and three others, and what all agree about is written to
+Each is computed for this processor and five others, and what all agree about is written to
 `studies/tests/recorded/NAME.json`, of the library to `tests/recorded`. Before that, read what has changed: it has to be
 what you meant to change.
 """
@@ -29,18 +29,16 @@ from tests.support import computed, recorded, replies, shown
 
 FOLDER = Path(__file__).parents[2] / "studies" / "tests" / "recorded"
 
-PLAIN = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
-PROCESSORS: dict[str, dict[str, str]] = {
-    "compiled for any": PLAIN,
-    "any": PLAIN | {"NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR", "OPENBLAS_CORETYPE": "Nehalem"},
-    "AVX2": {
-        "NUMBA_CPU_NAME": "haswell",
-        "NUMBA_CPU_FEATURES": "+avx2,+fma,+avx,+sse4.2",
-        "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR",
-        "OPENBLAS_CORETYPE": "Haswell",
-    },
+NO_AVX2 = "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"
+PROCESSORS = {
+    "compiled for any": ("generic", "", "", ""),
+    "any": ("generic", "", NO_AVX2, "Nehalem"),
+    "SSE": ("nehalem", "+sse4.2", NO_AVX2, "Prescott"),
+    "AVX": ("sandybridge", "+avx,+sse4.2", NO_AVX2, "Sandybridge"),
+    "AVX2": ("haswell", "+avx2,+fma,+avx,+sse4.2", "X86_V4 AVX512_ICL AVX512_SPR", "Haswell"),
 }
-"""Environments of other runs, without some of the instructions that processors differ by."""
+NAMES = "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE"
+"""Values of environment variables of other runs, without some of the instructions that processors differ by."""
 
 
 def told(name: str, found: Any) -> Any:
@@ -372,7 +370,7 @@ def main(names: list[str]) -> None:
         folder, others = None, [tempfile.mkdtemp() for _ in PROCESSORS]
         for other, processor in zip(others, PROCESSORS.values(), strict=True):
             command = [sys.executable, "-m", "tests.support.subjects", "--plain", other, *names]
-            subprocess.run(command, check=True, env=os.environ | processor)
+            subprocess.run(command, check=True, env=os.environ | dict(zip(NAMES, processor, strict=True)))
 
         def written(name: str, found: Any) -> Any:
             again = [json.loads((Path(other) / f"{name}.json").read_text(encoding="utf-8")) for other in others]
