@@ -5,11 +5,14 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
+import io
 import math
 import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image, ImageSequence
 
 import planarfriction as pf
 from planarfriction import environments
@@ -30,6 +33,7 @@ from planarfriction.planning.pushing import _neighbour
 from planarfriction.plots import interactive_limit_surface, notebook
 from planarfriction.plots.animation import frame_times
 from planarfriction.plots.film import Film
+from planarfriction.plots.film_files import write_frames
 from planarfriction.plots.track import track_of
 from planarfriction.scenes.signal import SAME_TIME, breaks_between, displacement, sample_count, sample_times
 from planarfriction_studies.rig import Gripper
@@ -257,11 +261,12 @@ def scenes() -> dict[str, Any]:
     told: dict[str, Any] = {}
     for name, run in solved().items():
         contacts = [each.name for each in run.scene.contacts]
-        body = {each: run.histories[each].values for each in run.histories if "bristles" not in each}
+        bristles = [str(each) for each in run.data.data_vars if str(each).startswith("bristles")]
         text = re.sub(r", \d+ steps in .* ms\)", "", repr(run))
         told[name] = {
             "repr": [repr(run.scene), text, *map(repr, run.scene.contacts)], "data": as_arrays(run.scene.to_dict()),
-            "html": without_picture(notebook.scene_html(run.scene)), "breaks": run.scene.breaks(), **body,
+            "html": without_picture(notebook.scene_html(run.scene)), "breaks": run.scene.breaks(),
+            "motion": run.data.drop_vars(bristles), "bristles": len(bristles),
             "twists": [run.contact_twist(each) for each in contacts], "slips": [*run.slip_events()],
             "status": [run.status, run.message],
         }  # fmt: skip
@@ -308,6 +313,7 @@ def films() -> dict[str, Any]:
         with contextlib.suppress(pf.FrictionError):
             times, words = frame_times(0.2 + span * sampled, slow, fps)
             told[f"{span} s, {slow}, {fps} Hz"] = [len(times), float(times[0]), float(times[-1]), words]
+    told["gif"] = moving_picture()
     made = made_patches()
     told["patches"] = {name: without_picture(notebook.patch_html(patch)) for name, patch in made.items()}
     surfaces = [kind(made["corner"]) for kind in (pf.LimitSurfaceExact, pf.LimitSurfaceTable, pf.LimitSurfaceEllipsoid)]
@@ -319,6 +325,18 @@ def films() -> dict[str, Any]:
     told["laws"] = [without_picture(notebook.law_html(each)) for each in (LAW, pf.Dahl(0.6))]
     told["models"] = [without_picture(notebook.model_html(each)) for each in _models(made)]
     return told
+
+
+def moving_picture() -> list[Any]:
+    """Write pictures of a few colours as a GIF, which keeps them all; returns its pictures and their times [ms]."""
+    i, j = np.mgrid[:4, :10]
+    levels = lambda number: np.stack([20 * i, 15 * j, 30 * number + 0 * i], -1).astype(np.uint8)  # noqa: E731
+    file = io.BytesIO()
+    write_frames(Path("film.gif"), file, levels, 5, 12.0)
+    with Image.open(file) as film:
+        frames = [(each.info["duration"], np.asarray(each.convert("RGB"))) for each in ImageSequence.Iterator(film)]
+    assert all((picture == levels(number)).all() for number, (_, picture) in enumerate(frames))
+    return [len(frames), [time for time, _ in frames]]
 
 
 def _models(made: dict[str, pf.ContactPatch]) -> list[Any]:

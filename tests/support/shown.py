@@ -14,7 +14,7 @@ import numpy as np
 import planarfriction as pf
 from planarfriction import plots
 from planarfriction.cli import main
-from planarfriction.identify import FitOptions, Identification, identify_lugre
+from planarfriction.identify import FitOptions, Identification, Log, identify_lugre
 from planarfriction.joints import Plant
 from planarfriction.joints.problem import Problem
 from planarfriction.patch import PUBLISHED_PATCHES
@@ -121,14 +121,23 @@ def figures() -> dict[str, Any]:
         "solution": run.plot(),
         "identification": identified().plot(),
         "identification of two": identified(2).plot(),
+        "identification of a line": identified(line=True).plot(),
         "push": pushed().plot(),
         **{f"joint {name}": fit.plot() for name, fit in joints().items()},
     }
 
 
-def identified(logs: int = 1) -> Identification:
-    """Fit two parameters of noisy logs."""
+def identified(logs: int = 1, line: bool = False) -> Identification:
+    """Fit two parameters of noisy logs, or of a log of one coordinate."""
     given = [noisy(clean_log(*excitation(duration=0.5)), seed) for seed in range(logs)]
+    if line:
+        time = 5e-3 * np.arange(200)
+        log = clean_log(time, np.outer(0.05 * time * np.sin(11.0 * time), [1.0, 0.0, 0.0]))
+        given = [
+            Log(
+                time, log.twist, log.wrench * [1.02, 0.0, 0.0] + [[0.01, 0.0, 0.0]] * np.sin(300.0 * time)[:, None], 4.0
+            )
+        ]
     options = FitOptions(nuisance=(), starts=1, refine=4, elasto_plastic=0.9)
     return identify_lugre(given, PATCH, model="reduced-published", parameters=("mu_c", "mu_s"), options=options)
 
