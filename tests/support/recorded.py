@@ -31,6 +31,9 @@ COLUMNS = 9
 
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
+FINGERPRINT = re.compile("[0-9a-f]{32}")
+"""Names of runs, which change with the version of the library and of packages."""
+
 PARTS = re.compile(r"(\. |\n|\|)")
 """Ends of sentences, lines and cells of a table."""
 
@@ -39,6 +42,8 @@ PARTS = re.compile(r"(\. |\n|\|)")
 
 def plain(value: Any) -> Any:
     """Tell a value by dictionaries, lists, texts and numbers."""
+    if isinstance(value, str) and FINGERPRINT.fullmatch(value):
+        return "fingerprint"
     if value is None or isinstance(value, (bool, int, str)):
         return value
     if isinstance(value, np.ndarray) and value.ndim == 0:

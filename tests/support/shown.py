@@ -8,17 +8,19 @@ import re
 import tempfile
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 
 import planarfriction as pf
 from planarfriction import plots
-from planarfriction.cli import main
+from planarfriction.cli import console, main
 from planarfriction.identify import FitOptions, Identification, Log, identify_lugre
 from planarfriction.joints import Plant
 from planarfriction.joints.problem import Problem
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.planning import Push, Pusher, Slider, push
+from planarfriction.sweeps import running
 from tests.joints import golden as joint_records
 from tests.joints.test_joint_fit import PENDULUM, SERVO, servo_logs, torque_log
 from tests.support import recorded, synthetic
@@ -26,9 +28,11 @@ from tests.support.identification_logs import PATCH, clean_log, excitation, nois
 
 FOLDER = Path(__file__).parents[1] / "recorded"
 
-UNSURE = "wall time|faster than real time|steps|^delay|^bias|^zero_drift|^load_|^noise_"
+UNSURE = "compil|wall time|faster than real time|steps|^delay|^bias|^zero_drift|^load_|^noise_"
 LEFT_OUT = re.compile(f"^.*(?:{UNSURE}).*\n", re.MULTILINE)
 """Lines that differ from run to run, or from processor to processor."""
+SPACED = re.compile(r"([ ─━])\1+")
+"""Widths of tables, which depend on lines that are left out."""
 
 MODEL = """model = "reduced-published"
 patch = {shape = "disc", radius = 0.01, cells = 5}
@@ -168,7 +172,8 @@ def pushed() -> Push:
 def printed() -> dict[str, Any]:
     """Call commands in an empty folder; returns exit codes and texts, and what the files hold that they write."""
     found: dict[str, Any] = {}
-    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+    patient = mock.patch.object(console, "EVERY", 1e6), mock.patch.object(running, "_BETWEEN", 1e6)
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), patient[0], patient[1]:
         Path("model.toml").write_text(MODEL, encoding="utf-8")
         Path("scene.toml").write_text(SCENE, encoding="utf-8")
         Path("here.py").write_text(MEASURE, encoding="utf-8")
@@ -180,7 +185,7 @@ def printed() -> dict[str, Any]:
             out, err = io.StringIO(), io.StringIO()
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
                 code = main(call.split())
-            found[call] = [code, *(LEFT_OUT.sub("", each.getvalue()) for each in (out, err))]
+            found[call] = [code, *(SPACED.sub(r"\1", LEFT_OUT.sub("", each.getvalue())) for each in (out, err))]
         for path in sorted(Path().rglob("*.csv")):
             found[path.as_posix()] = recorded.text(path.read_text(encoding="utf-8"))
     return found
