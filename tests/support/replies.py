@@ -10,6 +10,7 @@ import tomllib
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,8 @@ VALUES = (
     [], [1.0, 2.0], [1.0, -2.0], [0.0, 3], [[1.0, 2.0], [3.0, 4.0]], [[1.0], [2.0, 3.0]], ["disc", "ring"], [True], {},
     {"disc": 1.0}, {"disc": 1, "ring": 2}, {"rnig": 1}, np.array(2.0), np.arange(3), np.ones((2, 2, 1)),
     np.ma.masked_array([1.0], True), np.array([1 + 1j]), np.array(["a"]), 10**400,
+    SimpleNamespace(units=len), SimpleNamespace(unit="mm"), SimpleNamespace(units="kg m^2"),
+    SimpleNamespace(attrs={"units": "N"}),
     lambda: 0.0, (1.0, np.inf), range(3), [[[[[[[[[[0.0]]]]]]]]]],
 )  # fmt: skip
 WORDS = ("disc", "ring", "line")
