@@ -10,6 +10,7 @@ import math
 import re
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 from PIL import Image, ImageSequence
@@ -31,10 +32,10 @@ from planarfriction.planning import (
 from planarfriction.planning.contact_modes import TouchPoint
 from planarfriction.planning.pushing import _neighbour
 from planarfriction.plots import interactive_limit_surface, notebook
+from planarfriction.plots import track as tracks
 from planarfriction.plots.animation import frame_times
 from planarfriction.plots.film import Film
 from planarfriction.plots.film_files import write_frames
-from planarfriction.plots.track import track_of
 from planarfriction.scenes.signal import SAME_TIME, breaks_between, displacement, sample_count, sample_times
 from planarfriction_studies.rig import Gripper
 from planarfriction_studies.rig.trials import known_model, random_parts
@@ -218,7 +219,8 @@ def ready() -> dict[str, pf.Scene]:
     plate = pf.Body(0.3, 4e-4, (0.01, 0.0), 0.2, (0.05, 0.0, 1.0), outline=synthetic.PLATE)
     spring = pf.Spring(40.0, 0.5, [0.03, 0.01], (0.02, 0.0), 0.05, 1e-3)
     moved = pf.Signal.sampled([0.0, 0.1, 0.3], [[0.0, 0.0, 0.0], [0.05, 0.02, 0.5], [0.0, 0.0, 0.0]], "linear")
-    wave = pf.Signal.sine(2.0, 0.8, 3.0, t_end=0.3)
+    wave, fading = pf.Signal.sine(2.0, 0.8, 3.0, t_end=0.3), pf.Signal([0.0, 0.2, 0.3], [3.0, 0.5, 0.0], "linear")
+    turn = (0.01, 0.0, 1.0)
     two = [
         pf.Contact(cells, wave, position=(0.0, 0.0), angle=0.3, count=2, name="pads", support_velocity=moved),
         pf.Contact(small, 1.5, mounted_on="body", position=(0.01, -0.01), name="foot"),
@@ -232,7 +234,7 @@ def ready() -> dict[str, pf.Scene]:
         "drift, normal": scenes.drift(small, load="normal", t_end=1.2),
         "free slide": scenes.free_slide(small, twist=(0.3, 0.1, 20.0), angle=0.1),
         "driven": scenes.driven(pf.ReducedModel(PUBLISHED_PATCHES["LineGrad"](), LAW, cells=6), t_end=1.0),
-        "driven at the origin": scenes.driven(soft, twist=(0.01, 0.0, 1.0), at="origin", t_end=0.3, normal_force=2.0),
+        "driven at the origin": scenes.driven(soft, twist=turn, at="origin", normal_force=fading, t_end=0.3),
         "pushed": scenes.pushed(small, pad=cells, t_end=0.4),
         "pivot": scenes.pivot(small, t_end=0.5),
         "foot": scenes.foot(small, t_end=0.5, share=0.4),
@@ -294,7 +296,7 @@ def films() -> dict[str, Any]:
     for name in ("two", "free slide", "driven at the origin"):
         run = solved()[name]
         end = float(run.histories["time"].values[-1])
-        track = track_of(run, np.linspace(0.0, end, 5))
+        track = tracks.track_of(run, np.linspace(0.0, end, 5))
         film = Film(run, track, follow=name == "free slide", pace="   (2 x slower)", dpi=40.0)
         frames = []
         for frame in (1, 4):
@@ -313,6 +315,9 @@ def films() -> dict[str, Any]:
         with contextlib.suppress(pf.FrictionError):
             times, words = frame_times(0.2 + span * sampled, slow, fps)
             told[f"{span} s, {slow}, {fps} Hz"] = [len(times), float(times[0]), float(times[-1]), words]
+    with mock.patch.object(tracks, "MOST_STEPS", 7):
+        track = tracks.track_of(solved()["two"], np.linspace(0.0, 0.3, 4))
+        told["few steps"] = [[*each.slip, each.loads, each.wrenches] for each in track.contacts if each.slip]
     told["gif"] = moving_picture()
     made = made_patches()
     told["patches"] = {name: without_picture(notebook.patch_html(patch)) for name, patch in made.items()}

@@ -174,6 +174,7 @@ def replies() -> dict[str, Any]:
                 reply(lambda path: reading.Table(path).names, name),
                 reply(lambda path: reading.Table(path).numbers(["t", "b"]), name),
                 reply(lambda path: reading.Table(path).numbers(["t", "a"], ["a"]), name),
+                reply(lambda path: reading.Table(path).numbers(["b"]), name),
                 reply(lambda path: [*reading.read_rows(path, "a table")], name),
                 reply(read_pressure_map, name),
                 reply(lambda path: read_pressure_map(path, header=False, index=False, frame=1), name),
