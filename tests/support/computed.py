@@ -191,7 +191,7 @@ def online() -> dict[str, Any]:
         for _ in range(500):
             grips_.append(own.update(sample))
             sample = gripper.step(grips_[-1])
-        told[kind.__name__] = [np.array(grips_), gripper.slip, own.blind, own.estimate.mu_c]
+        told[kind.__name__] = [np.array(grips_), gripper.slip, own.blind, own.estimate.mu_c, list(own._settings)]
     return told
 
 
@@ -233,6 +233,7 @@ def ready() -> dict[str, pf.Scene]:
         "drift": scenes.drift(small, t_end=0.4),
         "drift, normal": scenes.drift(small, load="normal", t_end=1.2),
         "free slide": scenes.free_slide(small, twist=(0.3, 0.1, 20.0), angle=0.1),
+        "soft slide": scenes.free_slide(soft, twist=(0.05, 0.0, 2.0), mass=0.15, t_end=0.1),
         "driven": scenes.driven(pf.ReducedModel(PUBLISHED_PATCHES["LineGrad"](), LAW, cells=6), t_end=1.0),
         "driven at the origin": scenes.driven(soft, twist=turn, at="origin", normal_force=fading, t_end=0.3),
         "pushed": scenes.pushed(small, pad=cells, t_end=0.4),
@@ -316,7 +317,7 @@ def films() -> dict[str, Any]:
             times, words = frame_times(0.2 + span * sampled, slow, fps)
             told[f"{span} s, {slow}, {fps} Hz"] = [len(times), float(times[0]), float(times[-1]), words]
     with mock.patch.object(tracks, "MOST_STEPS", 7):
-        track = tracks.track_of(solved()["two"], np.linspace(0.0, 0.3, 4))
+        track = tracks.track_of(solved()["pivot"], np.linspace(0.0, 0.5, 4))
         told["few steps"] = [[*each.slip, each.loads, each.wrenches] for each in track.contacts if each.slip]
     told["gif"] = moving_picture()
     made = made_patches()

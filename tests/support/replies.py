@@ -37,7 +37,7 @@ VALUES = (
     np.ma.masked_array([1.0], True), np.array([1 + 1j]), np.array(["a"]), 10**400,
     SimpleNamespace(units=len), SimpleNamespace(unit="mm"), SimpleNamespace(units="kg m^2"),
     SimpleNamespace(attrs={"units": "N"}),
-    lambda: 0.0, (1.0, np.inf), range(3), [[[[[[[[[[0.0]]]]]]]]]],
+    lambda: 0.0, (1.0, np.inf), (2.0, 0.5), range(3), [[[[[[[[[[0.0]]]]]]]]]],
 )  # fmt: skip
 WORDS = ("disc", "ring", "line")
 CHECKS: dict[str, Callable[[Any], Any]] = {
@@ -78,6 +78,7 @@ CHECKS: dict[str, Callable[[Any], Any]] = {
     "quantity": lambda x: quantities.grid_of({"a": x}),
     "outline of a body": lambda x: pf.Body(1.0, 1.0, outline=x).outline,
     "load": lambda x: pf.Contact(pf.ReducedModel(pf.ContactPatch.disc(0.01, 5), LAW), x).normal_force.to_dict(),
+    "place of a body": lambda x: pf.Body(1.0, 1.0, x).position,
     "spring": lambda x: pf.Spring(1.0, anchor=x).pull(0.5, [0.1, 0.2, 0.3]),
     "pull": lambda x: pf.Spring(1.0, torsion=2.0, at=(0.1, 0.0)).pull(0.5, x),
     "grid": lambda x: Grid.square(0.02, x),

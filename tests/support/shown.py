@@ -86,6 +86,7 @@ COMMANDS = (
     "sweep free-slide --set mass=0.1:0.3:41 --cells 4 --t-end 0.01 --out many",
     "sweep free-slide --set mass=0.2,-1 --t-end 0.05 --cells 4 --out failing",
     "limit-surface --pressure pad.csv --cell-size 0.001 --surface cells --no-header --no-index",
+    "limit-surface --pressure many.csv --cell-size 0.001 --surface ellipsoid --no-header --no-index",
     "limit-surface --patch ring", "limit-surface --alone", "limit-surface --patch Line --pressure pad.csv",
     "limit-surface --csv a.txt", "limit-surface --out a.gif", "limit-surface --patch disc --invert",
     "run in-hand --model distributed --cells 8", "run nothing", "run in-hand --parts 3",
@@ -177,6 +178,7 @@ def printed() -> dict[str, Any]:
         Path("model.toml").write_text(MODEL, encoding="utf-8")
         Path("scene.toml").write_text(SCENE, encoding="utf-8")
         Path("here.py").write_text(MEASURE, encoding="utf-8")
+        Path("many.csv").write_text(40 * (39 * "1," + "2\n"), encoding="utf-8")
         Path("pad.csv").write_text("1,2,1\n0,2,0\n", encoding="utf-8")
         log = noisy(clean_log(*excitation(duration=0.5)), 0)
         rows = np.column_stack([log.time, log.twist, log.wrench, np.broadcast_to(log.normal_force, len(log.time))])
