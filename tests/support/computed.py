@@ -112,11 +112,12 @@ def patches() -> dict[str, Any]:
     drawn = environments.randomise(
         LAW, {"mu_c": (0.2, 0.9), "sigma_0": (1e4, 2e4), "scale": (0.9, 1.1), "centre_x": (-1e-3, 2e-3)}, 6, seed=3
     )
+    one = pf.ContactPatch.points([(0.0, 0.0)]).with_friction_metric([friction_metric(0.4, 1.0, 1.6)])
     static = environments.randomise(LAW, {"mu_s": (0.2, 1.5)}, 6, seed=1)
     return {
         **{name: told_patch(patch) for name, patch in made.items()},
         "errors": errors, "finer errors": finer, "drawn": drawn, "static": static,
-        "defaults": environments.defaults(LAW),
+        "defaults": environments.defaults(LAW), "root of one": one.root,
     }  # fmt: skip
 
 
@@ -162,7 +163,11 @@ def grips() -> dict[str, Any]:
     fast = [dynamic_holding_load(load, model, ramp=ramp) for ramp in (0.0, 0.05)]
     plate = pf.scenes.in_hand(model, centre_of_mass=(0.025, 0.0), normal_force=4.0, t_end=0.6)
     turn = plan_grip(plate, {"angle": -0.4}, knots=6)
-    return {"holding": holding, "fast": fast, "turn": told_plan(turn), "figure": turn.plot()}
+    wrong: list[Any] = []
+    for knots in ([0.0, 0.1, 0.2], [0.1, 0.2, 0.3, 0.4], [0.0, 0.2, 0.2, 0.4], [0.0, 0.1, 0.2, 0.6], 3):
+        with contextlib.suppress(pf.FrictionError):
+            wrong.append([knots, plan_grip(plate, {"angle": -0.4}, knots=knots)])
+    return {"holding": holding, "fast": fast, "turn": told_plan(turn), "figure": turn.plot(), "wrong": wrong}
 
 
 def told_plan(plan: Any) -> dict[str, Any]:
