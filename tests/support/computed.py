@@ -5,11 +5,15 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
+import io
 import math
 import re
+from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
+from PIL import Image, ImageSequence
 
 import planarfriction as pf
 from planarfriction import environments
@@ -28,9 +32,10 @@ from planarfriction.planning import (
 from planarfriction.planning.contact_modes import TouchPoint
 from planarfriction.planning.pushing import _neighbour
 from planarfriction.plots import interactive_limit_surface, notebook
+from planarfriction.plots import track as tracks
 from planarfriction.plots.animation import frame_times
 from planarfriction.plots.film import Film
-from planarfriction.plots.track import track_of
+from planarfriction.plots.film_files import write_frames
 from planarfriction.scenes.signal import SAME_TIME, breaks_between, displacement, sample_count, sample_times
 from planarfriction_studies.rig import Gripper
 from planarfriction_studies.rig.trials import known_model, random_parts
@@ -107,11 +112,12 @@ def patches() -> dict[str, Any]:
     drawn = environments.randomise(
         LAW, {"mu_c": (0.2, 0.9), "sigma_0": (1e4, 2e4), "scale": (0.9, 1.1), "centre_x": (-1e-3, 2e-3)}, 6, seed=3
     )
+    one = pf.ContactPatch.points([(0.0, 0.0)]).with_friction_metric([friction_metric(0.4, 1.0, 1.6)])
     static = environments.randomise(LAW, {"mu_s": (0.2, 1.5)}, 6, seed=1)
     return {
         **{name: told_patch(patch) for name, patch in made.items()},
         "errors": errors, "finer errors": finer, "drawn": drawn, "static": static,
-        "defaults": environments.defaults(LAW),
+        "defaults": environments.defaults(LAW), "root of one": one.root,
     }  # fmt: skip
 
 
@@ -157,7 +163,11 @@ def grips() -> dict[str, Any]:
     fast = [dynamic_holding_load(load, model, ramp=ramp) for ramp in (0.0, 0.05)]
     plate = pf.scenes.in_hand(model, centre_of_mass=(0.025, 0.0), normal_force=4.0, t_end=0.6)
     turn = plan_grip(plate, {"angle": -0.4}, knots=6)
-    return {"holding": holding, "fast": fast, "turn": told_plan(turn), "figure": turn.plot()}
+    wrong: list[Any] = []
+    for knots in ([0.0, 0.1, 0.2], [0.1, 0.2, 0.3, 0.4], [0.0, 0.2, 0.2, 0.4], [0.0, 0.1, 0.2, 0.6], 3):
+        with contextlib.suppress(pf.FrictionError):
+            wrong.append([knots, plan_grip(plate, {"angle": -0.4}, knots=knots)])
+    return {"holding": holding, "fast": fast, "turn": told_plan(turn), "figure": turn.plot(), "wrong": wrong}
 
 
 def told_plan(plan: Any) -> dict[str, Any]:
@@ -186,7 +196,7 @@ def online() -> dict[str, Any]:
         for _ in range(500):
             grips_.append(own.update(sample))
             sample = gripper.step(grips_[-1])
-        told[kind.__name__] = [np.array(grips_), gripper.slip, own.blind, own.estimate.mu_c]
+        told[kind.__name__] = [np.array(grips_), gripper.slip, own.blind, own.estimate.mu_c, list(own._settings)]
     return told
 
 
@@ -214,7 +224,8 @@ def ready() -> dict[str, pf.Scene]:
     plate = pf.Body(0.3, 4e-4, (0.01, 0.0), 0.2, (0.05, 0.0, 1.0), outline=synthetic.PLATE)
     spring = pf.Spring(40.0, 0.5, [0.03, 0.01], (0.02, 0.0), 0.05, 1e-3)
     moved = pf.Signal.sampled([0.0, 0.1, 0.3], [[0.0, 0.0, 0.0], [0.05, 0.02, 0.5], [0.0, 0.0, 0.0]], "linear")
-    wave = pf.Signal.sine(2.0, 0.8, 3.0, t_end=0.3)
+    wave, fading = pf.Signal.sine(2.0, 0.8, 3.0, t_end=0.3), pf.Signal([0.0, 0.2, 0.3], [3.0, 0.5, 0.0], "linear")
+    turn = (0.01, 0.0, 1.0)
     two = [
         pf.Contact(cells, wave, position=(0.0, 0.0), angle=0.3, count=2, name="pads", support_velocity=moved),
         pf.Contact(small, 1.5, mounted_on="body", position=(0.01, -0.01), name="foot"),
@@ -227,8 +238,9 @@ def ready() -> dict[str, pf.Scene]:
         "drift": scenes.drift(small, t_end=0.4),
         "drift, normal": scenes.drift(small, load="normal", t_end=1.2),
         "free slide": scenes.free_slide(small, twist=(0.3, 0.1, 20.0), angle=0.1),
+        "soft slide": scenes.free_slide(soft, twist=(0.05, 0.0, 2.0), mass=0.15, t_end=0.1),
         "driven": scenes.driven(pf.ReducedModel(PUBLISHED_PATCHES["LineGrad"](), LAW, cells=6), t_end=1.0),
-        "driven at the origin": scenes.driven(soft, twist=(0.01, 0.0, 1.0), at="origin", t_end=0.3, normal_force=2.0),
+        "driven at the origin": scenes.driven(soft, twist=turn, at="origin", normal_force=fading, t_end=0.3),
         "pushed": scenes.pushed(small, pad=cells, t_end=0.4),
         "pivot": scenes.pivot(small, t_end=0.5),
         "foot": scenes.foot(small, t_end=0.5, share=0.4),
@@ -257,11 +269,12 @@ def scenes() -> dict[str, Any]:
     told: dict[str, Any] = {}
     for name, run in solved().items():
         contacts = [each.name for each in run.scene.contacts]
-        body = {each: run.histories[each].values for each in run.histories if "bristles" not in each}
+        bristles = [str(each) for each in run.data.data_vars if str(each).startswith("bristles")]
         text = re.sub(r", \d+ steps in .* ms\)", "", repr(run))
         told[name] = {
             "repr": [repr(run.scene), text, *map(repr, run.scene.contacts)], "data": as_arrays(run.scene.to_dict()),
-            "html": without_picture(notebook.scene_html(run.scene)), "breaks": run.scene.breaks(), **body,
+            "html": without_picture(notebook.scene_html(run.scene)), "breaks": run.scene.breaks(),
+            "motion": run.data.drop_vars(bristles), "bristles": len(bristles),
             "twists": [run.contact_twist(each) for each in contacts], "slips": [*run.slip_events()],
             "status": [run.status, run.message],
         }  # fmt: skip
@@ -289,7 +302,7 @@ def films() -> dict[str, Any]:
     for name in ("two", "free slide", "driven at the origin"):
         run = solved()[name]
         end = float(run.histories["time"].values[-1])
-        track = track_of(run, np.linspace(0.0, end, 5))
+        track = tracks.track_of(run, np.linspace(0.0, end, 5))
         film = Film(run, track, follow=name == "free slide", pace="   (2 x slower)", dpi=40.0)
         frames = []
         for frame in (1, 4):
@@ -308,6 +321,10 @@ def films() -> dict[str, Any]:
         with contextlib.suppress(pf.FrictionError):
             times, words = frame_times(0.2 + span * sampled, slow, fps)
             told[f"{span} s, {slow}, {fps} Hz"] = [len(times), float(times[0]), float(times[-1]), words]
+    with mock.patch.object(tracks, "MOST_STEPS", 7):
+        track = tracks.track_of(solved()["pivot"], np.linspace(0.0, 0.5, 4))
+        told["few steps"] = [[*each.slip, each.loads, each.wrenches] for each in track.contacts if each.slip]
+    told["gif"] = moving_picture()
     made = made_patches()
     told["patches"] = {name: without_picture(notebook.patch_html(patch)) for name, patch in made.items()}
     surfaces = [kind(made["corner"]) for kind in (pf.LimitSurfaceExact, pf.LimitSurfaceTable, pf.LimitSurfaceEllipsoid)]
@@ -319,6 +336,18 @@ def films() -> dict[str, Any]:
     told["laws"] = [without_picture(notebook.law_html(each)) for each in (LAW, pf.Dahl(0.6))]
     told["models"] = [without_picture(notebook.model_html(each)) for each in _models(made)]
     return told
+
+
+def moving_picture() -> list[Any]:
+    """Write pictures of a few colours as a GIF, which keeps them all; returns its pictures and their times [ms]."""
+    i, j = np.mgrid[:4, :10]
+    levels = lambda number: np.stack([20 * i, 15 * j, 30 * number + 0 * i], -1).astype(np.uint8)  # noqa: E731
+    file = io.BytesIO()
+    write_frames(Path("film.gif"), file, levels, 5, 12.0)
+    with Image.open(file) as film:
+        frames = [(each.info["duration"], np.asarray(each.convert("RGB"))) for each in ImageSequence.Iterator(film)]
+    assert all((picture == levels(number)).all() for number, (_, picture) in enumerate(frames))
+    return [len(frames), [time for time, _ in frames]]
 
 
 def _models(made: dict[str, pf.ContactPatch]) -> list[Any]:

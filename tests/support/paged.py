@@ -5,15 +5,19 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import panel as pn
 
-from planarfriction_explorer import ladder_tab
+from planarfriction_explorer import ladder_tab, scene_tab
+from planarfriction_explorer.films import Watched
 from planarfriction_explorer.ladder import RUNGS, Rung
 from planarfriction_explorer.page import Page
 from tests.support.recorded import text
+from tests.support.shown import SCENE
 
 PARAMETERS = ("label", "value", "options", "start", "end", "step", "description", "disabled", "visible", "css_classes")
 """Parameters of widgets that are told."""
@@ -63,7 +67,37 @@ def page() -> dict[str, Any]:
     for name, words in (("said", shown.scenes._say), ("failed", shown.scenes._fail), ("rest", shown.scenes._rest)):
         words("a < b")
         found[name] = [shown.scenes.words.object, shown.scenes.button.label]
-    return found
+    return found | {"run": run_at_once(shown, rungs)}
+
+
+def run_at_once(shown: Page, rungs: list[Rung]) -> list[Any]:
+    """Tell what is said while a scene is run and stopped and models are compared, without threads."""
+    scenes, said, works = shown.scenes, list[Any](), list[Any]()
+
+    def film(scene: Any, progress: Callable[[str, float], None]) -> Watched:
+        for doing, share in (("simulating", 0.1), ("simulating", 0.1), ("drawing", 0.5)):
+            progress(doing, share)
+        return Watched(f"<p>{scene.name}", b"picture")
+
+    def tell(what: Callable[..., None], *values: Any) -> None:
+        what(*values)
+        said.append([what.__name__, scenes.words.object, scenes.button.label, shown.ladder.status.object])
+
+    task: Any = SimpleNamespace(check=lambda: None, tell=tell)
+    live = SimpleNamespace(now=works.append, stop=lambda: said.append("stop"))
+    with (
+        mock.patch.object(scene_tab, "film", film),
+        mock.patch.object(ladder_tab, "climb", lambda _: iter(rungs)),
+        mock.patch.object(scenes, "_live", live),
+    ):
+        for _ in range(3):  # begin, stop, begin
+            scenes._pressed()
+            said.append([scenes.words.object, scenes.button.label, scenes.result.object])
+        works[-1](task)
+        shown.ladder._work(task)
+    scenes.file.filename = "pad.toml"
+    scenes._read(SCENE.encode())
+    return [said, len(works), scenes.result.object, scenes.scene.value, scenes.model.visible]
 
 
 def told(shown: Page, layout: Any) -> dict[str, Any]:

@@ -6,9 +6,11 @@ import contextlib
 import functools
 import re
 import tempfile
+import tomllib
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,8 @@ from planarfriction.cli import doctor, identify, options
 from planarfriction.errors import FrictionError
 from planarfriction.patch import Grid, read_pressure_map
 from planarfriction.scenes import files, ready
+from planarfriction.scenes.model_files import patch_from_dict
+from planarfriction.scenes.section import Section
 from planarfriction.sweeps import quantities, settings
 from planarfriction_explorer import code, drawing, ladder, looks, pictures, state
 from tests.support import recorded, synthetic
@@ -31,7 +35,9 @@ VALUES = (
     [], [1.0, 2.0], [1.0, -2.0], [0.0, 3], [[1.0, 2.0], [3.0, 4.0]], [[1.0], [2.0, 3.0]], ["disc", "ring"], [True], {},
     {"disc": 1.0}, {"disc": 1, "ring": 2}, {"rnig": 1}, np.array(2.0), np.arange(3), np.ones((2, 2, 1)),
     np.ma.masked_array([1.0], True), np.array([1 + 1j]), np.array(["a"]), 10**400,
-    lambda: 0.0, (1.0, np.inf), range(3), [[[[[[[[[[0.0]]]]]]]]]],
+    SimpleNamespace(units=len), SimpleNamespace(unit="mm"), SimpleNamespace(units="kg m^2"),
+    SimpleNamespace(attrs={"units": "N"}),
+    lambda: 0.0, (1.0, np.inf), (2.0, 0.5), range(3), [[[[[[[[[[0.0]]]]]]]]]],
 )  # fmt: skip
 WORDS = ("disc", "ring", "line")
 CHECKS: dict[str, Callable[[Any], Any]] = {
@@ -72,6 +78,7 @@ CHECKS: dict[str, Callable[[Any], Any]] = {
     "quantity": lambda x: quantities.grid_of({"a": x}),
     "outline of a body": lambda x: pf.Body(1.0, 1.0, outline=x).outline,
     "load": lambda x: pf.Contact(pf.ReducedModel(pf.ContactPatch.disc(0.01, 5), LAW), x).normal_force.to_dict(),
+    "place of a body": lambda x: pf.Body(1.0, 1.0, x).position,
     "spring": lambda x: pf.Spring(1.0, anchor=x).pull(0.5, [0.1, 0.2, 0.3]),
     "pull": lambda x: pf.Spring(1.0, torsion=2.0, at=(0.1, 0.0)).pull(0.5, x),
     "grid": lambda x: Grid.square(0.02, x),
@@ -132,6 +139,27 @@ CHANGES = (
     ("normal_force", "model = {kind = 'reduced-published', surface = {kind = 'table'}}\nnormal_force"),
 )  # fmt: skip
 
+PATCHES = (
+    "shape = 'ring', inner_radius = 0.004, outer_radius = 0.01, cells = 5", "shape = 'cells', areas = [1]",
+    "shape = 'none'", "shape = 'line', length = 0.02, cells = 4, direction = 'x', profile = [1, 2, 3, 4]",
+    "shape = 'polygon', vertices = [[0, 0], [0.02, 0], [0, 0.01]], cells = 4", "shape = 'disc-published', cells = 4",
+    "shape = 'points', positions = [[0, 0], [0.01, 0]], weights = [1, 2], asymmetry = [0.1, 0.2]",
+    "shape = 'rectangle', width = 0.02, cells = 3, pressure = {law = 'linear_gradient', gradient = [10, -5]}",
+    "shape = 'disc', radius = 0.01, cells = 5, pressure = {law = 'soft_finger', c = 0.006, n = 0.33, k = 2}",
+    "shape = 'disc', radius = 0.01, cells = 5, pressure = 'uniform'",
+    "shape = 'disc', radius = 0.01, pressure = {c = 1}", "shape = 'disc', radius = 0.01, pressure = 'hard'",
+    "shape = 'disc', radius = 0.01, pressure = {law = 'soft_finger'}",
+    "shape = 'pressure-map', file = 'map.csv', cell_size = 0.001, frame = 0, header = false, index = false",
+    "shape = 'pressure-map', files = ['pad.npy', 'pad.npz'], loads = [1, 2], width = 0.01",
+    "shape = 'pressure-map', files = ['pad.npy', 'pad.npz'], width = 0.01",
+    "shape = 'pressure-map', files = 'pad.npy'", "shape = 'pressure-map', files = [3], loads = [1]",
+    "shape = 'pressure-map', file = ''", "shape = 'pressure-map'",
+    "shape = 'pressure-map', values = [[1, 2], [0, 1]], cell_size = 1e-3, name = 'pad'", "shape = 3", "radius = 1",
+    "shape = 'published', name = 'Line', cells = 11", "shape = 'published', name = 'Lin'",
+    "shape = 'disc', radius = 0.01, cells = 5, metric = [[1, 0], [0, 2]]",
+    "shape = 'disc', radius = 0.01, metric = {along = 1}",
+)  # fmt: skip
+
 
 def replies() -> dict[str, Any]:
     """Tell what checks and readers return, or the line that they raise, for each of many inputs."""
@@ -147,13 +175,14 @@ def replies() -> dict[str, Any]:
                 reply(lambda path: reading.Table(path).names, name),
                 reply(lambda path: reading.Table(path).numbers(["t", "b"]), name),
                 reply(lambda path: reading.Table(path).numbers(["t", "a"], ["a"]), name),
+                reply(lambda path: reading.Table(path).numbers(["b"]), name),
                 reply(lambda path: [*reading.read_rows(path, "a table")], name),
                 reply(read_pressure_map, name),
                 reply(lambda path: read_pressure_map(path, header=False, index=False, frame=1), name),
                 reply(lambda path: read_pressure_map(path, header=True, index=True, threshold=0.5), name),
                 reply(lambda path: pf.Signal.from_csv(path, time="t", value="b"), name),
             ]
-        told |= map_files() | stored_solutions()
+        told |= map_files() | stored_solutions() | {"patches": [reply(read_patch, each) for each in PATCHES]}
         for number, (old, new) in enumerate(CHANGES):
             Path("scene.toml").write_text(SCENE.replace(old, new, 1), encoding="utf-8")
             told[f"scene {number}"] = reply(written, "scene.toml")
@@ -206,6 +235,9 @@ def stored_solutions() -> dict[str, Any]:
     files_ = ("damaged.nc", "short.nc", "text.nc", "plain.nc", "none.nc")
     return {
         "same": [again == run, run == other, run == 3, run != again, hash(run) == hash(again)],
+        "tables": [reply(read_json, each) for each in ('{"t_end": 1, "t_end": 2}', "[1]", '{"name": "a"}')],
+        "kinds": [reply(run.scene.to_file, f"run{kind}") for kind in (".toml", ".json", ".txt", "")],
+        "back": [pf.Scene.from_file(f"run{kind}") == run.scene for kind in (".toml", ".json")],
         "loads": [reply(pf.Solution.load, each) for each in files_],
         "contacts": [reply(run.contact_index, each) for each in (None, "pad", "pud")],
         "checks": [[each.words, each.expected, each.tolerance] for each in doctor.checks()],
@@ -213,6 +245,19 @@ def stored_solutions() -> dict[str, Any]:
             doctor.Check("x", lambda each=each: each, 1.0, 0.1).outcome() for each in (1.0, 1.1, 1.2, "a", np.nan)
         ],
     }
+
+
+def read_json(text: str) -> Any:
+    """Read a scene file of this text."""
+    Path("scene.json").write_text(text, encoding="utf-8")
+    return repr(pf.Scene.from_file("scene.json"))
+
+
+def read_patch(text: str) -> Any:
+    """Read a patch as in a scene file; tell it and its weights."""
+    table = tomllib.loads(f"patch = {{{text}}}")["patch"]
+    patch = patch_from_dict(Section(table, "patch", "scene.toml", Path()))
+    return [as_arrays(patch.to_dict()), patch.weights(1.5)]
 
 
 def written(path: str) -> Any:
@@ -249,9 +294,13 @@ def swept() -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         told["motion"] = without_runs(sweeps.sweep(make, {"mu": values["mu"][:2], "kind": ["few"]}, out=folder))
         again = sweeps.sweep(make, values, out=folder, progress=lambda each: said.append(str(each._replace(left=None))))
-        told["more"], told["said"] = without_runs(again), [said[0], said[-1]]
+        told["more"], told["said"] = without_runs(again), said[-1]
         told["found"] = without_runs(sweeps.finished_runs(make, values | {"mu": [0.4, 0.5]}, out=folder))
     told["measured"] = without_runs(sweeps.sweep(make, values, measure=measured))
+    plate, ways = ready.in_hand(pf.ReducedModel(patch, LAW, cells=4), t_end=0.05), {"body.mass": [-1.0, 0.1, 0.3]}
+    told["of a scene"] = without_runs(
+        sweeps.sweep(plate, ways, measure=lambda run: float(run.histories["y"].values[-1]))
+    )
     told["times"] = [str(sweeps.Progress(9, 4, 1, 1, 2, left)) for left in (3.2, 89.6, 100.0, 9000.0, None)]
     scene = settings.Settable(ready.in_hand(pf.ReducedModel(patch, LAW), t_end=0.1))
     changes = (

@@ -15,7 +15,7 @@ import numpy as np
 import planarfriction as pf
 from planarfriction import plots
 from planarfriction.cli import console, main
-from planarfriction.identify import FitOptions, Identification, identify_lugre
+from planarfriction.identify import FitOptions, Identification, Log, identify_lugre
 from planarfriction.joints import Plant
 from planarfriction.joints.problem import Problem
 from planarfriction.patch import PUBLISHED_PATCHES
@@ -31,6 +31,8 @@ FOLDER = Path(__file__).parents[1] / "recorded"
 UNSURE = "compil|wall time|faster than real time|steps|^delay|^bias|^zero_drift|^load_|^noise_"
 LEFT_OUT = re.compile(f"^.*(?:{UNSURE}).*\n", re.MULTILINE)
 """Lines that differ from run to run, or from processor to processor."""
+SPACED = re.compile(r"([ ─━])\1+")
+"""Widths of tables, which depend on lines that are left out."""
 
 MODEL = """model = "reduced-published"
 patch = {shape = "disc", radius = 0.01, cells = 5}
@@ -84,6 +86,7 @@ COMMANDS = (
     "sweep free-slide --set mass=0.1:0.3:41 --cells 4 --t-end 0.01 --out many",
     "sweep free-slide --set mass=0.2,-1 --t-end 0.05 --cells 4 --out failing",
     "limit-surface --pressure pad.csv --cell-size 0.001 --surface cells --no-header --no-index",
+    "limit-surface --pressure many.csv --cell-size 0.001 --surface ellipsoid --no-header --no-index",
     "limit-surface --patch ring", "limit-surface --alone", "limit-surface --patch Line --pressure pad.csv",
     "limit-surface --csv a.txt", "limit-surface --out a.gif", "limit-surface --patch disc --invert",
     "run in-hand --model distributed --cells 8", "run nothing", "run in-hand --parts 3",
@@ -123,14 +126,23 @@ def figures() -> dict[str, Any]:
         "solution": run.plot(),
         "identification": identified().plot(),
         "identification of two": identified(2).plot(),
+        "identification of a line": identified(line=True).plot(),
         "push": pushed().plot(),
         **{f"joint {name}": fit.plot() for name, fit in joints().items()},
     }
 
 
-def identified(logs: int = 1) -> Identification:
-    """Fit two parameters of noisy logs."""
+def identified(logs: int = 1, line: bool = False) -> Identification:
+    """Fit two parameters of noisy logs, or of a log of one coordinate."""
     given = [noisy(clean_log(*excitation(duration=0.5)), seed) for seed in range(logs)]
+    if line:
+        time = 5e-3 * np.arange(200)
+        log = clean_log(time, np.outer(0.05 * time * np.sin(11.0 * time), [1.0, 0.0, 0.0]))
+        given = [
+            Log(
+                time, log.twist, log.wrench * [1.02, 0.0, 0.0] + [[0.01, 0.0, 0.0]] * np.sin(300.0 * time)[:, None], 4.0
+            )
+        ]
     options = FitOptions(nuisance=(), starts=1, refine=4, elasto_plastic=0.9)
     return identify_lugre(given, PATCH, model="reduced-published", parameters=("mu_c", "mu_s"), options=options)
 
@@ -166,6 +178,7 @@ def printed() -> dict[str, Any]:
         Path("model.toml").write_text(MODEL, encoding="utf-8")
         Path("scene.toml").write_text(SCENE, encoding="utf-8")
         Path("here.py").write_text(MEASURE, encoding="utf-8")
+        Path("many.csv").write_text(40 * (39 * "1," + "2\n"), encoding="utf-8")
         Path("pad.csv").write_text("1,2,1\n0,2,0\n", encoding="utf-8")
         log = noisy(clean_log(*excitation(duration=0.5)), 0)
         rows = np.column_stack([log.time, log.twist, log.wrench, np.broadcast_to(log.normal_force, len(log.time))])
@@ -174,7 +187,7 @@ def printed() -> dict[str, Any]:
             out, err = io.StringIO(), io.StringIO()
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
                 code = main(call.split())
-            found[call] = [code, *(LEFT_OUT.sub("", each.getvalue()) for each in (out, err))]
+            found[call] = [code, *(SPACED.sub(r"\1", LEFT_OUT.sub("", each.getvalue())) for each in (out, err))]
         for path in sorted(Path().rglob("*.csv")):
             found[path.as_posix()] = recorded.text(path.read_text(encoding="utf-8"))
     return found

@@ -107,7 +107,7 @@ class Bookkeeper:
         if record.status != FAILED:
             self._open[key] = record
             with contextlib.suppress(OSError):
-                failed.unlink(missing_ok=True)
+                failed.unlink()
         elif key:  # there is a scene
             try:
                 write_text(failed, failure(record.reason, scene))
