@@ -1,16 +1,17 @@
 """Patches, plans, estimates, scenes, frames, sweeps, the explorer's answers, and replies to bad input are as recorded.
 
-`tests/support/computed.py` and `tests/support/replies.py` compute them, `python -m tests.support.subjects NAME` records
-them again. Most follow closed forms that other tests check; these records see every other number and word.
+`tests/support/computed.py` and `tests/support/replies.py` compute them, `python -m tests.support.recording NAME`
+records them again. Most follow closed forms that other tests check; these records see every other number and word.
 """
 
 import pytest
 
-from tests.support import recorded, shown, subjects
+from tests.support import subjects
 
-NAMES = [name for name in subjects.OF_LIBRARY if name not in ("figures", "commands")]
+ELSEWHERE = "figures", "commands", "fits", "joints", "surfaces"
+"""Results of which a folder has a test of its own."""
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [name for name in subjects.SUBJECTS if name not in ELSEWHERE])
 def test_results_are_those_that_were_recorded(name):
-    recorded.check(shown.FOLDER / f"{name}.json", recorded.plain(subjects.OF_LIBRARY[name]()))
+    subjects.check(name, subjects.SUBJECTS[name]())

@@ -8,7 +8,7 @@ import pytest
 
 from planarfriction_studies.bench import BENCHMARKS
 from tests.support import recorded
-from tests.support.subjects import FOLDER, LONG, benchmark
+from tests.support.studied import FOLDER, LONG, benchmark
 
 
 def named(name: str):

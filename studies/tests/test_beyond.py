@@ -18,7 +18,7 @@ from planarfriction_studies.experiments.beyond import surfaces as beyond_surface
 from planarfriction_studies.experiments.beyond.tables import FAMILIES, draw_ladder
 from planarfriction_studies.experiments.in_hand.runs import Case
 from planarfriction_studies.experiments.runs import IN_WORDS
-from tests.support.subjects import SUBJECTS, check
+from tests.support.studied import SUBJECTS, check
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from planarfriction_studies.experiments import runs
 from planarfriction_studies.experiments.classics import run as classics
 from planarfriction_studies.experiments.classics import scenes
 from planarfriction_studies.experiments.experiment import Work
-from tests.support.subjects import check
+from tests.support.studied import check
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from planarfriction_studies.experiments import facts
 from planarfriction_studies.experiments.convergence import run as convergence
 from planarfriction_studies.experiments.convergence import runs
 from planarfriction_studies.experiments.experiment import Work
-from tests.support.subjects import check
+from tests.support.studied import check
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import pytest
 from planarfriction_studies.experiments import facts
 from planarfriction_studies.experiments.drift import run as drift
 from planarfriction_studies.experiments.experiment import Work, compare_curve
-from tests.support.subjects import check
+from tests.support.studied import check
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from planarfriction_studies.experiments.in_hand.runs import (
     with_friction,
 )
 from planarfriction_studies.experiments.runs import LAW, simulated
-from tests.support.subjects import check
+from tests.support.studied import check
 
 
 @pytest.fixture(scope="module")

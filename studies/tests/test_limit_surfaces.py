@@ -16,7 +16,7 @@ from planarfriction_studies.experiments.experiment import Work
 from planarfriction_studies.experiments.limit_surfaces import run as limit_surfaces
 from planarfriction_studies.experiments.limit_surfaces.patches import half_load_cell, linear_line, patch_comparisons
 from planarfriction_studies.experiments.runs import SIX_SHAPES
-from tests.support.subjects import check
+from tests.support.studied import check
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,7 @@ from planarfriction_studies.experiments.load_dependent.run import (
     soft_scene,
 )
 from planarfriction_studies.experiments.runs import simulated
-from tests.support.subjects import check
+from tests.support.studied import check
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import pytest
 
 from planarfriction_studies.experiments.experiment import compare
 from tests.support import recorded
-from tests.support.subjects import SUBJECTS, check
+from tests.support.studied import SUBJECTS, check
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction_studies.experiments import facts
 from planarfriction_studies.experiments.experiment import Work, compare_curve
 from planarfriction_studies.experiments.staircase import run as staircase
-from tests.support.subjects import check
+from tests.support.studied import check
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from planarfriction_studies.experiments.experiment import Work
 from planarfriction_studies.experiments.runs import published_model
 from planarfriction_studies.experiments.timing import run as timing
 from planarfriction_studies.experiments.timing import runs
-from tests.support.subjects import check
+from tests.support.studied import check
 
 
 @pytest.fixture(scope="module")

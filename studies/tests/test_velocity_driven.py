@@ -9,7 +9,7 @@ from planarfriction_studies.experiments import facts
 from planarfriction_studies.experiments.experiment import Work
 from planarfriction_studies.experiments.velocity_driven import boxes
 from planarfriction_studies.experiments.velocity_driven import run as velocity_driven
-from tests.support.subjects import check
+from tests.support.studied import check
 
 
 @pytest.fixture(scope="module")

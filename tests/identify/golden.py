@@ -1,4 +1,4 @@
-"""Numbers and texts of fits: `python -m tests.identify.golden` writes them again.
+"""Numbers and texts of fits.
 
 The values at which they are taken are fixed, without a search, so that rounding does not grow.
 """
@@ -6,7 +6,6 @@ The values at which they are taken are fixed, without a search, so that rounding
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -42,10 +41,7 @@ from tests.identify.test_motion import BODY, ellipsoid, slides
 from tests.identify.test_motion import LAW as SLIDING
 from tests.identify.test_motion import PATCH as STANDING
 from tests.support.identification_logs import LAW, PATCH, clean_log, excitation, noisy
-from tests.support.recorded import lines
-from tests.support.written import plain
 
-FILE = Path(__file__).with_name("golden.json")
 FINGER = pf.ContactPatch.disc(0.012, cells=9, pressure=pf.SoftFinger(c=0.006, n=0.3, k=2.5))
 WIDE = pf.LuGre(mu_c=0.52, mu_s=0.66, v_s=2.2e-3, gamma=1.5, sigma_0=1.9e4, sigma_1=25.0, sigma_2=0.7)
 
@@ -272,12 +268,3 @@ SOURCES: dict[str, Any] = {
     "slides": numbers_of_slides,
 }
 """What is computed, by name."""
-
-
-def main() -> None:
-    """Write all numbers and texts."""
-    FILE.write_text(lines({name: plain(of()) for name, of in SOURCES.items()}), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""Numbers and texts of joints' fits: `python -m tests.joints.golden` writes them again.
+"""Numbers and texts of joints' fits.
 
 The values at which they are taken are fixed, or a few steps of a search away.
 """
@@ -6,7 +6,6 @@ The values at which they are taken are fixed, or a few steps of a search away.
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,10 +15,7 @@ from planarfriction.joints.fit import attempt, improves, minimise, with_term
 from planarfriction.joints.problem import Problem, moving
 from planarfriction.joints.verdicts import judge
 from tests.joints.test_joint_fit import PENDULUM, SERVO, servo_logs, torque_log
-from tests.support.recorded import lines
-from tests.support.written import plain
 
-FILE = Path(__file__).with_name("golden.json")
 TERMS = ("load", "stribeck", "bristles", "directional")
 MORE = {"load": 0.1, "rise": 0.01, "v_s": 0.7, "sigma_0": 30.0, "sigma_1": 0.03, "load_external": 0.05}
 
@@ -141,12 +137,3 @@ SOURCES: dict[str, Any] = {
     "searches": numbers_of_searches, "friction": numbers_of_friction,
 }  # fmt: skip
 """What is computed, by name."""
-
-
-def main() -> None:
-    """Write all numbers and texts."""
-    FILE.write_text(lines({name: plain(of()) for name, of in SOURCES.items()}), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()

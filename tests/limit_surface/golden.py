@@ -1,8 +1,7 @@
-"""Numbers of limit surfaces and laws: `python -m tests.limit_surface.golden` writes them again."""
+"""Numbers of limit surfaces and laws."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,10 +10,7 @@ import planarfriction as pf
 from planarfriction.limit_surface.comparison import directions
 from tests.models.golden import GRAIN, LAWS, PATCHES, TIP
 from tests.support.rate_laws import BoucWen
-from tests.support.recorded import lines
-from tests.support.written import plain
 
-FILE = Path(__file__).with_name("golden.json")
 RING = pf.ContactPatch.ring(0.006, 0.01, cells=9)
 BOX = pf.ContactPatch.rectangle(0.02, 0.01, cells=7)
 SOFT = pf.ContactPatch.disc(0.012, cells=9, pressure=pf.SoftFinger(c=0.006, n=0.3, k=2.5))
@@ -72,12 +68,3 @@ SOURCES: dict[str, Any] = {
     "laws": numbers_of_laws,
 }
 """What is computed, by name."""
-
-
-def main() -> None:
-    """Write all numbers."""
-    FILE.write_text(lines({name: plain(of()) for name, of in SOURCES.items()}), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,14 +1,7 @@
 """Figures have the words, colours and data that were recorded."""
 
-import pytest
-
-from tests.support import recorded, shown
+from tests.support import shown, subjects
 
 
-@pytest.fixture(scope="module")
-def figures():
-    return shown.figures()
-
-
-def test_figures_are_those_that_were_recorded(figures):
-    recorded.check(shown.FOLDER / "figures.json", recorded.plain(figures))
+def test_figures_are_those_that_were_recorded():
+    subjects.check("figures", shown.figures())

@@ -1,4 +1,4 @@
-"""Results of patches, plans, the observer and scenes, to be recorded: see `tests.support.subjects`."""
+"""Results of patches, plans, the observer and scenes, to be recorded: see `tests.support.recording`."""
 
 from __future__ import annotations
 

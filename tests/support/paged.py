@@ -1,4 +1,4 @@
-"""What stands on the explorer's page after each of some wishes, to be recorded: see `tests.support.subjects`."""
+"""What stands on the explorer's page after each of some wishes, to be recorded: see `tests.support.recording`."""
 
 from __future__ import annotations
 

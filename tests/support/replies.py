@@ -1,4 +1,4 @@
-"""Replies to good and bad input, files, sweeps and the explorer, to be recorded: see `tests.support.subjects`."""
+"""Replies to good and bad input, files, sweeps and the explorer, to be recorded: see `tests.support.recording`."""
 
 from __future__ import annotations
 

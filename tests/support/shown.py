@@ -1,4 +1,4 @@
-"""Figures and printed texts of the library, to be recorded: `python -m tests.support.subjects figures commands`."""
+"""Figures and printed texts of the library, to be recorded: `python -m tests.support.recording figures commands`."""
 
 from __future__ import annotations
 
@@ -25,8 +25,6 @@ from tests.joints import golden as joint_records
 from tests.joints.test_joint_fit import PENDULUM, SERVO, servo_logs, torque_log
 from tests.support import recorded, synthetic
 from tests.support.identification_logs import PATCH, clean_log, excitation, noisy
-
-FOLDER = Path(__file__).parents[1] / "recorded"
 
 UNSURE = "compil|wall time|faster than real time|steps|^delay|^bias|^zero_drift|^load_|^noise_"
 LEFT_OUT = re.compile(f"^.*(?:{UNSURE}).*\n", re.MULTILINE)
