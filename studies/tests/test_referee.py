@@ -47,14 +47,12 @@ def test_stated_values(name):
     assert abs(truths.value(truth.source, truth.given) - truth.value) <= truth.error
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, truth in TRUTHS.items() if truth.source in MOTIONS])
 def test_stated_motions(name):
     truth = TRUTHS[name]
     assert abs(truths.value(truth.source, truth.given) - truth.value) <= truth.error
 
 
-@pytest.mark.slow
 def test_a_disc_is_a_patch():
     """The general motion against the disc's closed form: both have errors of 1e-9."""
     a = TRUTHS["disc x 10 rad/s"].given

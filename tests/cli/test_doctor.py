@@ -69,6 +69,11 @@ def test_a_package_that_is_missing_or_too_old_is_said(quick, monkeypatch, capsys
     assert words in lines(capsys)["extra some"]
 
 
+def test_a_release_candidate_is_a_version_as_others(monkeypatch):
+    monkeypatch.setattr(doctor.metadata, "version", lambda name: "3.1rc1")
+    assert doctor.state_of(Requirement("numpy>=3")) == ("numpy 3.1rc1", True)
+
+
 def test_packages_are_those_that_an_installation_names():
     named = {extra: [each.name for each in those] for extra, those in doctor.requirements()}
     assert "numpy" in named[""] and "torch" not in named[""]
