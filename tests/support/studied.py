@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import itertools
 import tempfile
@@ -16,7 +17,7 @@ import numpy as np
 
 from planarfriction_studies import experiments
 from planarfriction_studies.experiments.experiment import Work
-from tests.support import recorded
+from tests.support import recorded, shown
 
 FOLDER = Path(__file__).parents[2] / "studies" / "tests" / "recorded"
 
@@ -154,6 +155,39 @@ def _log(log: Any) -> list[Any]:
 
 def _joint(module: Any, logs: Any) -> Callable[[int], Any]:
     return lambda seed: module.synthetic_joint(seed, logs[:2])
+
+
+# ---------------------------------------------------------------------- commands
+
+COMMANDS = (
+    "reproduce --list", "referee --list --engine MuJoCo", "measured --seed -1",
+    "measured --task onsets --only none", "measured --own nothing.py:f", "measured --own own.py:predict --task pushes",
+    "measured --own own.py:held --task pushes", "measured --task pushes --only ellipsoid --out found",
+    "measured --task pushes --only uncoupled --json", "reproduce --quick --full", "reproduce --only nothing",
+    "bench --only nothing", "bench --only in_hand.reduced --rounds 0", "bench --compare nothing.json",
+    "bench --compare own.py --force", "bench --only in_hand.reduced", "online trials --parts 1",
+    "online trials --parts 4 --json trials.json", "online demo --out a.txt", "online demo --seed -1", "online demo",
+    "referee --case none", "referee --case stop --step 0",
+    "referee --case stop --engine MuJoCo --step 0.002 --json judged.json --out judged",
+    "simulators --case stop --engine MuJoCo --json judged.json", "referee export cases",
+)  # fmt: skip
+
+
+def commands() -> dict[str, Any]:
+    """Call the commands of the studies in an empty folder, with results of trials that are made up."""
+    from planarfriction_studies.commands.online import WORDS
+    from planarfriction_studies.rig import demo, trials
+
+    own = "def predict(question):\n    return [0.0, 0.0, 0.0]\ndef held(question):\n    return question.wrenches\n"
+    made = {name: 0.123 * i for i, name in enumerate(WORDS)}
+    hold = demo.record_hold
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), ExitStack() as stack:
+        Path("own.py").write_text(own, encoding="utf-8")
+        told = lambda parts, seed, progress: {"parts": parts, "seed": seed} | made  # noqa: E731
+        stack.enter_context(changed(trials, run_trials=told))
+        stack.enter_context(changed(demo, record_hold=lambda seed: hold(seed, 100)))
+        found = shown.called(COMMANDS)
+        return found | {path.name: recorded.text(path.read_text(encoding="utf-8")) for path in Path().rglob("*.json")}
 
 
 # ---------------------------------------------------------------------- benchmarks
@@ -324,6 +358,6 @@ SUBJECTS: dict[str, Callable[[], Any]] = {
     "replayed": replayed,
     "rig": rig,
     "referee": referee,
-    **({"mujoco": mujoco} if importlib.util.find_spec("mujoco") else {}),
+    **({"mujoco": mujoco, "called": commands} if importlib.util.find_spec("mujoco") else {}),
 }
 """Name of a file -> function that computes what it holds."""
