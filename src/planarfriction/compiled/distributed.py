@@ -39,7 +39,7 @@ class CompiledDistributed(CompiledModel):
         if self.reference > 0.0:
             from planarfriction.kernels import fixed_stiffness
 
-            self._contact = fixed_stiffness.rates_of(self.size, patch.anisotropic, patch.asymmetric)
+            self._contact = fixed_stiffness.fixed_rates_of(self.size, patch.anisotropic, patch.asymmetric)
         cells = len(patch.positions)
         super().__init__(functions, (self.size, cells), (self.size, self.size, cells))
 

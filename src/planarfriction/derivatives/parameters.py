@@ -72,9 +72,7 @@ PUBLISHED = Family(
 @functools.cache
 def _cells(size: int, turned: bool, leans: bool) -> Family:
     """Return the rollouts of `DistributedModel` of points, size 2, or of discs, 3 (see `cell_passes.KINDS`)."""
-    loops, sensitivities = rollouts_of_cells(size, turned, leans)
-    names, columns = cells_rollout.PARAMETERS, np.array(cells_rollout.COLUMNS)
-    return Family(names, columns, loops.rollout, loops.gradient, sensitivities, loops.tangent, loops.shares)
+    return Family(cells_rollout.PARAMETERS, np.array(cells_rollout.COLUMNS), *rollouts_of_cells(size, turned, leans))
 
 
 class Packed(NamedTuple):

@@ -51,7 +51,7 @@ from planarfriction.kernels.sdirk import (
     variation_of,
 )
 from planarfriction.kernels.small_matrices import applied
-from planarfriction.kernels.step_control import judged, length
+from planarfriction.kernels.step_control import fitted, judged
 from planarfriction.kernels.tangent import MOST, Drives, partial_of, wrench_by_input
 from planarfriction.kernels.vectors import Vector, applied_back, dot, plus, put, three, times
 
@@ -207,7 +207,8 @@ def propagate_back(
     while since > until:
         k = node_before(path, k, first, since)
         local, remaining = path.since[k + 1] - path.since[k], since - until
-        h = length(w.pace[0], local, since - path.since[xp.maximum(k + 1 - MOST, first)], remaining)
+        reach = since - path.since[xp.maximum(k + 1 - MOST, first)]
+        h = fitted(xp.minimum(w.pace[0] * local, reach), remaining)
         _step(address, path, k, first, since, h, d, drives, w)
         taken += 1
         of_gains = _error_of_gains(moments.shape[0], h, known, rtol, w)

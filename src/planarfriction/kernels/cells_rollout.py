@@ -374,18 +374,6 @@ def tangent(
 # ---------------------------------------------------------------------- bound to kinds of cells
 
 
-class CellRollouts(NamedTuple):
-    """Entry points of a kind of cells."""
-
-    rollout: Any
-    gradient: Any
-    tangent: Any
-    shares: Any
-
-
-def bound(kind: Kind, name: str) -> CellRollouts:
+def bound(kind: Kind, name: str) -> list:
     """Return the entry points of a kind of cells."""
-    return CellRollouts(*(bind(each, f"{name}_{each.__name__}", jit, kind=kind) for each in TEMPLATES))
-
-
-TEMPLATES = rollout, gradient, tangent, shares
+    return [bind(each, f"{name}_{each.__name__}", jit, kind=kind) for each in (rollout, gradient, tangent, shares)]

@@ -199,11 +199,11 @@ class Walk:
         target = self.emit(f"({', '.join(items)},)")
         pulls = {i: f"{{b}}[{i}]" for i in range(len(items))}
         pushes = {i: "(" + ", ".join("{d}" if i == j else "0.0" for j in range(len(items))) + ",)" for i in pulls}
-        return self._taken([target], items, Rule("v", {}, pulls, {}, pushes))[0]
+        return self._taken([target], items, Rule("v", {}, pulls, pushes))[0]
 
     def _item(self, vector: str, i: int) -> str:
         target = self.emit(f"{vector}[{i}]")
-        how = Rule("s", {}, {0: f"placed({{0}}, {i}, {{b}})"}, {}, {0: f"{{d}}[{i}]"})
+        how = Rule("s", {}, {0: f"placed({{0}}, {i}, {{b}})"}, {0: f"{{d}}[{i}]"})
         return self._taken([target], [vector], how)[0]
 
     def _taken(self, targets: list[str], atoms: list[str], how: Rule | Derivative) -> list[str]:

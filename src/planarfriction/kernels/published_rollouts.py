@@ -17,10 +17,10 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.law import LAW, law_of
-from planarfriction.kernels.moment_steps import Contact
 from planarfriction.kernels.published_contact import PublishedPatch
 from planarfriction.kernels.published_step import (
     NAMES,
+    Contact,
     HeldTwist,
     PublishedStep,
     hold_slopes,

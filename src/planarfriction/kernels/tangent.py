@@ -51,7 +51,7 @@ from planarfriction.kernels.sdirk import (
     variation_of,
 )
 from planarfriction.kernels.small_matrices import applied
-from planarfriction.kernels.step_control import judged, length
+from planarfriction.kernels.step_control import fitted, judged
 from planarfriction.kernels.vectors import Vector, applied_back, plus, put, three, times
 
 FRICTION, SIZE, MASS, INERTIA, LOAD = 0, 1, 2, 3, 4
@@ -222,7 +222,8 @@ def propagate(
     while since < until:
         k = node_after(path, k, last, since)
         local, remaining = path.since[k + 1] - path.since[k], until - since
-        h = length(w.pace[0], local, path.since[xp.minimum(k + MOST, last)] - since, remaining)
+        reach = path.since[xp.minimum(k + MOST, last)] - since
+        h = fitted(xp.minimum(w.pace[0] * local, reach), remaining)
         _step(address, path, k, last, since, h, slope, drives, w)
         taken += 1
         error, known = 0.0, 1.0 if since > 0.0 else 0.0
