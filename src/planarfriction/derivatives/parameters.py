@@ -21,20 +21,7 @@ from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModelPublished
 from planarfriction.models.reduced_published import PublishedShape, axes_of
 
-PARAMETERS = (
-    "sigma_0",
-    "sigma_1",
-    "sigma_2",
-    "mu_c",
-    "mu_s",
-    "v_s",
-    "gamma",
-    "breakaway_ratio",
-    "contact_radius",
-    "second_moment",
-    "centre_x",
-    "centre_y",
-)
+PARAMETERS = *cells_rollout.PARAMETERS, "contact_radius", "second_moment", "centre_x", "centre_y"
 """Parameters of `ReducedModelPublished`, in the order of their vector; units as in `LuGre`, [m], [m^2], [m], [m]."""
 
 POSITIVE = ("sigma_0", "mu_c", "mu_s", "v_s", "gamma", "contact_radius")
@@ -58,14 +45,8 @@ class Family(NamedTuple):
     """Derivatives by the weights of cells (see `kernels.cells_rollout`)."""
 
 
-PUBLISHED = Family(
-    PARAMETERS,
-    np.array([published_step.NAMES.index(name) for name in PARAMETERS]),
-    rollout,
-    gradient,
-    sensitivities,
-    tangent,
-)
+_COLUMNS = np.array([published_step.NAMES.index(name) for name in PARAMETERS])
+PUBLISHED = Family(PARAMETERS, _COLUMNS, rollout, gradient, sensitivities, tangent)
 """`ReducedModelPublished`."""
 
 

@@ -19,7 +19,7 @@ from planarfriction.kernels.cells import CellsContact
 from planarfriction.kernels.contacts import ModelFunctions, functions_of
 from planarfriction.kernels.passes import Passes
 from planarfriction.kernels.steps import StepFunctions, step_functions
-from planarfriction.kernels.vectors import Vector, copy, plus, put, three
+from planarfriction.kernels.vectors import Vector, clear, copy, plus, put, three
 
 RESULTS = LANES * 2 * DISC.size**2
 """Numbers of the results of a block of cells: derivatives, or rates or bristles, row by row."""
@@ -46,8 +46,7 @@ def _filled(numbers: int, size: int) -> Any:
     def filled(contact: CellsContact, z: Doubles, first: int, lanes: int, out: Doubles, block: Doubles) -> Any:
         n, count = contact.count, min(lanes, contact.count - first)
         for m in range(numbers + size + 1):
-            for i in range(count, lanes):
-                block[RESULTS + m * LANES + i] = 0.0
+            clear(at(block, RESULTS + m * LANES + count), lanes - count)
         for m in range(numbers):
             copy(at(contact.cells, m * n + first), at(block, RESULTS + m * LANES), count)
         for m in range(size):

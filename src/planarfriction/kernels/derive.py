@@ -333,8 +333,7 @@ class _WayBack:
         tape, name = self.walk.keep_tape(step, inner)
         pulled = self.emit(f"{name}({tape}, ({''.join(bar + ', ' for bar in bars if bar)}))", "bars")
         for i, path in enumerate(inner.by):
-            head, dot, rest = path.partition(".")
-            self._add(step.atoms[inner.arguments.index(head)] + dot + rest, f"{pulled}[{i}]")
+            self._add(inner.place(step, path), f"{pulled}[{i}]")
 
 
 class Derivative(NamedTuple):
@@ -353,6 +352,11 @@ class Derivative(NamedTuple):
     """Return the results and a tape, from the arguments of the function."""
     back: Any
     """Return the cotangents of `by`, from the tape and a tuple of the cotangents of the `live` results."""
+
+    def place(self, step: Step, path: str) -> str:
+        """Return the name of an argument, or of a field of one, that a step gives to this function."""
+        head, dot, rest = path.partition(".")
+        return step.atoms[self.arguments.index(head)] + dot + rest
 
 
 @functools.cache

@@ -19,7 +19,7 @@ from planarfriction.compiler.memory import Doubles, Place, at, reader
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import bristle_step, published_contact
 from planarfriction.kernels.derive import derive
-from planarfriction.kernels.law import grip
+from planarfriction.kernels.law import PARAMETERS, grip
 from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, per_h, through
 from planarfriction.kernels.steps import step_functions
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
@@ -120,15 +120,7 @@ def _step(
     return after, wrench
 
 
-_BY_LAW = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
-_BY = (
-    "z",
-    "u",
-    "twist",
-    "omega",
-    *(f"law.{name}" for name in _BY_LAW),
-    *(f"shape.{name}" for name in PublishedPatch._fields),
-)
+_BY = "z", "u", "twist", "omega", *(f"law.{n}" for n in PARAMETERS), *(f"shape.{n}" for n in PublishedPatch._fields)
 DERIVATIVE = derive(_step, _BY, ("z", "u", "twist"))
 _forth, _back = DERIVATIVE.forth, DERIVATIVE.back
 

@@ -22,7 +22,7 @@ import numpy as np
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.memory import Doubles
-from planarfriction.kernels.vectors import Vector
+from planarfriction.kernels.vectors import Vector, clear
 
 BILINEAR, POTENTIAL, ELLIPSOID, CELLS = 0, 1, 2, 3
 
@@ -83,12 +83,8 @@ def _bilinear(data: Doubles, start: int, size: int, x: float, y: float, s: float
     i, j, a, b, _, _ = place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
-    hx, hy, hs = (
-        _corners(data, p, row, a, b)[0],
-        _corners(data, p + 1, row, a, b)[0],
-        _corners(data, p + 2, row, a, b)[0],
-    )
-    return hx * speed, hy * speed, hs * speed
+    hx, hy, hs = _corners(data, p, row, a, b), _corners(data, p + 1, row, a, b), _corners(data, p + 2, row, a, b)
+    return hx[0] * speed, hy[0] * speed, hs[0] * speed
 
 
 @kernel
@@ -244,8 +240,7 @@ def _cells_jacobian(
     data: Doubles, start: int, size: int, x: float, y: float, s: float, speed: float, out: Doubles
 ) -> None:
     radial = (x / speed, y / speed, s / speed)
-    for i in range(9):
-        out[i] = 0.0
+    clear(out, 9)
     for m in range(size):
         px, py, w = data[start + m], data[start + size + m], data[start + 2 * size + m]
         ux, uy = x - s * py, y + s * px
