@@ -19,7 +19,7 @@ from planarfriction.kernels.law import LAW
 from planarfriction.kernels.published_rollouts import gradient, rollout, sensitivities, tangent
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModelPublished
-from planarfriction.models.reduced_published import PublishedShape, axes_of
+from planarfriction.models.reduced_published import axes_of
 
 PARAMETERS = *cells_rollout.PARAMETERS, "contact_radius", "second_moment", "centre_x", "centre_y"
 """Parameters of `ReducedModelPublished`, in the order of their vector; units as in `LuGre`, [m], [m^2], [m], [m]."""
@@ -153,13 +153,8 @@ def _packed(model: Any) -> Packed:
         at_loads = model.compiled.at_loads
         shapes = at_loads if model.depends_on_load else at_loads(np.ones(1), False)
         return Packed(family, np.array(law), shapes, inner=model.state_shape, reference=model.compiled.reference)
-    return pack_shape(law, model.shape_at(1.0))
-
-
-def pack_shape(law: LawNumbers, shape: PublishedShape) -> Packed:
-    """Return a law and the shape of a `ReducedModelPublished`."""
-    surface = shape.surface.numbers
-    axes = None if (shape.root == np.eye(2)).all() else shape.axes
+    shape = model.shape_at(1.0)
+    surface, axes = shape.surface.numbers, None if (shape.root == np.eye(2)).all() else shape.axes
     return _on_surface(np.array([*law, *shape.numbers]), surface.kind, surface.size, surface.data, axes)
 
 

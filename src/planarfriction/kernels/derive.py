@@ -55,7 +55,10 @@ class Walk:
         self.steps: list[Step] = []
         self.results: list[str] = []
         self.count = 0
-        definition = self._definition()
+        try:
+            definition = definition_of(self.function)
+        except OSError as error:
+            raise NotStraightError(f"{self.where}: there is no source to write derivatives from") from error
         self.arguments = [each.arg for each in definition.args.args]
         self.first = {name: self._new(name) for name in self.arguments}
         self.known = dict(self.first)
@@ -65,12 +68,6 @@ class Walk:
             self._statement(statement)
         if not self.results:
             raise self._refusal(definition, "has no return")
-
-    def _definition(self) -> ast.FunctionDef:
-        try:
-            return definition_of(self.function)
-        except OSError as error:
-            raise NotStraightError(f"{self.where}: there is no source to write derivatives from") from error
 
     def _refusal(self, node: ast.AST, why: str) -> NotStraightError:
         text = ast.unparse(node).splitlines()[0]
@@ -187,13 +184,10 @@ class Walk:
         if self.vectors.intersection(atoms):
             raise self._refusal(node, "is of vectors: use `plus`, `times`, `dot`")
         if isinstance(node.op, ast.Div) and atoms[1] in self.active:
-            return self._quotient(*atoms)
+            atoms.append(self.emit(f"1.0 / {atoms[1]}"))
+            return self._taken([self.emit(f"{atoms[0]} * {atoms[2]}")], atoms, QUOTIENT)[0]
         target = self.emit(text.format(*atoms))
         return self._taken([target], atoms, RULES[type(node.op)])[0]
-
-    def _quotient(self, above: str, below: str) -> str:
-        inverse = self.emit(f"1.0 / {below}")
-        return self._taken([self.emit(f"{above} * {inverse}")], [above, below, inverse], QUOTIENT)[0]
 
     def _vector(self, items: list[str]) -> str:
         target = self.emit(f"({', '.join(items)},)")

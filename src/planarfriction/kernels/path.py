@@ -48,11 +48,6 @@ class Tolerances(NamedTuple):
     """[n]"""
 
 
-def path_for(most: int, n: int) -> Path:
-    """Return memory for the ends of steps (made outside compiled code)."""
-    return Path(np.zeros(most, np.int64), np.zeros(most), np.zeros((most, n)), np.zeros((most, n)))
-
-
 @jit
 def follow(run: Place, path: Path) -> tuple[int, int]:
     """Go on with the run at an address until it ends or `path` is full; return its number of nodes and the outcome."""
