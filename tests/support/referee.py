@@ -65,7 +65,11 @@ def exact(function: Any, exchanged: dict[Any, Callable] | None = None) -> Callab
 
 def _exact(function: Any, known: dict[int, Any]) -> Callable:
     plain, names = getattr(function, "py_func", function), {}
-    known[id(function)] = found = types.FunctionType(plain.__code__, names, plain.__name__)
+    cells = [types.CellType() for _ in plain.__closure__ or ()]
+    known[id(function)] = found = types.FunctionType(plain.__code__, names, plain.__name__, None, tuple(cells))
+    outer = {name: each.cell_contents for name, each in zip(plain.__code__.co_freevars, plain.__closure__ or ())}
+    for cell, value in zip(cells, _exchanged(outer, outer.keys(), known).values(), strict=True):
+        cell.cell_contents = value
     used = set(plain.__code__.co_names)
     names.update(_exchanged(plain.__globals__, used, known))
     for name, value in names.items():

@@ -238,7 +238,7 @@ def forget(address: Place, piece: int, slope: np.ndarray) -> None:
     """Clear the slopes [P, n] of contacts without load on a piece, at its end."""
     system = read(address)
     for p in range(slope.shape[0]):
-        forget_unloaded(system, piece, pointer(slope[p]))
+        forget_unloaded(system, piece, at(pointer(slope), p * slope.shape[1]))
 
 
 @jit
@@ -248,7 +248,7 @@ def settle(address: Place, piece: int, slope: np.ndarray) -> None:
     for c in range(system.size):
         if hardly_loaded(system, piece, c):
             for p in range(slope.shape[0]):
-                clear(at(pointer(slope[p]), state[c]), state[c + 1] - state[c])
+                clear(at(pointer(slope), p * slope.shape[1] + state[c]), state[c + 1] - state[c])
 
 
 @jit
