@@ -67,9 +67,10 @@ def _exact(function: Any, known: dict[int, Any]) -> Callable:
     plain, names = getattr(function, "py_func", function), {}
     cells = [types.CellType() for _ in plain.__closure__ or ()]
     known[id(function)] = found = types.FunctionType(plain.__code__, names, plain.__name__, None, tuple(cells))
-    outer = {name: each.cell_contents for name, each in zip(plain.__code__.co_freevars, plain.__closure__ or ())}
-    for cell, value in zip(cells, _exchanged(outer, outer.keys(), known).values(), strict=True):
-        cell.cell_contents = value
+    outer = dict(zip(plain.__code__.co_freevars, (each.cell_contents for each in plain.__closure__ or ()), strict=True))
+    exchanged = _exchanged(outer, set(outer), known)
+    for name, cell in zip(outer, cells, strict=True):
+        cell.cell_contents = exchanged[name]
     used = set(plain.__code__.co_names)
     names.update(_exchanged(plain.__globals__, used, known))
     for name, value in names.items():
