@@ -21,8 +21,8 @@ from planarfriction.kernels.passes import Passes
 from planarfriction.kernels.steps import StepFunctions, step_functions
 from planarfriction.kernels.vectors import Vector, clear, copy, plus, put, three
 
-RESULTS = LANES * 2 * DISC.size**2
-"""Numbers of the results of a block of cells: derivatives, or rates or bristles, row by row."""
+RESULTS = LANES * 4 * DISC.size**2
+"""Numbers of the results of a block of cells: derivatives of rates and tractions, or rates or bristles, row by row."""
 
 BLOCK = RESULTS + LANES * 12
 """Numbers of a block of cells: results, and copies of up to eight numbers, of the bristle and of the weight."""

@@ -50,16 +50,19 @@ def _leaning(plain: Any, speed: Any, scaled: Any) -> tuple:
 
     @kernel
     def within(lean: Leaning, z: Vector) -> Vector:
+        """Compute `settle.within` of a bristle."""
         return plus(settle.within(lean.law, out(lean, z)), 1.0, middle(lean))
 
     @kernel
     def evaluate(lean: Leaning, z: Vector, u: Vector) -> tuple[Vector, Vector]:
+        """Compute z' and the traction of a bristle that moves at u."""
         c = centre(lean, u)
         rate, pull = rate_of(lean.law, plus(z, -1.0, c), u)
         return rate, plus(pull, -lean.law.sigma_0, c)
 
     @kernel
     def step(lean: Leaning, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
+        """Compute the bristle after dt and its traction."""
         c = centre(lean, u)
         new, pull = step_of(lean.law, plus(z, -1.0, c), u, dt)
         return plus(new, 1.0, c), plus(pull, -lean.law.sigma_0, c)
