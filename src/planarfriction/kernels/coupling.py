@@ -88,9 +88,10 @@ def _load_slopes(patches: Patches, p: Problem) -> None:
     """Write the slopes of the wrenches by the loads; where stiffness is fixed, by a step under another load."""
     for k in range(patches.count):
         one, load = 3 * k, p.load[k]
-        copy(at(p.unit, one), at(p.unit_loaded, one), 3)
+        for i in range(3):
+            p.unit_loaded[one + i] = p.unit[one + i]
         if patches.reference[k] > 0.0 and p.acting[k] != 0 and load > 0.0:
-            copy(at(p.twist, one), p.seen, 3)
+            p.seen[0], p.seen[1], p.seen[2] = p.twist[one], p.twist[one + 1], p.twist[one + 2]
             _step(patches, p, patches.steps, k, (1.0 + LOAD_STEP) * load)
             for i in range(3):
                 p.unit_loaded[one + i] += (p.step[i] - p.unit[one + i]) / LOAD_STEP
@@ -111,8 +112,10 @@ def step_all(patches: Patches, p: Problem, functions: Integers) -> None:
             _step(patches, p, functions, k, p.load[k])
             if dx != 0.0 or dy != 0.0:
                 _bring_back(p.step, dx, dy)
-        copy(p.step, at(p.unit, 3 * k), 3)
-        copy(at(p.step, 3), at(p.unit_slopes, 9 * k), 9)
+        for i in range(3):
+            p.unit[3 * k + i] = p.step[i]
+        for i in range(9):
+            p.unit_slopes[9 * k + i] = p.step[3 + i]
 
 
 @kernel
@@ -377,7 +380,8 @@ def solve(patches_at: Place, problem_at: Place) -> None:
         p.wrench[i] = p.load[i // 3] * p.unit[i]
     for k in range(patches.count):
         if p.load[k] == 0.0:  # without load there is no memory
-            clear(at(p.new, patches.firsts[k]), patches.firsts[k + 1] - patches.firsts[k])
+            for i in range(patches.firsts[k], patches.firsts[k + 1]):
+                p.new[i] = 0.0
     if lost and best > tolerance:
         _restrain(patches, p)
     p.residual[0], p.converged[0] = best, 1.0 if best <= tolerance else 0.0
