@@ -334,7 +334,10 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
     radius = np.array([lever_of(model) for model in models])
     references = np.array([model.law.reference_load or 0.0 for model in models], float)
     bristles = np.array([model.state_shape[0] for model in models], np.int64)
-    followers, firsts = _followers(models), bounds.astype(np.int64)
+    places, words = zip(*(model.compiled.points() for model in models), strict=True)
+    x, y = (np.ascontiguousarray(each) for each in np.concatenate(places).T)
+    followers = Followers(x, y, np.cumsum([0, *map(len, places)]), np.array(words, np.int64))
+    firsts = bounds.astype(np.int64)
     rows = layout(len(models), int(bounds[-1]), len(followers.x), int(followers.words.sum()))
     patches = Patches(
         count=len(models),
@@ -352,14 +355,6 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
     kept = [steps, slopes, firsts, radius, references, bristles, *followers, *known.values()]
     counts = np.diff(followers.firsts)
     return _PackedPatches(row_of(patches), rows.slices, rows.size, records, following, counts, sizes, kept)
-
-
-def _followers(models: Sequence[FrictionModel]) -> Followers:
-    """Return the points of the patches."""
-    places, words = zip(*(model.compiled.points() for model in models), strict=True)
-    x, y = (np.ascontiguousarray(each) for each in np.concatenate(places).T)
-    firsts = np.cumsum([0, *map(len, places)])
-    return Followers(x, y, firsts, np.array(words, np.int64))
 
 
 def follows(model: FrictionModel) -> bool:

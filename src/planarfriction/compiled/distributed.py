@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from planarfriction.compiled import packed
-from planarfriction.compiled.base import CompiledModel, driven
-from planarfriction.compiled.packed import PackedModel
-from planarfriction.compiled.rates import linearised
+from planarfriction.compiled.base import CompiledModel
+from planarfriction.compiled.packed import PackedModel, driven, linearised
 from planarfriction.compiled.shapes_by_load import ShapesByLoad, cells_by_load
 from planarfriction.compiler.memory import places_of, rows_of, size_of
 from planarfriction.kernels.cell_steps import functions_of_cells
@@ -39,7 +38,7 @@ class CompiledDistributed(CompiledModel):
         if self.reference > 0.0:
             from planarfriction.kernels import fixed_stiffness
 
-            self._contact = fixed_stiffness.rates_of(self.size, patch.anisotropic, patch.asymmetric)
+            self._contact = fixed_stiffness.fixed_rates_of(self.size, patch.anisotropic, patch.asymmetric)
         cells = len(patch.positions)
         super().__init__(functions, (self.size, cells), (self.size, self.size, cells))
 
@@ -128,23 +127,14 @@ class CompiledDistributed(CompiledModel):
         chosen = np.ones(weights.shape[1], bool) if chosen is None else chosen
         weights, positions = np.ascontiguousarray(weights), self.patch.positions[chosen]
         count, numbers = len(positions), self.numbers(chosen)
-        record, rows = self.record(numbers, weights)
+        (record, per_cell), states = self.record(numbers, weights), self.size * count
+        distances = np.hypot(*(positions - positions.mean(axis=0)).T)
+        radius = float(np.hypot(distances, KAPPA * self.patch.lever_radii[chosen]).mean())
+        rows, scale = rows_of(record, len(weights), weights=places_of(weights)), self.law.largest_deflection
         return PackedModel(
-            self._contact,
-            rows_of(record, len(weights), weights=places_of(weights)),
-            self.size * count,
-            rows * count,
-            np.full(self.size * count, self.law.largest_deflection),
-            float(
-                np.hypot(
-                    np.hypot(*(positions - positions.mean(axis=0)).T), KAPPA * self.patch.lever_radii[chosen]
-                ).mean()
-            ),
-            (weights, numbers),
-            chosen,
-            reference=self.reference,
-            bristle=self.size,
-        )
+            self._contact, rows, states, per_cell * count, np.full(states, scale), radius, (weights, numbers), chosen,
+            reference=self.reference, bristle=self.size,
+        )  # fmt: skip
 
     def numbers(self, chosen: Any = slice(None)) -> np.ndarray:
         """Return the numbers of the chosen cells, or of all, as their levers read them, `[numbers, n]`.

@@ -32,40 +32,23 @@ def under_edge(compiled: CompiledDistributed, packed: PackedModel, outline: np.n
     if area == 0.0:
         raise InvalidValueError("outline", "enclose an area where a contact has an edge", "none")
     corners = np.ascontiguousarray(outline if area > 0.0 else outline[::-1])
-    held, trial = ((np.zeros(len(x)), np.zeros_like(cells)) for _ in range(2))
-    held_row, trial_row = (row_of(compiled.record(numbers, share)[0]) for share, numbers in (held, trial))
-    rate, by_place, wrench = np.zeros(packed.states), np.zeros((3, packed.states)), np.zeros(3)
-    calls = calls_of(packed.functions)
-    record = EdgeContact(
-        count=len(x),
-        numbers=len(cells),
-        turned=patch.anisotropic,
-        discs=compiled.size == 3,
-        x=x,
-        y=y,
-        radii=radii,
-        middle=middle,
-        outline=corners,
-        corners=len(corners),
-        weights=weights,
-        cells=cells,
-        whole=place_of(packed.records),
-        held=place_of(held_row),
-        held_weights=held[0],
-        held_cells=held[1],
-        trial=place_of(trial_row),
-        trial_weights=trial[0],
-        trial_cells=trial[1],
-        calls=calls,
-        states=packed.states,
-        rate=rate,
-        by_place=by_place,
-        wrench=wrench,
+    shapes = {"rate": packed.states, "by_place": (3, packed.states), "wrench": 3}
+    for name in ("held", "trial"):
+        shapes |= {f"{name}_weights": len(x), f"{name}_cells": cells.shape}
+    room = {name: np.zeros(shape) for name, shape in shapes.items()}
+    held, trial = (
+        row_of(compiled.record(room[f"{name}_cells"], room[f"{name}_weights"])[0]) for name in ("held", "trial")
     )
-    rows, room = (packed.records, held_row, trial_row), (*held, *trial, rate, by_place, wrench)
+    arrays = {"x": x, "y": y, "radii": radii, "middle": middle, "outline": corners, "weights": weights, "cells": cells}
+    arrays |= {"calls": calls_of(packed.functions), **room}
+    record = EdgeContact(
+        **arrays, count=len(x), numbers=len(cells), turned=patch.anisotropic, discs=compiled.size == 3,
+        corners=len(corners), whole=place_of(packed.records), held=place_of(held), trial=place_of(trial),
+        states=packed.states,
+    )  # fmt: skip
     return packed._replace(
         functions=FUNCTIONS,
         records=rows_of(record, len(weights), weights=places_of(weights), whole=places_of(packed.records)),
         workspace=OWN + packed.workspace,
-        keepalive=(*packed.keepalive, x, y, radii, middle, corners, calls, *rows, *room),
+        keepalive=(*packed.keepalive, packed.records, held, trial, *arrays.values()),
     )

@@ -1,4 +1,4 @@
-"""Models at some loads, as the solver, steps and `coupling` read them."""
+"""Models at some loads, as the solver, steps and `coupling` read them, and their rates for batches."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy as np
 from planarfriction.compiler.calls import address_of
 from planarfriction.compiler.memory import place_of, row_of
 from planarfriction.equality import by_parts
+from planarfriction.formulas import LIGHTEST
+from planarfriction.kernels import batched_rates
 from planarfriction.kernels.steps import Stepped
 
 MAX_PACK_BYTES = 64e6
@@ -60,3 +62,30 @@ class PackedModel(NamedTuple):
         address = address_of(function)
         fields = address, self.states, square, loads, place_of(self.records), words
         return row_of(Stepped(*fields, self.reference, self.bristle))
+
+
+def driven(contact: PackedModel, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """Return twists as rates read them: of a fixed stiffness with the factor on `sigma_0` behind, `[B, 4]`."""
+    if contact.reference == 0.0:
+        return twist
+    factor = contact.reference / np.maximum(load, LIGHTEST * contact.reference)
+    return np.concatenate([twist, factor[:, None]], axis=1)
+
+
+def rates(packed: PackedModel, state: np.ndarray, twist: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return rates as `state` `[B, ...]` and wrenches per unit load `[B, 3]` at contiguous states and twists `[B, 3]`.
+
+    `packed` has one record, or one for each contact.
+    """
+    rate, wrench = np.empty((len(twist), packed.states)), np.empty((len(twist), 3))
+    function = address_of(packed.functions.evaluate)
+    batched_rates.evaluate(function, packed.records, state.reshape(rate.shape), twist, rate, wrench)
+    return rate.reshape(state.shape), wrench
+
+
+def linearised(packed: PackedModel, state: np.ndarray, twist: np.ndarray) -> np.ndarray:
+    """Return linearisations `[B, workspace]`; the kernels of each kind of model describe the numbers."""
+    lin = np.empty((len(twist), packed.workspace))
+    function = address_of(packed.functions.linearise)
+    batched_rates.linearise(function, packed.records, state.reshape(len(twist), packed.states), twist, lin)
+    return lin

@@ -10,8 +10,7 @@ import numpy as np
 
 from planarfriction.compiled import packed
 from planarfriction.compiled.base import CompiledModel
-from planarfriction.compiled.packed import PackedModel
-from planarfriction.compiled.rates import linearised
+from planarfriction.compiled.packed import PackedModel, linearised
 from planarfriction.compiler.memory import place_of, rows_of
 from planarfriction.kernels import published_contact
 from planarfriction.kernels.published_contact import LINEAR, PublishedContact, PublishedPatch, Root

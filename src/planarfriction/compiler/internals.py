@@ -20,7 +20,15 @@ def part(module: str, name: str, instead: Any) -> Any:
     try:
         return getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError) as error:
-        _tell(error)
+        global _warned
+        if not _warned:
+            _warned = True
+            warnings.warn(
+                f"Numba {numba.__version__} with llvmlite {llvmlite.__version__} differs from the versions that were "
+                f"tested ({error}): compiling takes longer, and may take place in each process",
+                RuntimeWarning,
+                stacklevel=2,
+            )
         return instead
 
 
@@ -29,15 +37,3 @@ def need(owner: Any, *names: str) -> None:
     for name in names:
         if not hasattr(owner, name):
             raise ImportError(f"{getattr(owner, '__name__', owner)} has no {name}")
-
-
-def _tell(error: Exception) -> None:
-    global _warned
-    if not _warned:
-        _warned = True
-        warnings.warn(
-            f"Numba {numba.__version__} with llvmlite {llvmlite.__version__} differs from the versions that were "
-            f"tested ({error}): compiling takes longer, and may take place in each process",
-            RuntimeWarning,
-            stacklevel=2,
-        )

@@ -93,11 +93,6 @@ class MachineCode(NullCache):
         self._sources, self._name = sources, f"{path.stem}.{name}"
         self._identity = (sources.name_of(path), name, digest)
 
-    @property
-    def cache_path(self) -> str:
-        """Folder that is tried first."""
-        return str(next(folders(self._sources)))
-
     def writable(self) -> bool:
         """Return True if there is a folder for machine code that can be written."""
         for folder in folders(self._sources):

@@ -70,7 +70,23 @@ def places_of(rows: np.ndarray) -> np.ndarray:
 @functools.cache
 def size_of(record: Any) -> int:
     """Return the number of words of a record."""
-    return sum(size_of(kind) if hasattr(kind, "_fields") else 1 for _, kind in _fields(record))
+    return sum(_words(kind) for _, kind in _fields(record))
+
+
+def _words(kind: Any) -> int:
+    return size_of(kind) if hasattr(kind, "_fields") else 1
+
+
+@functools.cache
+def _plan(record: Any) -> dict[str, tuple[int, int, bool, np.dtype | None]]:
+    """Return the first word of each field, the words of a record in it or 0, True for an integer, and the dtype."""
+    plan, first = {}, 0
+    for name, kind in _fields(record):
+        number, words = _number_of(kind), _words(kind)
+        dtype = None if number is None else np.dtype(str(number))
+        plan[name] = first, words if hasattr(kind, "_fields") else 0, _is_integer(kind), dtype
+        first += words
+    return plan
 
 
 def row_of(record: Any) -> np.ndarray:
@@ -84,35 +100,19 @@ def row_of(record: Any) -> np.ndarray:
     return row
 
 
-@functools.cache
-def _plan(record: Any) -> tuple[tuple[str, int, bool, np.dtype | None], ...]:
-    """Return the name of each field, the words of a record in it or 0, whether it is an integer, and its dtype."""
-    return tuple(
-        (
-            name,
-            size_of(kind) if hasattr(kind, "_fields") else 0,
-            _is_integer(kind),
-            None if _number_of(kind) is None else np.dtype(str(_number_of(kind))),
-        )
-        for name, kind in _fields(record)
-    )
-
-
 def _write(row: np.ndarray, record: Any) -> None:
-    at, integers = 0, row.view(np.int64)
-    for (name, words, integer, dtype), value in zip(_plan(type(record)), record, strict=True):
+    integers = row.view(np.int64)
+    for (first, words, integer, dtype), value in zip(_plan(type(record)).values(), record, strict=True):
         if words:
             if isinstance(value, np.ndarray):
-                row[at : at + words] = value
+                row[first : first + words] = value
             else:
-                _write(row[at : at + words], value)
-            at += words
+                _write(row[first : first + words], value)
             continue
         if isinstance(value, np.ndarray):
-            assert value.dtype == dtype, (name, value.dtype)
+            assert value.dtype == dtype, (dtype, value.dtype)
             value = place_of(value) if value.size else 0
-        (integers if integer else row)[at] = value
-        at += 1
+        (integers if integer else row)[first] = value
 
 
 def rows_of(record: Any, count: int, **columns: np.ndarray) -> np.ndarray:
@@ -121,13 +121,10 @@ def rows_of(record: Any, count: int, **columns: np.ndarray) -> np.ndarray:
     A column holds one row for each record; the column of an array holds addresses.
     """
     rows = np.tile(row_of(record), (count, 1))
-    at = 0
-    for name, kind in _fields(type(record)):
-        width = size_of(kind) if hasattr(kind, "_fields") else 1
-        if name in columns:
-            target = rows.view(np.int64) if _is_integer(kind) else rows
-            target[:, at : at + width] = np.reshape(columns[name], (count, width))
-        at += width
+    for name, column in columns.items():
+        first, words, integer, _ = _plan(type(record))[name]
+        target = (rows.view(np.int64) if integer else rows)[:, first : first + (words or 1)]
+        target[:] = np.reshape(column, target.shape)
     return rows
 
 
@@ -170,7 +167,7 @@ def _load(context: Any, builder: Any, kind: Any, words: Any, at: int, constant: 
     return value, at + 1
 
 
-def _pointer(context: Any, builder: Any, kind: Any, value: Any, target: Any) -> Any:
+def pointer_to(context: Any, builder: Any, kind: Any, value: Any, target: Any) -> Any:
     """Return an address, a pointer or an array as a pointer to numbers of another type."""
     if isinstance(kind, types.Array):
         value = context.make_array(kind)(context, builder, value).data
@@ -215,12 +212,8 @@ class _Fields(AttributeTemplate):
 
 @lower_getattr_generic(_View)
 def _load_field(context: Any, builder: Any, view: _View, value: Any, name: str) -> Any:
-    words, first = builder.bitcast(value, ir.DoubleType().as_pointer()), 0
-    for field, kind in _fields(view.record):
-        if field == name:
-            break
-        first += size_of(kind) if hasattr(kind, "_fields") else 1
-    result = _type_in_view(kind)
+    words, first = builder.bitcast(value, ir.DoubleType().as_pointer()), _plan(view.record)[name][0]
+    result = _type_in_view(dict(_fields(view.record))[name])
     if isinstance(result, _View):
         place = builder.gep(words, [ir.Constant(ir.IntType(64), first)])
         return builder.bitcast(place, context.get_value_type(result))
@@ -238,7 +231,7 @@ def reader(record: Any) -> Any:
     @intrinsic
     def read(typingctx: Any, row: types.Type) -> Any:
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            words = _pointer(context, builder, row, args[0], types.float64)
+            words = pointer_to(context, builder, row, args[0], types.float64)
             if isinstance(result, _View):
                 return builder.bitcast(words, context.get_value_type(result))
             return _load(context, builder, result, words, 0)[0]
@@ -257,7 +250,7 @@ def _view(number: Any) -> Any:
             return None
 
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            return _pointer(context, builder, place, args[0], number)
+            return pointer_to(context, builder, place, args[0], number)
 
         return types.CPointer(number)(place), generate
 
@@ -346,7 +339,7 @@ def arrays_at(typingctx: Any, offsets: types.Type, place: types.Type) -> Any:
     result = _type_of(offsets.instance_class.record)
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        first, fields = _pointer(context, builder, place, args[1], types.float64), []
+        first, fields = pointer_to(context, builder, place, args[1], types.float64), []
         for kind, offset in zip(result, cgutils.unpack_tuple(builder, args[0]), strict=True):
             fields.append(builder.bitcast(builder.gep(first, [offset]), context.get_value_type(kind)))
         return context.make_tuple(builder, result, fields)

@@ -19,22 +19,9 @@ from planarfriction.kernels.law import LAW
 from planarfriction.kernels.published_rollouts import gradient, rollout, sensitivities, tangent
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModelPublished
-from planarfriction.models.reduced_published import PublishedShape, axes_of
+from planarfriction.models.reduced_published import axes_of
 
-PARAMETERS = (
-    "sigma_0",
-    "sigma_1",
-    "sigma_2",
-    "mu_c",
-    "mu_s",
-    "v_s",
-    "gamma",
-    "breakaway_ratio",
-    "contact_radius",
-    "second_moment",
-    "centre_x",
-    "centre_y",
-)
+PARAMETERS = *cells_rollout.PARAMETERS, "contact_radius", "second_moment", "centre_x", "centre_y"
 """Parameters of `ReducedModelPublished`, in the order of their vector; units as in `LuGre`, [m], [m^2], [m], [m]."""
 
 POSITIVE = ("sigma_0", "mu_c", "mu_s", "v_s", "gamma", "contact_radius")
@@ -58,23 +45,15 @@ class Family(NamedTuple):
     """Derivatives by the weights of cells (see `kernels.cells_rollout`)."""
 
 
-PUBLISHED = Family(
-    PARAMETERS,
-    np.array([published_step.NAMES.index(name) for name in PARAMETERS]),
-    rollout,
-    gradient,
-    sensitivities,
-    tangent,
-)
+_COLUMNS = np.array([published_step.NAMES.index(name) for name in PARAMETERS])
+PUBLISHED = Family(PARAMETERS, _COLUMNS, rollout, gradient, sensitivities, tangent)
 """`ReducedModelPublished`."""
 
 
 @functools.cache
 def _cells(size: int, turned: bool, leans: bool) -> Family:
     """Return the rollouts of `DistributedModel` of points, size 2, or of discs, 3 (see `cell_passes.KINDS`)."""
-    loops, sensitivities = rollouts_of_cells(size, turned, leans)
-    names, columns = cells_rollout.PARAMETERS, np.array(cells_rollout.COLUMNS)
-    return Family(names, columns, loops.rollout, loops.gradient, sensitivities, loops.tangent, loops.shares)
+    return Family(cells_rollout.PARAMETERS, np.array(cells_rollout.COLUMNS), *rollouts_of_cells(size, turned, leans))
 
 
 class Packed(NamedTuple):
@@ -174,13 +153,8 @@ def _packed(model: Any) -> Packed:
         at_loads = model.compiled.at_loads
         shapes = at_loads if model.depends_on_load else at_loads(np.ones(1), False)
         return Packed(family, np.array(law), shapes, inner=model.state_shape, reference=model.compiled.reference)
-    return pack_shape(law, model.shape_at(1.0))
-
-
-def pack_shape(law: LawNumbers, shape: PublishedShape) -> Packed:
-    """Return a law and the shape of a `ReducedModelPublished`."""
-    surface = shape.surface.numbers
-    axes = None if (shape.root == np.eye(2)).all() else shape.axes
+    shape = model.shape_at(1.0)
+    surface, axes = shape.surface.numbers, None if (shape.root == np.eye(2)).all() else shape.axes
     return _on_surface(np.array([*law, *shape.numbers]), surface.kind, surface.size, surface.data, axes)
 
 

@@ -92,7 +92,8 @@ class MotionPath:
         Raises SolverError if the solver fails, or takes too many steps.
         """
         now, outcome, n, (left, too_many) = start_of(self.batches.state), rosenbrock.DONE, len(self.scale), self._limit
-        path = paths.path_for(max(int(min(NUMBERS / n, most)), LEAST_NODES), n)
+        nodes = max(int(min(NUMBERS / n, most)), LEAST_NODES)
+        path = Path(np.zeros(nodes, np.int64), np.zeros(nodes), np.zeros((nodes, n)), np.zeros((nodes, n)))
         for system in self.batches:
             run = rosenbrock.Run(system, RODAS4, self._output, now, rtol=self._rtol, atol=self._atol)
             now.cursor[0], outcome = 0, rosenbrock.PAUSED

@@ -160,10 +160,7 @@ def rollout_vjp(
     (count, size), steps, packed = inputs.state.shape, len(inputs.dt), inputs.model
     inner, family, turned = packed.inner, packed.family, packed.turned
     cotangents = turned(rows_of("wrenches_bar", wrenches_bar, (steps, 3), inputs.batch))
-    if states is None:
-        on_the_way = _roll(inputs, steps)[2]
-    else:
-        on_the_way = rows_of("states", states, (steps, *inner), inputs.batch).reshape(-1, steps, size)
+    on_the_way = _on_the_way(inputs, states)
     z_bar = np.zeros_like(inputs.state)
     if state_bar is not None:
         z_bar[:] = rows_of("state_bar", state_bar, inner, inputs.batch).reshape(-1, size)
@@ -189,12 +186,8 @@ def weights_vjp(
     Other arguments are as in `rollout_vjp`. Raises InvalidValueError as `rollout_vjp` does.
     """
     inputs = checked(model, state, twist, normal_force, dt, parameters, [weights.shape[:-1]])
-    (count, size), steps, shares = inputs.state.shape, len(inputs.dt), inputs.model.family.shares
-    cotangents = rows_of("wrenches_bar", wrenches_bar, (steps, 3), inputs.batch)
-    if states is None:
-        on_the_way = _roll(inputs, steps)[2]
-    else:
-        on_the_way = rows_of("states", states, (steps, *inputs.model.inner), inputs.batch).reshape(-1, steps, size)
+    count, shares, on_the_way = len(inputs.state), inputs.model.family.shares, _on_the_way(inputs, states)
+    cotangents = rows_of("wrenches_bar", wrenches_bar, (len(inputs.dt), 3), inputs.batch)
     found, compiled = np.zeros((count, weights.shape[-1])), inputs.compiled()
     share(compiled, count, lambda *span: shares(compiled, on_the_way, cotangents, span, found))  # pyright: ignore
     return sum_to(weights.shape, inputs.of_all(found))
@@ -251,10 +244,8 @@ def rollout_jvp(
     steps = validation.numbers("twist", twist).shape[-2:-1]
     tangent = RolloutTangent() if tangent is None else tangent
     validation.instance("tangent", tangent, RolloutTangent, "a RolloutTangent")
-    names, inner = (
-        [f"tangent.{name}" for name in tangent._fields],
-        (packed.inner, (*steps, 3), steps, (len(family.names),)),
-    )
+    names = [f"tangent.{name}" for name in tangent._fields]
+    inner = packed.inner, (*steps, 3), steps, (len(family.names),)
     changes = [validation.finite_numbers(name, value) for name, value in zip(names, tangent, strict=True)]
     more = [value.shape[: max(value.ndim - len(shape), 0)] for value, shape in zip(changes, inner, strict=True)]
     inputs = checked(packed, state, twist, normal_force, dt, None, more)
@@ -282,6 +273,15 @@ def _roll(inputs: RolloutInputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.
     compiled, family = inputs.compiled(), inputs.model.family
     share(compiled, count, lambda *span: family.rollout(compiled, span, end, wrenches, states))
     return end, inputs.of_all(inputs.model.turned(wrenches)), states
+
+
+def _on_the_way(inputs: RolloutInputs, states: Any) -> np.ndarray:
+    """Return the states before each step `[B or 1, T, S]`, given ones or those of a rollout."""
+    steps = len(inputs.dt)
+    if states is None:
+        return _roll(inputs, steps)[2]
+    rows = rows_of("states", states, (steps, *inputs.model.inner), inputs.batch)
+    return rows.reshape(-1, steps, inputs.state.shape[1])
 
 
 def _differentiate(model: Packed, inputs: Inputs, z: np.ndarray, out: Derivatives) -> None:

@@ -19,7 +19,6 @@ from planarfriction.kernels import (
     cells_rollout,
     disc_cells,
     discs,
-    moment_steps,
     points,
     published_step,
 )
@@ -243,14 +242,13 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
 
 
 def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
-    """Trace `moment_steps` of the record of the contact."""
+    """Trace the steps of the record of the contact."""
     found, law = model.compiled.shapes.shape_at(None), model.law.numbers
     surface, root, shape = found.surface.numbers, found.root, PublishedPatch(*found.numbers)
     if surface.kind == CELLS:
         raise InvalidValueError("surface", "be an ellipsoid or a table", type(found.surface).__name__)
     root = Root(float(root[0, 0]), float(root[0, 1]), float(root[1, 1]))
-    steps = published_step
-    frame, hold, taped_step = (twin(each) for each in (steps._FRAME, steps.MODEL.hold, steps.MODEL.taped_step))
+    steps = twin(published_step)
 
     def contact(trace: Trace) -> PublishedContact:
         data: Any = Table(trace, "surface", surface.data)
@@ -258,33 +256,29 @@ def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
 
     def step(trace: Trace) -> Any:
         new, out, dt = [0.0] * 3, [0.0] * 3, Number(trace, "dt")
-        z, twist = _state(trace, 3, 1), _vector(trace, *_TWIST)
-        model = {"frame": frame, "hold": hold, "taped_step": taped_step}
-        twin(moment_steps.step)(contact(trace), z, twist, dt, new, out, **model)
+        steps.step(contact(trace), _state(trace, 3, 1), _vector(trace, *_TWIST), dt, new, out)
         return tuple(new), tuple(out)
 
     def steady(trace: Trace) -> Any:
-        own, part = frame.read(contact(trace))
-        held = hold(part, frame.seen(own, _vector(trace, *_TWIST)))
+        own, part = steps.read(contact(trace))
+        held = steps.hold(part, steps.seen(own, _vector(trace, *_TWIST)))
         grip = part.law.sigma_0 / twin(formulas.stribeck)(Mathematics, held.v, part.law)
         x, y, s = twin(times)(twin(ratio)(1.0, grip * held.v), held.u)
         settled = x, y, part.shape.contact_radius * s
-        wrench = frame.wrench(own, taped_step(part, held, settled, 0.0).wrench)
+        wrench = steps.wrench_of(own, steps.taped_step(part, held, settled, 0.0).wrench)
         return tuple(Mathematics.where(held.v > 0.0, each, 0.0) for each in wrench)
 
     def slopes(trace: Trace) -> Any:
         laws: list[LawNumbers] = []
 
         def pull_back(*arguments: Any) -> Any:
-            bar = twin(steps.MODEL.pull_back)(*arguments)
+            bar = steps.pull_back(*arguments)
             laws.append(bar.law)
             return bar
 
         new, out, dt = [0.0] * 3, [0.0] * 39, Number(trace, "dt")
-        z, twist = _state(trace, 3, 1), _vector(trace, *_TWIST)
-        given = contact(trace), z, twist, dt, new, out
-        model = {"frame": frame, "hold_slopes": twin(steps.MODEL.hold_slopes), "taped_step": taped_step}
-        twin(moment_steps.slopes)(*given, **model, pull_back=pull_back, whole=True)
+        given = contact(trace), _state(trace, 3, 1), _vector(trace, *_TWIST), dt, new, out
+        steps.slopes(*given, pull_back=pull_back, whole=True)
         by_law = [tuple(getattr(each, name) for name in _parameters(law)) for each in laws]
         rows = [
             (*out[at + 18 : at + 21], *out[at : at + 3], bar) for at, bar in zip(range(3, 21, 3), by_law, strict=True)

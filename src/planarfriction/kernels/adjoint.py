@@ -24,7 +24,7 @@ from planarfriction.compiler.calls import call, pointer
 from planarfriction.compiler.memory import Doubles, Place, arrays_at, at
 from planarfriction.kernels.body import (
     SystemRecord,
-    function_of,
+    functions_of,
     linearisation_of,
     load_of,
     maps_of,
@@ -32,7 +32,7 @@ from planarfriction.kernels.body import (
     record_of,
     total_load,
 )
-from planarfriction.kernels.contacts import PULL_BACK, ROWS, SOLVE_TRANSPOSED
+from planarfriction.kernels.contacts import ROWS
 from planarfriction.kernels.path import Path, Stretch, Tolerances, hold, node_before
 from planarfriction.kernels.sdirk import (
     AGAIN,
@@ -51,7 +51,7 @@ from planarfriction.kernels.sdirk import (
     variation_of,
 )
 from planarfriction.kernels.small_matrices import applied
-from planarfriction.kernels.step_control import judged, length
+from planarfriction.kernels.step_control import fitted, judged
 from planarfriction.kernels.tangent import MOST, Drives, partial_of, wrench_by_input
 from planarfriction.kernels.vectors import Vector, applied_back, dot, plus, put, three, times
 
@@ -68,7 +68,7 @@ def _pulled(
     first, rows, (a, g, _) = system.contacts.state[c], arrays_at(ROWS, system.work.rows), maps_of(system, c)
     put(rows.d_wrench, wrench)
     states = at(y, first), linearisation_of(system, c), at(rates, first), system.work.rows, at(w.forcing, first)
-    call(function_of(system, c, PULL_BACK), (record_of(system, piece, c), *states))
+    call(functions_of(system, c).pull_back, (record_of(system, piece, c), *states))
     return applied_back(a, rows.d_twist), applied_back(g, rows.d_twist)
 
 
@@ -76,7 +76,7 @@ def _pulled(
 def _solve_bristles(system: SystemRecord, piece: int, c: int, y: Doubles, b: Doubles, out: Doubles) -> None:
     first = system.contacts.state[c]
     states = record_of(system, piece, c), at(y, first), at(b, first), linearisation_of(system, c), at(out, first)
-    call(function_of(system, c, SOLVE_TRANSPOSED), states)
+    call(functions_of(system, c).solve_transposed, states)
 
 
 @kernel
@@ -132,13 +132,8 @@ def _step(
     address: Place, path: Path, k: int, first: int, since: float, h: float, d: Variation, drives: Drives, w: Workspace
 ) -> None:
     """Carry the adjoint back over `h` seconds into `w.new`, as `tangent` does its slopes forwards."""
-    system, piece, n, shift, inputs = (
-        read(address),
-        path.piece[k],
-        path.state.shape[1],
-        1.0 / (h * GAMMA),
-        drives.input_kind.shape[0],
-    )
+    system, piece, n, shift = read(address), path.piece[k], path.state.shape[1], 1.0 / (h * GAMMA)
+    inputs = drives.input_kind.shape[0]
     for i in range(PLACES.shape[0]):
         time = since - h * PLACES[i]
         hold(address, path, node_before(path, k, first, time), time, shift, w)
@@ -207,7 +202,8 @@ def propagate_back(
     while since > until:
         k = node_before(path, k, first, since)
         local, remaining = path.since[k + 1] - path.since[k], since - until
-        h = length(w.pace[0], local, since - path.since[xp.maximum(k + 1 - MOST, first)], remaining)
+        reach = since - path.since[xp.maximum(k + 1 - MOST, first)]
+        h = fitted(xp.minimum(w.pace[0] * local, reach), remaining)
         _step(address, path, k, first, since, h, d, drives, w)
         taken += 1
         of_gains = _error_of_gains(moments.shape[0], h, known, rtol, w)

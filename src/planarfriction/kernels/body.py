@@ -19,24 +19,21 @@ from planarfriction.compiler.calls import address_of, call
 from planarfriction.compiler.memory import Doubles, Integers, Packed, Place, arrays_at, at, exists, layout, reader
 from planarfriction.kernels import cells
 from planarfriction.kernels.contacts import (
-    BACK_SUBSTITUTE,
     CALLS,
-    ELIMINATE,
-    EVALUATE,
-    FACTOR,
-    LINEARISE,
     SEEN,
     SEEN_SIZE,
     WORLD,
+    Addresses,
     Contacts,
     Seen,
+    addresses_at,
     contact_map,
     contact_map_slopes,
 )
 from planarfriction.kernels.settle import bring_back, factor_at
 from planarfriction.kernels.small_matrices import applied, inverse
 from planarfriction.kernels.springs import add_spring_slopes, spring_wrench
-from planarfriction.kernels.vectors import Vector, applied_back, plus, put, put_all, three
+from planarfriction.kernels.vectors import Vector, applied_back, clear, copy, plus, put, put_all, three
 
 NO_LOAD = 1e-6
 """Share of the reference load below which a fixed stiffness is fixed no longer: limits of 1e-12 m are not followed."""
@@ -103,8 +100,6 @@ class Work(NamedTuple):
     """Inverse of the matrix, [3, 3]."""
     to_pose: Doubles
     """Acceleration per residual of the pose, [3, 3]."""
-    body: Doubles
-    """A vector of the body, [3]."""
     rows: Doubles
     """Twist and wrench of one contact and their changes (see `contacts.Rows`), [4, 3]."""
     frame: Doubles
@@ -150,7 +145,7 @@ class System(Packed):
         n, square = len(contacts.count), (3, 3)
         work = layout(
             Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=SEEN_SIZE, factor=n,
-            covered=n, stiffness=18, matrix=square, inverse=square, to_pose=square, body=3, rows=(4, 3), frame=(n, 8),
+            covered=n, stiffness=18, matrix=square, inverse=square, to_pose=square, rows=(4, 3), frame=(n, 8),
         )  # fmt: skip
         self._block, addresses = np.zeros(work.size), [address_of(each) for each in BODY_FUNCTIONS]
         sizes = n, int(contacts.state[n]), pressures, len(motion.breaks) - 1, len(motion.spring)
@@ -198,9 +193,9 @@ def settle_all(system: SystemRecord, piece: int, y: Doubles) -> None:
 
 
 @kernel
-def function_of(system: SystemRecord, c: int, which: int) -> Place:
-    """Return the address of one of the functions of contact c, `EVALUATE` to `PULL_BACK`."""
-    return system.contacts.calls[CALLS * c + which]
+def functions_of(system: SystemRecord, c: int) -> Addresses:
+    """Return the addresses of the functions of contact c."""
+    return addresses_at(at(system.contacts.calls, CALLS * c))
 
 
 @kernel
@@ -229,8 +224,7 @@ def place_at(system: SystemRecord, piece: int, since: float, c: int, body: Doubl
     mover = at(system.motion.mover, 9 * (piece * system.size + c))
     vx, vy, omega = mover[3] + since * mover[6], mover[4] + since * mover[7], mover[5] + since * mover[8]
     dx, dy = body[3], body[4]
-    for i in range(4):
-        frame[i] = place[i]
+    copy(place, frame, 4)
     if system.contacts.mount[c] == WORLD:
         half = 0.5 * since
         turned = mover[2] + since * (mover[5] + half * mover[8])
@@ -273,7 +267,7 @@ def rates(address: Place, piece: int, since: float, y: Doubles, dy: Doubles) -> 
     work, body, out, a = system.work, at(y, system.bristles), at(dy, system.bristles), system.work.stiffness
     force = at(system.motion.force, 6 * piece)
     total = plus(three(force), since, three(at(force, 3)))
-    total = plus(total, 1.0, spring_wrench(system.motion, system.springs, piece, since, body))
+    total = plus(total, 1.0, spring_wrench(system, piece, since, body))
     for c in range(system.size):
         first, w = system.contacts.state[c], at(work.wrench, 3 * c)
         place, seen = place_at(system, piece, since, c, body)
@@ -281,9 +275,8 @@ def rates(address: Place, piece: int, since: float, y: Doubles, dy: Doubles) -> 
         reference = system.contacts.reference[c]
         work.factor[c] = factor_at(reference, xp.maximum(load_of(system, piece, since, c), NO_LOAD * reference))
         inputs = _seen_from(work, c, place, at(body, 3), a, seen)
-        call(
-            function_of(system, c, EVALUATE), (record_of(system, piece, c), at(y, first), work.twist, at(dy, first), w)
-        )
+        states = at(y, first), work.twist, at(dy, first), w
+        call(functions_of(system, c).evaluate, (record_of(system, piece, c), *states))
         work.covered[c] = inputs.covered[0]
         total = plus(total, total_load(system, piece, since, c), applied_back(a, w))
     for i in range(3):
@@ -318,10 +311,8 @@ def linearise(address: Place, piece: int, y: Doubles) -> None:
                 g[3 * i] -= omega * a[3 * i + 1]
                 g[3 * i + 1] += omega * a[3 * i]
         _seen_from(work, c, place, at(y, system.bristles + 3), a, seen)
-        z = at(y, system.contacts.state[c])
-        call(
-            function_of(system, c, LINEARISE), (record_of(system, piece, c), z, work.twist, linearisation_of(system, c))
-        )
+        states = at(y, system.contacts.state[c]), work.twist, linearisation_of(system, c)
+        call(functions_of(system, c).linearise, (record_of(system, piece, c), *states))
 
 
 @entry
@@ -333,13 +324,12 @@ def factor(address: Place, piece: int, since: float, y: Doubles, shift: float) -
     """
     system = read(address)
     s, m, to_pose = system.work.stiffness, system.work.matrix, system.work.to_pose
-    for i in range(9):
-        m[i], to_pose[i] = 0.0, 0.0
+    clear(m, 9)
+    clear(to_pose, 9)
     for c in range(system.size):
         z, (a, g, h) = at(y, system.contacts.state[c]), maps_of(system, c)
-        for i in range(9, 18):
-            s[i] = 0.0
-        call(function_of(system, c, FACTOR), (record_of(system, piece, c), z, shift, linearisation_of(system, c), s))
+        clear(at(s, 9), 9)
+        call(functions_of(system, c).factor, (record_of(system, piece, c), z, shift, linearisation_of(system, c), s))
         load = total_load(system, piece, since, c)
         for j in range(3):
             by_u = applied_back(a, applied(s, (a[j], a[3 + j], a[6 + j])))
@@ -349,7 +339,7 @@ def factor(address: Place, piece: int, since: float, y: Doubles, shift: float) -
                 weight, per_pose = system.motion.inverse_mass[i] * load, (h[3 * i + j] + bpy[i]) / shift
                 to_pose[3 * i + j] += weight * per_pose
                 m[3 * i + j] += weight * (by_u[i] + per_pose)
-    add_spring_slopes(system.motion, system.springs, piece, since, at(y, system.bristles), 1.0 / shift, to_pose, m)
+    add_spring_slopes(system, piece, since, at(y, system.bristles), 1.0 / shift, to_pose, m)
     put_all(system.work.inverse, inverse(shift, m))
 
 
@@ -357,18 +347,14 @@ def factor(address: Place, piece: int, since: float, y: Doubles, shift: float) -
 def solve(address: Place, piece: int, since: float, y: Doubles, shift: float, r: Doubles, out: Doubles) -> None:
     """Solve `(shift I - J) out = r` with the matrix that `factor` prepared."""
     system = read(address)
-    w, v, body, inverse_mass = (
-        system.work.stiffness,
-        system.work.twist,
-        at(y, system.bristles),
-        system.motion.inverse_mass,
-    )
+    w, v, inverse_mass = system.work.stiffness, system.work.twist, system.motion.inverse_mass
+    body = at(y, system.bristles)
     r_body, r_pose = at(r, system.bristles), at(r, system.bristles + 3)
     b = plus(three(r_body), 1.0, applied(system.work.to_pose, r_pose))
     for c in range(system.size):
         first = system.contacts.state[c]
         states = record_of(system, piece, c), at(y, first), shift, at(r, first), linearisation_of(system, c), w
-        call(function_of(system, c, ELIMINATE), states)
+        call(functions_of(system, c).eliminate, states)
         load, force = total_load(system, piece, since, c), applied_back(maps_of(system, c)[0], w)
         b = plus(b, load, (inverse_mass[0] * force[0], inverse_mass[1] * force[1], inverse_mass[2] * force[2]))
     u, pose, per_shift = at(out, system.bristles), at(out, system.bristles + 3), 1.0 / shift
@@ -385,7 +371,7 @@ def solve(address: Place, piece: int, since: float, y: Doubles, shift: float, r:
         put(v, plus(applied(a, u), 1.0, applied(g, pose)))
         put(at(v, 3), _placed(a, pose[0], pose[1], pose[2]))
         states = record_of(system, piece, c), at(y, first), at(r, first), v, linearisation_of(system, c), at(out, first)
-        call(function_of(system, c, BACK_SUBSTITUTE), states)
+        call(functions_of(system, c).back_substitute, states)
 
 
 BODY_FUNCTIONS = rates, linearise, factor, solve

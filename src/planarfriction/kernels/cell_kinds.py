@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import Any, NamedTuple
+from typing import Any
 
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, at
@@ -63,13 +63,6 @@ def _shares_of(written: Passes) -> Any:
     return shares
 
 
-class Rollouts(NamedTuple):
-    """Entry points of a kind of cells."""
-
-    rollouts: cells_rollout.CellRollouts
-    sensitivities: Any
-
-
 @kernel
 def _shared(law: LawNumbers, block: Doubles, i: int) -> LawNumbers:
     return law
@@ -86,8 +79,8 @@ def _leaning_at(first: int) -> Any:
 
 
 @functools.cache
-def rollouts_of_cells(size: int, turned: bool, leans: bool) -> Rollouts:
-    """Return the rollouts of a kind of cells (see `KINDS`); they are written on first use."""
+def rollouts_of_cells(size: int, turned: bool, leans: bool) -> tuple:
+    """Return rollout, gradient, sensitivities, tangent and shares of a kind of cells (see `KINDS`)."""
     kind = KINDS[size, turned, leans]
     path, law = ("lean.law", _leaning_at(LANES * kind.numbers)) if leans else ("law", _shared)
     step, within, by = kind.element.step, kind.element.within, ("z", f"{path}.sigma_0", f"{path}.mu_s")
@@ -97,4 +90,5 @@ def rollouts_of_cells(size: int, turned: bool, leans: bool) -> Rollouts:
     ways = _advance_of(forward_passes(kind)), _retreat_of(backward_passes(kind)), _shares_of(share_passes(kind)), pushed
     functions = Kind(kind.lever, size, *ways, law, limit, reader_of(size))
     sensitivities = cells_sensitivities.bound(functions, step, within, path, kind.name)
-    return Rollouts(cells_rollout.bound(functions, kind.name), sensitivities)
+    rollout, gradient, tangent, shares = cells_rollout.bound(functions, kind.name)
+    return rollout, gradient, sensitivities, tangent, shares

@@ -23,13 +23,6 @@ from planarfriction.kernels.trace import Number, Trace, traced
 from planarfriction.kernels.twins import twin
 
 
-class Division(NamedTuple):
-    """Division of a function into passes that is fastest for a few dozen cells (see `passes`)."""
-
-    count: int
-    short: int
-
-
 class Element(NamedTuple):
     """Bristle of a kind of cells."""
 
@@ -37,18 +30,19 @@ class Element(NamedTuple):
     size: int
     """Components d."""
     evaluate: Any
-    """`(law, z, u)`: return z' and the traction."""
+    """`(law, z, u)`: return z' and the traction; with a fixed stiffness `(law, z, u, factor)`."""
     step: Any
     """`(law, z, u, dt)`: return the bristle after dt and its traction."""
     within: Any = settle.within
     """`(law, z)`: return a bristle brought back onto its limit (see `settle`)."""
-    forward: Division = Division(8, 2)
-    backward: Division = Division(6, 6)
-    rate: Division = Division(5, 0)
-    slopes: Division = Division(4, 2)
+    forward: tuple[int, int] = 8, 2
+    """Division into passes that is fastest for a few dozen cells (see `passes`)."""
+    backward: tuple[int, int] = 6, 6
+    rate: tuple[int, int] = 5, 0
+    slopes: tuple[int, int] = 4, 2
 
 
-POINT = Element("points", 2, points.evaluate, points.step, slopes=Division(2, 0))
+POINT = Element("points", 2, points.evaluate, points.step, slopes=(2, 0))
 DISC = Element("discs", 3, discs.evaluate, discs.step)
 LEANING_POINT = Element("leaning points", 2, leaning_cells.evaluate, leaning_cells.step, leaning_cells.within)
 LEANING_DISC = Element(
@@ -70,10 +64,12 @@ class CellKind(NamedTuple):
     """Record of the numbers of the law."""
     linear: bool = True
     """See `general_cells.Bristle`."""
+    fixed: bool = False
+    """True for a fixed stiffness, whose factor comes in place of dt (see `fixed_stiffness`)."""
 
 
 @kernel
-def _leaning(contact: CellsContact, i: int, v: Doubles) -> Leaning:
+def _leaning(contact: CellsContact, i: int) -> Leaning:
     return Leaning(contact.law, (contact.lean[i], contact.lean[contact.count + i]))
 
 
@@ -110,6 +106,7 @@ class _Symbols:
         self.cell, self.z, self.v = numbers[: kind.numbers], self.several("z", kind.element.size), self.several("v", 3)
         self.dt, self.weight = Number(trace, "dt"), Number(trace, "weight")
         self.u = twin(kind.lever.seen)(self.cell, self.v)
+        self.inputs = (self.law, self.z, self.u, self.dt)[: 3 + kind.fixed]
 
     def several(self, letter: str, count: int) -> tuple:
         """Return a vector of symbols."""
@@ -162,14 +159,14 @@ def _step_of(kind: CellKind) -> Callable[[Trace], Any]:
 def forward_passes(kind: CellKind) -> Passes:
     """Write the step of the cells of a block, in place."""
     stores = list(_fields("z", Z, kind.element.size).values())
-    return passes(kind.element.name, traced(_step_of(kind)), _in_block(kind), stores, **kind.element.forward._asdict())
+    return passes(kind.element.name, traced(_step_of(kind)), _in_block(kind), stores, kind.element.forward)
 
 
 def step_passes(kind: CellKind) -> Passes:
     """Write the step of cells in `Rows`; the new bristles may go where the old ones are, so they are written last."""
-    stores = _rows("new", "out", kind.element.size)
-    sources, division = _in_rows(kind) | stores, kind.element.forward._asdict()
-    return passes(f"steps of {kind.element.name}", traced(_step_of(kind)), sources, list(stores.values()), **division)
+    element, stores = kind.element, _rows("new", "out", kind.element.size)
+    sources = _in_rows(kind) | stores
+    return passes(f"steps of {element.name}", traced(_step_of(kind)), sources, list(stores.values()), element.forward)
 
 
 def backward_passes(kind: CellKind) -> Passes:
@@ -192,8 +189,7 @@ def backward_passes(kind: CellKind) -> Passes:
 
     bar = _fields("b", BAR, element.size)
     sources = _in_block(kind) | _PULL | bar | {"by_load": f"block[{BY_LOAD} + i]"}
-    name, division = f"{element.name}_back", element.backward._asdict()
-    return passes(name, traced(adjoint), sources, list(bar.values()), **division)
+    return passes(f"{element.name}_back", traced(adjoint), sources, list(bar.values()), element.backward)
 
 
 def share_passes(kind: CellKind) -> Passes:
@@ -211,8 +207,7 @@ def share_passes(kind: CellKind) -> Passes:
 
     store = f"block[{OUT} + i]"
     sources = {**_in_block(kind), **_PULL, "before": store}
-    name, division = f"{kind.element.name}_shares", kind.element.forward._asdict()
-    return passes(name, traced(share), sources, [store], **division)
+    return passes(f"{kind.element.name}_shares", traced(share), sources, [store], kind.element.forward)
 
 
 def rate_passes(kind: CellKind) -> Passes:
@@ -221,11 +216,11 @@ def rate_passes(kind: CellKind) -> Passes:
 
     def rate(trace: Trace) -> Any:
         s = _Symbols(trace, kind)
-        zdot, traction = twin(element.evaluate)(s.law, s.z, s.u)
+        zdot, traction = twin(element.evaluate)(*s.inputs)
         return zdot, twin(kind.lever.wrench)(s.cell, tuple(s.weight * each for each in traction))
 
-    stores, division = list(_rows("rate", "out", element.size).values()), element.rate._asdict()
-    return passes(f"rates of {element.name}", traced(rate), _in_rows(kind), stores, **division)
+    stores = list(_rows("rate", "out", element.size).values())
+    return passes(f"rates of {element.name}", traced(rate), _in_rows(kind), stores, element.rate)
 
 
 def slope_passes(kind: CellKind) -> Passes:
@@ -237,11 +232,10 @@ def slope_passes(kind: CellKind) -> Passes:
 
     def slopes(trace: Trace) -> Any:
         s = _Symbols(trace, kind)
-        _, tape = twin(written.forth)(s.law, s.z, s.u)
+        _, tape = twin(written.forth)(*s.inputs)
         rows = [twin(written.back)(tape, (unit[: element.size], unit[element.size :])) for unit in units]
         halves = [rows[first : first + element.size] for first in range(0, count, element.size)]
         return tuple(tuple(row[which] for row in half) for half in halves for which in range(2))
 
     stores = [f"block.out[{m * LANES} + i]" for m in range(2 * count * element.size)]  # of a block: that lies apart
-    name, division = f"slopes of {element.name}", element.slopes._asdict()
-    return passes(name, traced(slopes), _in_rows(kind), stores, **division)
+    return passes(f"slopes of {element.name}", traced(slopes), _in_rows(kind), stores, element.slopes)

@@ -7,7 +7,7 @@ traction (docs/physics.md, "Distributed model").
 from __future__ import annotations
 
 import functools
-from typing import Any, NamedTuple
+from typing import Any
 
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, Place, at
@@ -19,10 +19,10 @@ from planarfriction.kernels.cells import CellsContact
 from planarfriction.kernels.contacts import ModelFunctions, functions_of
 from planarfriction.kernels.passes import Passes
 from planarfriction.kernels.steps import StepFunctions, step_functions
-from planarfriction.kernels.vectors import Vector, copy, plus, put, three
+from planarfriction.kernels.vectors import Vector, clear, copy, plus, put, three
 
-RESULTS = LANES * 2 * DISC.size**2
-"""Numbers of the results of a block of cells: derivatives, or rates or bristles, row by row."""
+RESULTS = LANES * 4 * DISC.size**2
+"""Numbers of the results of a block of cells: derivatives of rates and tractions, or rates or bristles, row by row."""
 
 BLOCK = RESULTS + LANES * 12
 """Numbers of a block of cells: results, and copies of up to eight numbers, of the bristle and of the weight."""
@@ -46,8 +46,7 @@ def _filled(numbers: int, size: int) -> Any:
     def filled(contact: CellsContact, z: Doubles, first: int, lanes: int, out: Doubles, block: Doubles) -> Any:
         n, count = contact.count, min(lanes, contact.count - first)
         for m in range(numbers + size + 1):
-            for i in range(count, lanes):
-                block[RESULTS + m * LANES + i] = 0.0
+            clear(at(block, RESULTS + m * LANES + count), lanes - count)
         for m in range(numbers):
             copy(at(contact.cells, m * n + first), at(block, RESULTS + m * LANES), count)
         for m in range(size):
@@ -71,28 +70,30 @@ def _run(written: Passes) -> Any:
 
 def evaluate(
     contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, *, cell_rows: Any, rate: Any, copied: int,
-    read: Any,
+    fixed: bool, read: Any,
 ) -> None:  # fmt: skip
-    """Write `z'`, and `W`."""
+    """Write `z'`, and `W`; behind V is the factor of a `fixed` stiffness."""
     record, twist, total, block = read(contact), three(v), (0.0, 0.0, 0.0), scratch(BLOCK)
+    factor = v[3] if fixed else 0.0
     n, (_, lanes) = record.count, divided(record.count)
     for first in range(0, n, lanes):
         rows, count = cell_rows(record, z, first, lanes, block if copied > 0 else at(zdot, first), block)
-        total = plus(total, 1.0, rate(record.law, twist, 0.0, rows, count))
+        total = plus(total, 1.0, rate(record.law, twist, factor, rows, count))
         for m in range(copied):
             copy(at(block, m * LANES), at(zdot, m * n + first), min(lanes, n - first))
     put(w, total)
 
 
 def linearise(
-    contact: Place, z: Doubles, v: Doubles, lin: Doubles, *, bristle: Any, cell_rows: Any, slope: Any, read: Any
-) -> None:
+    contact: Place, z: Doubles, v: Doubles, lin: Doubles, *, bristle: Any, cell_rows: Any, slope: Any, fixed: bool,
+    read: Any,
+) -> None:  # fmt: skip
     """Write A and F of each cell, and C and E unless tractions are linear (see `general_cells`)."""
-    record, twist, block = read(contact), three(v), scratch(BLOCK)
+    record, twist, factor, block = read(contact), three(v), v[3] if fixed else 0.0, scratch(BLOCK)
     n, (_, lanes) = record.count, divided(record.count)
     for first in range(0, n, lanes):
         rows, count = cell_rows(record, z, first, lanes, block, block)
-        slope(record.law, twist, 0.0, rows, count)
+        slope(record.law, twist, factor, rows, count)
         square = bristle.size * bristle.size
         for m in range(2 * square if bristle.linear else 4 * square):
             row = m if m < 2 * square else m + square  # behind the inverse
@@ -114,27 +115,30 @@ def step(
     put(out, total)
 
 
-class CellFunctions(NamedTuple):
-    """Functions of contacts of a kind of cells: step, rates and their derivatives in passes, the rest cell by cell."""
-
-    rates: ModelFunctions
-    steps: StepFunctions
-
-
 @functools.cache
-def functions_of_cells(size: int, turned: bool, leans: bool) -> CellFunctions:
+def functions_of_cells(size: int, turned: bool, leans: bool) -> tuple[ModelFunctions, StepFunctions]:
     """Return the functions of contacts of a kind of cells (see `KINDS`); they are written on first use."""
-    return functions_of_kind(KINDS[size, turned, leans], cells.read)
+    kind = KINDS[size, turned, leans]
+    return rates_of(kind, cells.read), steps_of(kind, cells.read)
 
 
-def functions_of_kind(kind: CellKind, read: Any) -> CellFunctions:
-    """Return the functions of contacts of a kind of cells whose records `read` reads."""
-    bristle = general_cells.bristle(kind.element.evaluate, kind.element.step, kind.element.size, kind.linear)
-    model = {"lever": kind.lever, "bristle": bristle, "read": read}
-    templates, slope = (evaluate, linearise, *general_cells.RATES[2:]), _run(slope_passes(kind))
-    copied = bristle.size if bristle.size == DISC.size else 0  # points come by the hundred
-    model["cell_rows"] = _filled(kind.numbers + 2 * kind.leans, bristle.size) if copied else _in_place
-    rates = functions_of(kind.name, templates, **model, rate=_run(rate_passes(kind)), slope=slope, copied=copied)
-    advance = _run(step_passes(kind))
-    steps = step_functions(kind.name, (step, general_cells.slopes), **model, advance=advance, copied=copied)
-    return CellFunctions(rates, steps)
+def _model_of(kind: CellKind, read: Any) -> dict[str, Any]:
+    """Return the arguments of templates that rates and steps of a kind of cells share."""
+    size, numbers = kind.element.size, kind.numbers + 2 * kind.leans
+    copied = size if size == DISC.size else 0  # points come by the hundred
+    cell_rows = _filled(numbers, size) if copied else _in_place
+    bristle = general_cells.bristle(size, kind.linear)
+    return {"lever": kind.lever, "bristle": bristle, "read": read, "copied": copied, "cell_rows": cell_rows}
+
+
+def rates_of(kind: CellKind, read: Any) -> ModelFunctions:
+    """Return the functions of the solver for contacts of a kind of cells whose records `read` reads."""
+    loops = {"rate": _run(rate_passes(kind)), "slope": _run(slope_passes(kind)), "fixed": kind.fixed}
+    return functions_of(kind.name, (evaluate, linearise, *general_cells.FUNCTIONS), **_model_of(kind, read), **loops)
+
+
+def steps_of(kind: CellKind, read: Any) -> StepFunctions:
+    """Return the steps of contacts of a kind of cells whose records `read` reads."""
+    slopes = general_cells.slopes_of(kind.element.step, kind.element.size)
+    loops = {"advance": _run(step_passes(kind)), "linearise": slopes}
+    return step_functions(kind.name, (step, general_cells.slopes), **_model_of(kind, read), **loops)

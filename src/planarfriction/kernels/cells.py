@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, reader
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels.vectors import Vector, dot
+from planarfriction.kernels.vectors import Vector, dot, reader_of
 
 
 class CellsContact(NamedTuple):
@@ -42,15 +42,21 @@ class Lever(NamedTuple):
     around: Any
     """`(cell, P)`: return `B' P B` of a matrix [d, d], nine numbers."""
     law: Any
-    """`(contact, i, v)`: return the law of the cell; `v` are the twist and numbers behind it."""
+    """`(contact, i)`: return the law of the cell."""
 
 
 # ---------------------------------------------------------------------- the levers
 
 
-@kernel
-def _place(contact: CellsContact, i: int) -> Vector:
-    return contact.cells[i], contact.cells[contact.count + i]
+def numbers_of(count: int) -> Any:
+    """Return `Lever.of` of a lever of so many numbers."""
+    read = reader_of(count)
+
+    @kernel
+    def numbers(contact: CellsContact, i: int) -> Vector:
+        return read(contact.cells, i, contact.count)
+
+    return numbers
 
 
 @kernel
@@ -73,15 +79,8 @@ def _around(cell: Vector, p: Vector) -> Vector:
 
 
 @kernel
-def _map(contact: CellsContact, i: int) -> Vector:
-    """Return xx, xy, yy, x, y of `B = [(xx, xy, x), (xy, yy, y)]`."""
-    c, n = contact.cells, contact.count
-    return c[i], c[n + i], c[2 * n + i], c[3 * n + i], c[4 * n + i]
-
-
-@kernel
 def _seen_by_map(cell: Vector, v: Vector) -> Vector:
-    xx, xy, yy, x, y = cell
+    xx, xy, yy, x, y = cell  # B = [(xx, xy, x), (xy, yy, y)]
     return xx * v[0] + xy * v[1] + x * v[2], xy * v[0] + yy * v[1] + y * v[2]
 
 
@@ -101,10 +100,10 @@ def _around_by_map(cell: Vector, p: Vector) -> Vector:
 
 
 @kernel
-def law_of_all(contact: CellsContact, i: int, v: Doubles) -> LawNumbers:
+def law_of_all(contact: CellsContact, i: int) -> LawNumbers:
     """Return the law that all cells share."""
     return contact.law
 
 
-POSITIONS = Lever(_place, _seen, _wrench, _around, law_of_all)
-LEVERS = Lever(_map, _seen_by_map, _wrench_by_map, _around_by_map, law_of_all)
+POSITIONS = Lever(numbers_of(2), _seen, _wrench, _around, law_of_all)
+LEVERS = Lever(numbers_of(5), _seen_by_map, _wrench_by_map, _around_by_map, law_of_all)

@@ -28,13 +28,10 @@ from planarfriction.kernels.cell_blocks import (
     lever_at,
     totals,
 )
-from planarfriction.kernels.law import law_of
+from planarfriction.kernels.law import PARAMETERS, law_of
 from planarfriction.kernels.rollouts import Bars, Inputs, row_of
 from planarfriction.kernels.settle import factor_at, softening, stiffened
-from planarfriction.kernels.vectors import Vector, add, plus, scatter, three, times
-
-PARAMETERS = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
-"""Numbers of the law that derivatives are taken by."""
+from planarfriction.kernels.vectors import Vector, add, clear, copy, plus, scatter, three, times
 
 COLUMNS = tuple(LawNumbers._fields.index(name) for name in PARAMETERS)
 """Places of `PARAMETERS` in a row."""
@@ -53,11 +50,8 @@ def _lay(w: Doubles, blocks: int, levers: np.ndarray, numbers: int = BLOCK) -> N
     """Write the numbers of the levers, states of zero and no cotangents."""
     per_block = levers.shape[0] // blocks
     for k in range(blocks):
-        block = at(w, k * numbers)
-        for i in range(numbers):
-            block[i] = 0.0
-        for i in range(per_block):
-            block[i] = levers[k * per_block + i]
+        clear(at(w, k * numbers), numbers)
+        copy(at(pointer(levers), k * per_block), at(w, k * numbers), per_block)
 
 
 @kernel
@@ -85,9 +79,7 @@ def _read(w: Doubles, field: int, values: np.ndarray, n: int, size: int, numbers
 @kernel
 def _forget(w: Doubles, blocks: int, field: int, size: int) -> None:
     for k in range(blocks):
-        block = at(w, k * BLOCK + field)
-        for i in range(size * LANES):
-            block[i] = 0.0
+        clear(at(w, k * BLOCK + field), size * LANES)
 
 
 @kernel
@@ -374,18 +366,6 @@ def tangent(
 # ---------------------------------------------------------------------- bound to kinds of cells
 
 
-class CellRollouts(NamedTuple):
-    """Entry points of a kind of cells."""
-
-    rollout: Any
-    gradient: Any
-    tangent: Any
-    shares: Any
-
-
-def bound(kind: Kind, name: str) -> CellRollouts:
+def bound(kind: Kind, name: str) -> list:
     """Return the entry points of a kind of cells."""
-    return CellRollouts(*(bind(each, f"{name}_{each.__name__}", jit, kind=kind) for each in TEMPLATES))
-
-
-TEMPLATES = rollout, gradient, tangent, shares
+    return [bind(each, f"{name}_{each.__name__}", jit, kind=kind) for each in (rollout, gradient, tangent, shares)]

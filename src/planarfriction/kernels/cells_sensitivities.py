@@ -21,7 +21,7 @@ from planarfriction.kernels.forward import forwards
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rollouts import Derivatives, row_of
 from planarfriction.kernels.settle import factor_at, stiffened
-from planarfriction.kernels.vectors import Vector, add, plus, scatter, three
+from planarfriction.kernels.vectors import Vector, add, clear, plus, scatter, three
 
 _MOVING = "sigma_0", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
 PARAMETERS = (*_MOVING, "sigma_1", "sigma_2")
@@ -103,10 +103,8 @@ def _total(kind: Kind, block: Doubles, lanes: int, load: float, n: int) -> Vecto
 
 @kernel
 def _forget(block: Doubles) -> None:
-    for i in range(3 * LANES):
-        block[Z + i] = 0.0
-    for i in range(_CHANGE, _PULL):
-        block[i] = 0.0
+    clear(at(block, Z), 3 * LANES)
+    clear(at(block, _CHANGE), _PULL - _CHANGE)
 
 
 @kernel

@@ -14,18 +14,12 @@ import numpy as np
 
 from planarfriction.compiler import entry, kernel
 from planarfriction.compiler.calls import address_of
-from planarfriction.compiler.memory import Doubles, Integers, Layout
+from planarfriction.compiler.memory import Doubles, Integers, Layout, reader, row_of
 from planarfriction.kernels.bind import bind
-from planarfriction.kernels.vectors import Vector, plus, times
+from planarfriction.kernels.vectors import Vector, clear, plus, times
 
 WORLD, BODY, BODY_AXES = 0, 1, 2
 """Fixed to the world; fixed to the body; fixed to a body whose prescribed velocity is given in its own axes."""
-
-EVALUATE, LINEARISE, FACTOR, ELIMINATE, BACK_SUBSTITUTE, CHANGE, SOLVE_TRANSPOSED, PULL_BACK = range(8)
-"""Columns of `Contacts.calls`; derivatives of scenes need `CHANGE` and the following."""
-
-CALLS = 8
-"""Number of columns of `Contacts.calls`."""
 
 
 class Rows(NamedTuple):
@@ -94,19 +88,32 @@ class ModelFunctions(NamedTuple):
     `rows.d_twist`."""
 
 
+class Addresses(NamedTuple):
+    """Addresses of `ModelFunctions`; 0 of those that are not wanted."""
+
+    evaluate: int
+    linearise: int
+    factor: int
+    eliminate: int
+    back_substitute: int
+    change: int = 0
+    """This and the following are for derivatives of scenes."""
+    solve_transposed: int = 0
+    pull_back: int = 0
+
+
+addresses_at = reader(Addresses)
+CALLS = len(Addresses._fields)
+
+
 def functions_of(name: str, templates: tuple, **model: Any) -> ModelFunctions:
     """Return the functions of a model, entry points `<name>_<template>`: templates that are bound to its argument."""
     return ModelFunctions(*(bind(each, f"{name}_{each.__name__}", entry, **model) for each in templates))
 
 
 def calls_of(functions: ModelFunctions, *, change: bool = False) -> np.ndarray:
-    """Return the addresses of the functions of a model, compiled or read from the cache, [8].
-
-    Those from `change` on are 0 unless asked for.
-    """
-    wanted = functions if change else functions[:CHANGE]
-    addresses = [address_of(each) if each else 0 for each in wanted]
-    return np.array(addresses + [0] * (CALLS - len(addresses)), np.int64)
+    """Return the words of `Addresses` of compiled functions of a model, those from `change` on if asked for."""
+    return row_of(Addresses(*(address_of(each) if each else 0 for each in functions[: None if change else 5])))
 
 
 @kernel
@@ -118,8 +125,8 @@ def traction(law: Any, z: Vector, rate: Vector, u: Vector) -> Vector:
 class Contacts(NamedTuple):
     """C contacts and the R shapes they take."""
 
-    calls: Integers
-    """Addresses of each contact's `ModelFunctions`, [C, 8]."""
+    calls: Doubles
+    """Words of the `Addresses` of the functions of each contact, [C, 8]."""
     record: Integers
     """Addresses of the records of contacts, one for each shape, [R]."""
     mount: Integers
@@ -156,8 +163,8 @@ def contact_map(mount: int, place: Doubles, pose: Doubles, a: Doubles) -> None:
 @kernel
 def contact_map_slopes(mount: int, a: Doubles, u: Doubles, w: Doubles, g: Doubles, h: Doubles) -> None:
     """Write `G = d(A u)/d pose` and `H = d(A' W)/d pose` into `g` and `h` [3, 3]."""
-    for i in range(9):
-        g[i], h[i] = 0.0, 0.0
+    clear(g, 9)
+    clear(h, 9)
     if mount == WORLD:
         # the lever arm shortens as the body moves; world axes of the force
         fx, fy = a[0] * w[0] + a[3] * w[1], a[1] * w[0] + a[4] * w[1]

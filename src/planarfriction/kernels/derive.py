@@ -55,7 +55,10 @@ class Walk:
         self.steps: list[Step] = []
         self.results: list[str] = []
         self.count = 0
-        definition = self._definition()
+        try:
+            definition = definition_of(self.function)
+        except OSError as error:
+            raise NotStraightError(f"{self.where}: there is no source to write derivatives from") from error
         self.arguments = [each.arg for each in definition.args.args]
         self.first = {name: self._new(name) for name in self.arguments}
         self.known = dict(self.first)
@@ -65,12 +68,6 @@ class Walk:
             self._statement(statement)
         if not self.results:
             raise self._refusal(definition, "has no return")
-
-    def _definition(self) -> ast.FunctionDef:
-        try:
-            return definition_of(self.function)
-        except OSError as error:
-            raise NotStraightError(f"{self.where}: there is no source to write derivatives from") from error
 
     def _refusal(self, node: ast.AST, why: str) -> NotStraightError:
         text = ast.unparse(node).splitlines()[0]
@@ -187,23 +184,20 @@ class Walk:
         if self.vectors.intersection(atoms):
             raise self._refusal(node, "is of vectors: use `plus`, `times`, `dot`")
         if isinstance(node.op, ast.Div) and atoms[1] in self.active:
-            return self._quotient(*atoms)
+            atoms.append(self.emit(f"1.0 / {atoms[1]}"))
+            return self._taken([self.emit(f"{atoms[0]} * {atoms[2]}")], atoms, QUOTIENT)[0]
         target = self.emit(text.format(*atoms))
         return self._taken([target], atoms, RULES[type(node.op)])[0]
-
-    def _quotient(self, above: str, below: str) -> str:
-        inverse = self.emit(f"1.0 / {below}")
-        return self._taken([self.emit(f"{above} * {inverse}")], [above, below, inverse], QUOTIENT)[0]
 
     def _vector(self, items: list[str]) -> str:
         target = self.emit(f"({', '.join(items)},)")
         pulls = {i: f"{{b}}[{i}]" for i in range(len(items))}
         pushes = {i: "(" + ", ".join("{d}" if i == j else "0.0" for j in range(len(items))) + ",)" for i in pulls}
-        return self._taken([target], items, Rule("v", {}, pulls, {}, pushes))[0]
+        return self._taken([target], items, Rule("v", {}, pulls, pushes))[0]
 
     def _item(self, vector: str, i: int) -> str:
         target = self.emit(f"{vector}[{i}]")
-        how = Rule("s", {}, {0: f"placed({{0}}, {i}, {{b}})"}, {}, {0: f"{{d}}[{i}]"})
+        how = Rule("s", {}, {0: f"placed({{0}}, {i}, {{b}})"}, {0: f"{{d}}[{i}]"})
         return self._taken([target], [vector], how)[0]
 
     def _taken(self, targets: list[str], atoms: list[str], how: Rule | Derivative) -> list[str]:
@@ -333,8 +327,7 @@ class _WayBack:
         tape, name = self.walk.keep_tape(step, inner)
         pulled = self.emit(f"{name}({tape}, ({''.join(bar + ', ' for bar in bars if bar)}))", "bars")
         for i, path in enumerate(inner.by):
-            head, dot, rest = path.partition(".")
-            self._add(step.atoms[inner.arguments.index(head)] + dot + rest, f"{pulled}[{i}]")
+            self._add(inner.place(step, path), f"{pulled}[{i}]")
 
 
 class Derivative(NamedTuple):
@@ -353,6 +346,11 @@ class Derivative(NamedTuple):
     """Return the results and a tape, from the arguments of the function."""
     back: Any
     """Return the cotangents of `by`, from the tape and a tuple of the cotangents of the `live` results."""
+
+    def place(self, step: Step, path: str) -> str:
+        """Return the name of an argument, or of a field of one, that a step gives to this function."""
+        head, dot, rest = path.partition(".")
+        return step.atoms[self.arguments.index(head)] + dot + rest
 
 
 @functools.cache

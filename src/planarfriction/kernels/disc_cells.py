@@ -7,19 +7,13 @@ metric the map L of the cell turns the first two, and a is the radius in the spa
 from __future__ import annotations
 
 from planarfriction.compiler import kernel
-from planarfriction.kernels.cells import CellsContact, Lever, law_of_all
+from planarfriction.kernels.cells import Lever, law_of_all, numbers_of
 from planarfriction.kernels.vectors import Vector, dot
 
 
 @kernel
-def _place(contact: CellsContact, i: int) -> Vector:
-    """Return x, y and kappa a."""
-    return contact.cells[i], contact.cells[contact.count + i], contact.cells[2 * contact.count + i]
-
-
-@kernel
 def _seen(cell: Vector, v: Vector) -> Vector:
-    x, y, a = cell
+    x, y, a = cell  # a is kappa times the radius
     return v[0] - v[2] * y, v[1] + v[2] * x, a * v[2]
 
 
@@ -37,15 +31,8 @@ def _around(cell: Vector, p: Vector) -> Vector:
 
 
 @kernel
-def _map(contact: CellsContact, i: int) -> Vector:
-    """Return xx, xy, yy, x, y, kappa a of `B = [(xx, xy, x), (xy, yy, y), (0, 0, kappa a)]`."""
-    c, n = contact.cells, contact.count
-    return c[i], c[n + i], c[2 * n + i], c[3 * n + i], c[4 * n + i], c[5 * n + i]
-
-
-@kernel
 def _seen_by_map(cell: Vector, v: Vector) -> Vector:
-    xx, xy, yy, x, y, a = cell
+    xx, xy, yy, x, y, a = cell  # B = [(xx, xy, x), (xy, yy, y), (0, 0, kappa a)]
     return xx * v[0] + xy * v[1] + x * v[2], xy * v[0] + yy * v[1] + y * v[2], a * v[2]
 
 
@@ -68,5 +55,5 @@ def _around_by_map(cell: Vector, p: Vector) -> Vector:
     )  # fmt: skip
 
 
-POSITIONS = Lever(_place, _seen, _wrench, _around, law_of_all)
-LEVERS = Lever(_map, _seen_by_map, _wrench_by_map, _around_by_map, law_of_all)
+POSITIONS = Lever(numbers_of(3), _seen, _wrench, _around, law_of_all)
+LEVERS = Lever(numbers_of(6), _seen_by_map, _wrench_by_map, _around_by_map, law_of_all)

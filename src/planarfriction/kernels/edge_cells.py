@@ -16,18 +16,9 @@ from typing import NamedTuple
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, kernel
 from planarfriction.compiler.calls import call
-from planarfriction.compiler.memory import Doubles, Integers, Layout, Place, arrays_at, at, reader
-from planarfriction.kernels.contacts import (
-    BACK_SUBSTITUTE,
-    ELIMINATE,
-    EVALUATE,
-    FACTOR,
-    LINEARISE,
-    SEEN,
-    ModelFunctions,
-    Seen,
-)
-from planarfriction.kernels.vectors import Vector
+from planarfriction.compiler.memory import Doubles, Layout, Place, arrays_at, at, reader
+from planarfriction.kernels.contacts import SEEN, Addresses, ModelFunctions, Seen
+from planarfriction.kernels.vectors import Vector, copy
 
 # Share of its area below which nothing of a disc is covered, and above which all is: rounding makes 1e-15 of it.
 _NONE, _ALL = 1e-9, 1.0 - 1e-9
@@ -71,8 +62,8 @@ class EdgeContact(NamedTuple):
     """Address of the record of the cells anywhere else, whose arrays follow."""
     trial_weights: Doubles
     trial_cells: Doubles
-    calls: Integers
-    """Addresses of the functions of the cells, [8]."""
+    calls: Addresses
+    """Addresses of the functions of the cells."""
     states: int
     """Number of states of the bristles."""
     rate: Doubles
@@ -152,8 +143,7 @@ def _cover(record: EdgeContact, place: Vector, weights: Doubles, cells: Doubles)
     x, y = cos * dx + sin * dy, cos * dy - sin * dx
     if covered_part(record.outline, record.corners, x, y, middle[2])[0] == 1.0:
         return 1.0
-    for i in range(record.numbers * n):
-        cells[i] = record.cells[i]
+    copy(record.cells, cells, record.numbers * n)
     total, borne, lever = 0.0, 0.0, 3 if record.turned else 0
     for i in range(n):
         dx, dy = record.x[i] - bx, record.y[i] - by
@@ -188,7 +178,7 @@ def evaluate(contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles) 
     record, seen = read(contact), arrays_at(SEEN, v)
     share = _cover(record, _place(seen, 0.0, 0.0, 0.0), record.trial_weights, record.trial_cells)
     seen.covered[0] = share
-    call(record.calls[EVALUATE], (record.whole if share == 1.0 else record.trial, z, v, zdot, w))
+    call(record.calls.evaluate, (record.whole if share == 1.0 else record.trial, z, v, zdot, w))
 
 
 @entry
@@ -198,7 +188,7 @@ def linearise(contact: Place, z: Doubles, v: Doubles, lin: Doubles) -> None:
     share = _cover(record, _place(seen, 0.0, 0.0, 0.0), record.held_weights, record.held_cells)
     m.share[0] = share
     cells = record.whole if share == 1.0 else record.held
-    call(record.calls[LINEARISE], (cells, z, v, at(lin, OWN)))
+    call(record.calls.linearise, (cells, z, v, at(lin, OWN)))
     if share == 1.0:
         return
     for j in range(3):
@@ -208,7 +198,7 @@ def linearise(contact: Place, z: Doubles, v: Doubles, lin: Doubles) -> None:
             moved = _place(seen, by if j == 0 else 0.0, by if j == 1 else 0.0, by if j == 2 else 0.0)
             share = _cover(record, moved, record.trial_weights, record.trial_cells)
             cells, per = record.whole if share == 1.0 else record.trial, 0.5 / by
-            call(record.calls[EVALUATE], (cells, z, v, record.rate, record.wrench))
+            call(record.calls.evaluate, (cells, z, v, record.rate, record.wrench))
             for i in range(3):
                 m.slopes[3 * i + j] = per * record.wrench[i] + (m.slopes[3 * i + j] if side == 1 else 0.0)
             for i in range(record.states):
@@ -225,9 +215,9 @@ def _cells(record: EdgeContact, lin: Doubles) -> Place:
 def factor(contact: Place, z: Doubles, shift: float, lin: Doubles, stiffness: Doubles) -> None:
     """Prepare D, and write the stiffness, and the slopes by the place behind it."""
     record, m, w = read(contact), arrays_at(_PLACES, lin), read(contact).wrench
-    call(record.calls[FACTOR], (_cells(record, lin), z, shift, at(lin, OWN), stiffness))
+    call(record.calls.factor, (_cells(record, lin), z, shift, at(lin, OWN), stiffness))
     for j in range(0 if m.share[0] == 1.0 else 3):
-        call(record.calls[ELIMINATE], (record.held, z, shift, at(record.by_place, j * record.states), at(lin, OWN), w))
+        call(record.calls.eliminate, (record.held, z, shift, at(record.by_place, j * record.states), at(lin, OWN), w))
         for i in range(3):
             stiffness[9 + 3 * i + j] = m.slopes[3 * i + j] + w[i]
 
@@ -236,7 +226,7 @@ def factor(contact: Place, z: Doubles, shift: float, lin: Doubles, stiffness: Do
 def eliminate(contact: Place, z: Doubles, shift: float, r: Doubles, lin: Doubles, w: Doubles) -> None:
     """Write the wrench that a residual causes."""
     record = read(contact)
-    call(record.calls[ELIMINATE], (_cells(record, lin), z, shift, r, at(lin, OWN), w))
+    call(record.calls.eliminate, (_cells(record, lin), z, shift, r, at(lin, OWN), w))
 
 
 @entry
@@ -248,7 +238,7 @@ def back_substitute(contact: Place, z: Doubles, r: Doubles, dv: Doubles, lin: Do
         for j in range(3):
             record.rate[i] += dv[3 + j] * by_place[j * record.states + i]
     right = record.rate if partly else r
-    call(record.calls[BACK_SUBSTITUTE], (_cells(record, lin), z, right, dv, at(lin, OWN), out))
+    call(record.calls.back_substitute, (_cells(record, lin), z, right, dv, at(lin, OWN), out))
 
 
 FUNCTIONS = ModelFunctions(evaluate, linearise, factor, eliminate, back_substitute)

@@ -20,19 +20,8 @@ from typing import NamedTuple
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, kernel
 from planarfriction.compiler.calls import call
-from planarfriction.compiler.memory import Doubles, Integers, Layout, Place, arrays_at, at, reader
-from planarfriction.kernels.contacts import (
-    BACK_SUBSTITUTE,
-    CHANGE,
-    ELIMINATE,
-    EVALUATE,
-    FACTOR,
-    LINEARISE,
-    PULL_BACK,
-    ROWS,
-    SOLVE_TRANSPOSED,
-    ModelFunctions,
-)
+from planarfriction.compiler.memory import Doubles, Layout, Place, arrays_at, at, reader
+from planarfriction.kernels.contacts import ROWS, Addresses, ModelFunctions
 from planarfriction.kernels.tilt import SOFTNESS, tilt
 from planarfriction.kernels.vectors import Vector, plus, put, three, times
 
@@ -53,8 +42,8 @@ class FollowingContact(NamedTuple):
     slope_x: Doubles
     """Relative slopes of weights by the centre of pressure, while all cells press [1/m], [n]."""
     slope_y: Doubles
-    calls: Integers
-    """Addresses of the functions of the cells, [8]."""
+    calls: Addresses
+    """Addresses of the functions of the cells."""
     cells: int
     """Address of the record of the cells with the weights `pressed`."""
     trial_cells: int
@@ -167,7 +156,7 @@ def evaluate(contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles) 
     """Write z' and the wrench."""
     record = read(contact)
     _press(record, z, record.trial)
-    call(record.calls[EVALUATE], (record.trial_cells, z, v, zdot, w))
+    call(record.calls.evaluate, (record.trial_cells, z, v, zdot, w))
     _pulls_to(record, z, w, zdot)
 
 
@@ -175,26 +164,24 @@ def evaluate(contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles) 
 def linearise(contact: Place, z: Doubles, v: Doubles, lin: Doubles) -> None:
     """Hold the weights, write K and p, and linearise the cells; a wrench is linear in the weights."""
     record, m = read(contact), arrays_at(_PLACES, lin)
-    if _press(record, z, record.pressed):
-        _slopes(record, record.pressed, 1.0, 0.0, record.trial)
-        call(record.calls[EVALUATE], (record.trial_cells, z, v, record.scratch, m.by_x))
-        _slopes(record, record.pressed, 0.0, 1.0, record.trial)
-    else:
-        for i in range(record.count):
-            record.trial[i] = record.weights[i] * record.slope_x[i]
-        call(record.calls[EVALUATE], (record.trial_cells, z, v, record.scratch, m.by_x))
-        for i in range(record.count):
-            record.trial[i] = record.weights[i] * record.slope_y[i]
-    call(record.calls[EVALUATE], (record.trial_cells, z, v, record.scratch, m.by_y))
+    lifts = _press(record, z, record.pressed)
+    for j in range(2):
+        slope = record.slope_x if j == 0 else record.slope_y
+        if lifts:
+            _slopes(record, record.pressed, 1.0 - j, float(j), record.trial)
+        else:
+            for i in range(record.count):
+                record.trial[i] = record.weights[i] * slope[i]
+        call(record.calls.evaluate, (record.trial_cells, z, v, record.scratch, m.by_x if j == 0 else m.by_y))
     m.centre[0], m.centre[1] = _centre(record, z)
-    call(record.calls[LINEARISE], (record.cells, z, v, at(lin, OWN)))
+    call(record.calls.linearise, (record.cells, z, v, at(lin, OWN)))
 
 
 @entry
 def factor(contact: Place, z: Doubles, shift: float, lin: Doubles, stiffness: Doubles) -> None:
     """Prepare D, and write the stiffness."""
     record, m, s = read(contact), arrays_at(_PLACES, lin), stiffness
-    call(record.calls[FACTOR], (record.cells, z, shift, at(lin, OWN), s))
+    call(record.calls.factor, (record.cells, z, shift, at(lin, OWN), s))
     h, one = record.height, 1.0 + shift * record.lag
     xx, xy, yx, yy = one + h * m.by_x[0], h * m.by_y[0], h * m.by_x[1], one + h * m.by_y[1]
     per = xx * yy - xy * yx
@@ -211,7 +198,7 @@ def factor(contact: Place, z: Doubles, shift: float, lin: Doubles, stiffness: Do
 def eliminate(contact: Place, z: Doubles, shift: float, r: Doubles, lin: Doubles, w: Doubles) -> None:
     """Write the wrench that a residual causes."""
     record, m = read(contact), arrays_at(_PLACES, lin)
-    call(record.calls[ELIMINATE], (record.cells, z, shift, r, at(lin, OWN), w))
+    call(record.calls.eliminate, (record.cells, z, shift, r, at(lin, OWN), w))
     m.residual[0], m.residual[1] = w[0], w[1]
     a, b = _solved(record, m, r, w[0], w[1])
     put(w, plus(three(w), 1.0, _by_pressure(m, a, b)))
@@ -221,7 +208,7 @@ def eliminate(contact: Place, z: Doubles, shift: float, r: Doubles, lin: Doubles
 def back_substitute(contact: Place, z: Doubles, r: Doubles, dv: Doubles, lin: Doubles, out: Doubles) -> None:
     """Solve for the states, after `eliminate` of the same residual."""
     record, m = read(contact), arrays_at(_PLACES, lin)
-    call(record.calls[BACK_SUBSTITUTE], (record.cells, z, r, dv, at(lin, OWN), out))
+    call(record.calls.back_substitute, (record.cells, z, r, dv, at(lin, OWN), out))
     x, y = m.residual[0], m.residual[1]
     for j in range(3):
         x, y = x + m.stiffness[j] * dv[j], y + m.stiffness[3 + j] * dv[j]
@@ -235,7 +222,7 @@ def change(
 ) -> None:  # fmt: skip
     """Write the changes of z' and of the wrench; in a patch that has grown, p is nearer to the middle."""
     record, changes, m = read(contact), arrays_at(ROWS, rows), arrays_at(_PLACES, lin)
-    call(record.calls[CHANGE], (record.cells, z, zdot, at(lin, OWN), dz, dzdot, rows, friction, size))
+    call(record.calls.change, (record.cells, z, zdot, at(lin, OWN), dz, dzdot, rows, friction, size))
     n = record.states
     by_pressure = _by_pressure(m, dz[n] - size * m.centre[0], dz[n + 1] - size * m.centre[1])
     put(changes.d_wrench, plus(three(changes.d_wrench), 1.0, by_pressure))
@@ -250,10 +237,10 @@ def solve_transposed(contact: Place, z: Doubles, r: Doubles, lin: Doubles, out: 
     a, b = r[n], r[n + 1]
     a, b = record.lag * (m.inverse[0] * a + m.inverse[2] * b), record.lag * (m.inverse[1] * a + m.inverse[3] * b)
     put(rows.d_wrench, times(-record.height / record.lag, (a, b, 0.0)))
-    call(record.calls[PULL_BACK], (record.cells, z, at(lin, OWN), record.zero, record.rows, record.scratch))
+    call(record.calls.pull_back, (record.cells, z, at(lin, OWN), record.zero, record.rows, record.scratch))
     for i in range(n):
         record.scratch[i] += r[i]
-    call(record.calls[SOLVE_TRANSPOSED], (record.cells, z, record.scratch, at(lin, OWN), out))
+    call(record.calls.solve_transposed, (record.cells, z, record.scratch, at(lin, OWN), out))
     out[n], out[n + 1] = a, b
 
 
@@ -265,7 +252,7 @@ def pull_back(contact: Place, z: Doubles, lin: Doubles, dzdot: Doubles, rows: Do
     per = 1.0 / record.lag
     wrench = plus(d_wrench, -per * record.height, (dzdot[n], dzdot[n + 1], 0.0))
     put(changes.d_wrench, wrench)
-    call(record.calls[PULL_BACK], (record.cells, z, at(lin, OWN), dzdot, rows, out))
+    call(record.calls.pull_back, (record.cells, z, at(lin, OWN), dzdot, rows, out))
     put(changes.d_wrench, d_wrench)
     out[n], out[n + 1] = -per * dzdot[n], -per * dzdot[n + 1]
     for i in range(3):

@@ -98,7 +98,7 @@ class _Changes:
                 direction[target] = self._emit(added)
 
     def _by_function(self, step: Step, inner: Derivative) -> None:
-        places = {path: _place(step, inner, path) for path in inner.by}
+        places = {path: inner.place(step, path) for path in inner.by}
         inputs = [
             {path: direction[place] for path, place in places.items() if place in direction} for direction in self.of
         ]
@@ -114,9 +114,3 @@ class _Changes:
                     direction[target] = targets[-1]
         changes = [change for each in inputs for change in each.values()]
         self.lines.append(f"{', '.join(targets)} = {name}({', '.join([*step.atoms, *changes])})")
-
-
-def _place(step: Step, inner: Derivative, path: str) -> str:
-    """Return the name of an argument, or of a field of one, that a step gives to an inner function."""
-    head, dot, rest = path.partition(".")
-    return step.atoms[inner.arguments.index(head)] + dot + rest

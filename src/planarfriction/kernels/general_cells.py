@@ -1,4 +1,4 @@
-"""A contact of n cells whose bristles follow any law, `z' = f(z, u)` with the traction `t(z, u)` (see `Bristle`).
+"""A contact of n cells, cell by cell, whose bristles follow any law, `z' = f(z, u)` with the traction `t(z, u)`.
 
 A bristle has d components, two of a point or three of a disc; the state of the contact is `z [d, n]`. With `u = B V`
 of a cell (see `cells.Lever`) and the derivatives `A = df/dz`, `F = df/du`, `C = dt/dz`, `E = dt/du`, each [d, d],
@@ -53,34 +53,27 @@ class CellSlopes(NamedTuple):
 
 
 class Bristle(NamedTuple):
-    """Compiled functions of a bristle of d components; `law` comes from `Lever.law`."""
+    """Compiled functions of bristles of d components."""
 
-    evaluate: Any
-    """`(law, z, u)`: return z' and the traction."""
-    linearise: Any
-    """`(law, z, u)`: return z' and the traction with their derivatives, as `CellSlopes`."""
-    linearise_step: Any
-    """`(law, z, u, dt)`: return the bristle and its traction after dt with their derivatives."""
     size: int
     """d"""
     vector: Any
     """`(row, first, stride)`: return d numbers."""
     matrix: Any
     """`(row, first, stride)`: return d^2 numbers."""
-    add_diagonal: Any
-    """`(a, x)`: return `A + x I`."""
+    identity: tuple
+    """Identity matrix [d, d], row by row."""
     inverse: Any
     """`(shift, a)`: return the inverse of `shift I - A`."""
     linear: bool
     """True if the traction is `-(sigma_0 z + sigma_1 z' + sigma_2 u)`: C and E then follow from A and F."""
 
 
-def bristle(evaluate: Any, step: Any, size: int = 2, linear: bool = False) -> Bristle:
-    """Return the functions of a bristle, with the derivatives that `derive` writes."""
-    linearise = slopes_of(evaluate, size) if evaluate else None  # not needed for steps alone, nor steps for rates
+def bristle(size: int, linear: bool) -> Bristle:
+    """Return the functions of a bristle of two or three components."""
+    identity = tuple(float(i % (size + 1) == 0) for i in range(size * size))
     readers = reader_of(size), reader_of(size * size)
-    of_step = slopes_of(step, size) if step else None
-    return Bristle(evaluate, linearise, of_step, size, *readers, *_ALGEBRA[size], linear)
+    return Bristle(size, *readers, identity, inverse if size == 3 else _inverse_2, linear)
 
 
 def slopes_of(function: Any, size: int) -> Any:
@@ -116,51 +109,9 @@ def _inverse_2(shift: float, m: Vector) -> Vector:
 
 
 @kernel
-def _add_diagonal_2(a: Vector, x: float) -> Vector:
-    return a[0] + x, a[1], a[2], a[3] + x
-
-
-@kernel
-def _add_diagonal_3(a: Vector, x: float) -> Vector:
-    return a[0] + x, a[1], a[2], a[3], a[4] + x, a[5], a[6], a[7], a[8] + x
-
-
-_ALGEBRA = {2: (_add_diagonal_2, _inverse_2), 3: (_add_diagonal_3, inverse)}
-
-
-@kernel
 def _matrix(bristle: Bristle, lin: Doubles, which: int, i: int, n: int) -> Vector:
     """Return a matrix of cell i."""
     return bristle.matrix(lin, which * bristle.size * bristle.size * n + i, n)
-
-
-def evaluate(
-    contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, *, lever: Lever, bristle: Bristle, read: Any
-) -> None:
-    """Write `z'`, and `W`."""
-    record, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
-    n = record.count
-    for i in range(n):
-        cell = lever.of(record, i)
-        rate, t = bristle.evaluate(lever.law(record, i, v), bristle.vector(z, i, n), lever.seen(cell, twist))
-        scatter(zdot, i, n, rate)
-        total = plus(total, record.weights[i], lever.wrench(cell, t))
-    put(w, total)
-
-
-def linearise(
-    contact: Place, z: Doubles, v: Doubles, lin: Doubles, *, lever: Lever, bristle: Bristle, read: Any
-) -> None:
-    """Write A, F, C and E of each cell."""
-    record, twist = read(contact), three(v)
-    n = record.count
-    for i in range(n):
-        u = lever.seen(lever.of(record, i), twist)
-        linear = bristle.linearise(lever.law(record, i, v), bristle.vector(z, i, n), u)
-        scatter(lin, i, n, (linear.new_z, linear.new_u))
-        if not bristle.linear:
-            place = C * bristle.size * bristle.size * n + i
-            scatter(lin, place, n, (linear.traction_z, linear.traction_u))
 
 
 def factor(
@@ -176,7 +127,7 @@ def factor(
         driven = matrix_product(inverse, _matrix(bristle, lin, F, i, n))
         if bristle.linear:
             pull = record.law.sigma_0 + record.law.sigma_1 * shift
-            p = bristle.add_diagonal(times(-pull, driven), -record.law.sigma_2)
+            p = plus(times(-pull, driven), -record.law.sigma_2, bristle.identity)
         else:
             p = plus(matrix_product(_matrix(bristle, lin, C, i, n), driven), 1.0, _matrix(bristle, lin, E, i, n))
         total = plus(total, record.weights[i], lever.around(lever.of(record, i), p))
@@ -284,14 +235,14 @@ def _put_cell(
 
 def slopes(
     contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, lever: Lever, bristle: Bristle,
-    read: Any, whole: bool,
+    linearise: Any, read: Any, whole: bool,
 ) -> None:  # fmt: skip
     """Step with the slopes of the wrench, or with all derivatives."""
     record, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
     n, by_twist = record.count, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for i in range(n):
         cell = lever.of(record, i)
-        linear = bristle.linearise_step(lever.law(record, i, v), bristle.vector(z, i, n), lever.seen(cell, twist), dt)
+        linear = linearise(lever.law(record, i), bristle.vector(z, i, n), lever.seen(cell, twist), dt)
         scatter(new, i, n, linear.new)
         total = plus(total, record.weights[i], lever.wrench(cell, linear.traction))
         by_twist = plus(by_twist, record.weights[i], lever.around(cell, linear.traction_u))
@@ -301,4 +252,4 @@ def slopes(
     put_all(at(out, 3), by_twist)
 
 
-RATES = evaluate, linearise, factor, eliminate, back_substitute, change, solve_transposed, pull_back
+FUNCTIONS = factor, eliminate, back_substitute, change, solve_transposed, pull_back

@@ -7,7 +7,7 @@ lean.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
@@ -25,72 +25,50 @@ class Leaning(NamedTuple):
 
 
 @kernel
-def _centre(lean: Leaning, u: Vector) -> Vector:
-    """Compute c of a point."""
-    return times(formulas.stribeck(xp, norm(u), lean.law) / lean.law.sigma_0, lean.a)
+def _in_plane(size: float, a: Vector) -> Vector:
+    return size * a[0], size * a[1], 0.0
 
 
-@kernel
-def _disc_centre(lean: Leaning, u: Vector) -> Vector:
-    """Compute c of a disc."""
-    size = formulas.stribeck(xp, discs.mean_speed(u), lean.law) / lean.law.sigma_0
-    return size * lean.a[0], size * lean.a[1], 0.0
+def _leaning(plain: Any, speed: Any, scaled: Any) -> tuple:
+    """Return functions of a bristle from those of a `plain` one, from its `speed(u)`, and from `scaled(size, a)`.
+
+    `out(lean, z)` returns a bristle as seen from the middle of its limit, c at rest; `within` is as in `settle`.
+    """
+    rate_of, step_of = plain.evaluate, plain.step
+
+    @kernel
+    def centre(lean: Leaning, u: Vector) -> Vector:
+        return scaled(formulas.stribeck(xp, speed(u), lean.law) / lean.law.sigma_0, lean.a)
+
+    @kernel
+    def middle(lean: Leaning) -> Vector:
+        return scaled(lean.law.mu_s / lean.law.sigma_0, lean.a)
+
+    @kernel
+    def out(lean: Leaning, z: Vector) -> Vector:
+        return plus(z, -1.0, middle(lean))
+
+    @kernel
+    def within(lean: Leaning, z: Vector) -> Vector:
+        """Compute `settle.within` of a bristle."""
+        return plus(settle.within(lean.law, out(lean, z)), 1.0, middle(lean))
+
+    @kernel
+    def evaluate(lean: Leaning, z: Vector, u: Vector) -> tuple[Vector, Vector]:
+        """Compute z' and the traction of a bristle that moves at u."""
+        c = centre(lean, u)
+        rate, pull = rate_of(lean.law, plus(z, -1.0, c), u)
+        return rate, plus(pull, -lean.law.sigma_0, c)
+
+    @kernel
+    def step(lean: Leaning, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
+        """Compute the bristle after dt and its traction."""
+        c = centre(lean, u)
+        new, pull = step_of(lean.law, plus(z, -1.0, c), u, dt)
+        return plus(new, 1.0, c), plus(pull, -lean.law.sigma_0, c)
+
+    return out, within, evaluate, step
 
 
-@kernel
-def middle(lean: Leaning) -> Vector:
-    """Compute c of a point at rest, the middle of the limit of its bristle (see `settle`)."""
-    return times(lean.law.mu_s / lean.law.sigma_0, lean.a)
-
-
-@kernel
-def middle_of_disc(lean: Leaning) -> Vector:
-    """Compute c of a disc at rest."""
-    size = lean.law.mu_s / lean.law.sigma_0
-    return size * lean.a[0], size * lean.a[1], 0.0
-
-
-@kernel
-def within(lean: Leaning, z: Vector) -> Vector:
-    """Compute `settle.within` of a point."""
-    c = middle(lean)
-    return plus(settle.within(lean.law, plus(z, -1.0, c)), 1.0, c)
-
-
-@kernel
-def within_disc(lean: Leaning, z: Vector) -> Vector:
-    """Compute `settle.within` of a disc."""
-    c = middle_of_disc(lean)
-    return plus(settle.within(lean.law, plus(z, -1.0, c)), 1.0, c)
-
-
-@kernel
-def evaluate(lean: Leaning, z: Vector, u: Vector) -> tuple[Vector, Vector]:
-    """Compute z' and the traction of a point that moves at u."""
-    c = _centre(lean, u)
-    rate, pull = points.evaluate(lean.law, plus(z, -1.0, c), u)
-    return rate, plus(pull, -lean.law.sigma_0, c)
-
-
-@kernel
-def step(lean: Leaning, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
-    """Compute the bristle after dt and the traction of a point that moves at u."""
-    c = _centre(lean, u)
-    new, pull = points.step(lean.law, plus(z, -1.0, c), u, dt)
-    return plus(new, 1.0, c), plus(pull, -lean.law.sigma_0, c)
-
-
-@kernel
-def evaluate_disc(lean: Leaning, z: Vector, u: Vector) -> tuple[Vector, Vector]:
-    """Compute z' and the traction of a disc that moves at u."""
-    c = _disc_centre(lean, u)
-    rate, pull = discs.evaluate(lean.law, plus(z, -1.0, c), u)
-    return rate, plus(pull, -lean.law.sigma_0, c)
-
-
-@kernel
-def step_disc(lean: Leaning, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
-    """Compute the bristle after dt and the traction of a disc that moves at u."""
-    c = _disc_centre(lean, u)
-    new, pull = discs.step(lean.law, plus(z, -1.0, c), u, dt)
-    return plus(new, 1.0, c), plus(pull, -lean.law.sigma_0, c)
+out, within, evaluate, step = _leaning(points, norm, times)
+out_of_disc, within_disc, evaluate_disc, step_disc = _leaning(discs, discs.mean_speed, _in_plane)

@@ -53,14 +53,15 @@ class Part(NamedTuple):
 
 
 def passes(
-    name: str, block: Block, inputs: Mapping[str, str], stores: Sequence[str], *, count: int, short: int
+    name: str, block: Block, inputs: Mapping[str, str], stores: Sequence[str], division: tuple[int, int]
 ) -> Passes:
-    """Write a traced function of a cell as about `count` passes, which repeat numbers of up to `short` operations.
+    """Write a traced function of a cell as passes.
 
-    `inputs` are the sources of its arguments by their names in the trace: numbers of a cell are read at
-    `[... + i]`, all cells share the others. The first results go to the places `stores`, the others are summed up.
+    `inputs` are the sources of its arguments by their names in the trace: numbers of a cell are read at `[... + i]`,
+    all cells share the others. The first results go to the places `stores`, the others are summed up. `division`: about
+    how many passes there are, and how many operations a number takes at most that they repeat.
     """
-    parts = _parts(block, inputs, stores, count, short)
+    parts = _parts(block, inputs, stores, *division)
     places, rows = _places(parts)
     texts, calls = [], []
     for k, part in enumerate(parts):

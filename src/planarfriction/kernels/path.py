@@ -13,7 +13,7 @@ from planarfriction.kernels.body import read, settle_all
 from planarfriction.kernels.integration import read_run
 from planarfriction.kernels.rosenbrock import PAUSED, PIECE, SINCE, STEPS, advance
 from planarfriction.kernels.sdirk import Workspace
-from planarfriction.kernels.vectors import put, three
+from planarfriction.kernels.vectors import copy, put, three
 
 
 class Path(NamedTuple):
@@ -48,11 +48,6 @@ class Tolerances(NamedTuple):
     """[n]"""
 
 
-def path_for(most: int, n: int) -> Path:
-    """Return memory for the ends of steps (made outside compiled code)."""
-    return Path(np.zeros(most, np.int64), np.zeros(most), np.zeros((most, n)), np.zeros((most, n)))
-
-
 @jit
 def follow(run: Place, path: Path) -> tuple[int, int]:
     """Go on with the run at an address until it ends or `path` is full; return its number of nodes and the outcome."""
@@ -68,16 +63,15 @@ def follow(run: Place, path: Path) -> tuple[int, int]:
             if since == 0.0:
                 settle_all(system, piece, progress.y)
             path.piece[count], path.since[count] = piece, since
-            for i in range(n):
-                path.state[count, i] = progress.y[i]
+            copy(progress.y, path.state[count], n)
         outcome = advance(run, 1)
         if counts[STEPS] == accepted:
             continue
         count += starting
         ended = cursor[PIECE] != piece
         path.piece[count], path.since[count] = piece, breaks[piece + 1] - breaks[piece] if ended else clock[SINCE]
-        for i in range(n):
-            path.rate[count - 1, i], path.state[count, i] = integration.stages.start_rate[i], integration.stages.new[i]
+        copy(integration.stages.start_rate, path.rate[count - 1], n)
+        copy(integration.stages.new, path.state[count], n)
         if ended or outcome != PAUSED or count + 3 > path.piece.shape[0]:  # else the next trial evaluates it
             call(system.rates, (integration.system, piece, path.since[count], path.state[count], path.rate[count]))
         count += 1

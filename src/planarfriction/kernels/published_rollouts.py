@@ -17,10 +17,10 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.law import LAW, law_of
-from planarfriction.kernels.moment_steps import Contact
 from planarfriction.kernels.published_contact import PublishedPatch
 from planarfriction.kernels.published_step import (
     NAMES,
+    Contact,
     HeldTwist,
     PublishedStep,
     hold_slopes,
@@ -31,7 +31,19 @@ from planarfriction.kernels.published_step import (
 )
 from planarfriction.kernels.rollouts import Bars, Derivatives, Inputs, row_of
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
-from planarfriction.kernels.vectors import Vector, accumulate, add, dot, gathered, norm, put, scatter, three, times
+from planarfriction.kernels.vectors import (
+    Vector,
+    accumulate,
+    add,
+    clear,
+    dot,
+    gathered,
+    norm,
+    put,
+    scatter,
+    three,
+    times,
+)
 
 ABREAST = 8
 """Contacts of one loop: the numbers of the longest vectors of processors."""
@@ -211,10 +223,8 @@ def _jacobian(
         unit = (1.0 if i % 3 == 0 else 0.0), (1.0 if i % 3 == 1 else 0.0), (1.0 if i % 3 == 2 else 0.0)
         loaded = 0.0 if i > 2 or load == 0.0 else 1.0
         bar = pull_back(contact, step, slopes, times(loaded, unit), times(load if i > 2 else 0.0, unit))
-        row = out[i]
-        for m in range(row.shape[0]):
-            row[m] = 0.0
-        accumulate(row, 0, 1, (bar.state, bar.twist, dot(unit, step.wrench) if i > 2 else 0.0, bar.law, bar.shape))
+        clear(out[i], out.shape[1])
+        accumulate(out[i], 0, 1, (bar.state, bar.twist, dot(unit, step.wrench) if i > 2 else 0.0, bar.law, bar.shape))
     return step
 
 

@@ -8,21 +8,22 @@ In scaled coordinates, `V_S = S V` at the centre of pressure with `S = diag(1, 1
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import Doubles, Place, reader
+from planarfriction.compiler.memory import Doubles, Place, at, reader
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import bristle_step, moment_steps, published_contact
+from planarfriction.kernels import bristle_step, published_contact
 from planarfriction.kernels.derive import derive
-from planarfriction.kernels.law import grip
-from planarfriction.kernels.moment_steps import Contact, Cotangents, Framed, StepModel
+from planarfriction.kernels.law import PARAMETERS, grip
 from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, per_h, through
 from planarfriction.kernels.steps import step_functions
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
-from planarfriction.kernels.vectors import Vector, applied_back, norm, plus, times
+from planarfriction.kernels.vectors import Vector, applied_back, norm, plus, put, three, times
 
 NAMES = (*LawNumbers._fields, *PublishedPatch._fields)
 """Numbers of a contact, in the order of its row."""
@@ -31,6 +32,26 @@ STILL = 1e-100
 """Scaled speed [m/s] up to which a patch is at rest: its square is a number."""
 
 shape_of = reader(PublishedPatch)
+
+
+class Contact(NamedTuple):
+    """A contact as the functions of a model see it."""
+
+    law: tuple
+    shape: tuple
+    surface: tuple
+    """Kind, offset and size of the limit surface: three integers."""
+    data: np.ndarray
+    """Numbers of the limit surfaces, flat."""
+
+
+class Cotangents(NamedTuple):
+    """Cotangents of all inputs of a step."""
+
+    state: tuple
+    twist: tuple
+    law: tuple
+    shape: tuple
 
 
 class HeldTwist(NamedTuple):
@@ -99,15 +120,7 @@ def _step(
     return after, wrench
 
 
-_BY_LAW = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
-_BY = (
-    "z",
-    "u",
-    "twist",
-    "omega",
-    *(f"law.{name}" for name in _BY_LAW),
-    *(f"shape.{name}" for name in PublishedPatch._fields),
-)
+_BY = "z", "u", "twist", "omega", *(f"law.{n}" for n in PARAMETERS), *(f"shape.{n}" for n in PublishedPatch._fields)
 DERIVATIVE = derive(_step, _BY, ("z", "u", "twist"))
 _forth, _back = DERIVATIVE.forth, DERIVATIVE.back
 
@@ -135,19 +148,17 @@ def pull_back(contact: Contact, step: PublishedStep, slopes: Vector, new: Vector
     )
 
 
-# ---------------------------------------------------------------------- bound to this model
-
-
-MODEL = StepModel(shape_of, hold, hold_slopes, taped_step, pull_back)
+# ---------------------------------------------------------------------- steps of a contact in axes of its own
 
 
 @kernel
 def _spins(record: PublishedContact) -> float:
+    """Return 1; 0 of a point, whose third state has no effect and keeps its value."""
     return xp.where(record.shape.contact_radius > 0.0, 1.0, 0.0)
 
 
 @kernel
-def _read(contact: Place) -> tuple[PublishedContact, Contact]:
+def read(contact: Place) -> tuple[PublishedContact, Contact]:
     """Return the record of a contact, and the contact about its centre of pressure, in the axes of its metric.
 
     A point slides as a patch of any size does that does not spin.
@@ -159,16 +170,46 @@ def _read(contact: Place) -> tuple[PublishedContact, Contact]:
 
 
 @kernel
-def _seen(record: PublishedContact, v: Vector) -> Vector:
+def seen(record: PublishedContact, v: Vector) -> Vector:
+    """Return a twist in these axes."""
     x, y = through(record.root, v[0], v[1])
     return x - record.shape.centre_y * v[2], y + record.shape.centre_x * v[2], _spins(record) * v[2]
 
 
 @kernel
-def _wrench(record: PublishedContact, w: Vector) -> Vector:
+def wrench_of(record: PublishedContact, w: Vector) -> Vector:
+    """Return a wrench in these axes about the origin; a point has no torque."""
     x, y = through(record.root, w[0], w[1])
     return x, y, record.shape.centre_x * w[1] - record.shape.centre_y * w[0] + _spins(record) * w[2]
 
 
-_FRAME = Framed(_read, _seen, _wrench, _spins)
-STEPS = step_functions("published", moment_steps.TEMPLATES, frame=_FRAME, **MODEL._asdict())
+def step(contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles) -> None:
+    """Step a contact (see `steps.StepFunctions`)."""
+    (record, framed), z = read(contact), three(z)
+    spins = _spins(record)
+    done = taped_step(framed, hold(framed, seen(record, three(v))), (z[0], z[1], spins * z[2]), dt)
+    put(new, (done.new[0], done.new[1], spins * done.new[2] + (1.0 - spins) * z[2]))
+    put(out, wrench_of(record, done.wrench))
+
+
+def slopes(
+    contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, pull_back: Any, whole: bool
+) -> None:
+    """Step a contact with the slopes of the wrench, or with all derivatives, the rows of the wrench first."""
+    (record, framed), z = read(contact), three(z)
+    spins = _spins(record)
+    drive, known = hold_slopes(framed, seen(record, three(v)), out)
+    done = taped_step(framed, drive, (z[0], z[1], spins * z[2]), dt)
+    put(new, (done.new[0], done.new[1], spins * done.new[2] + (1.0 - spins) * z[2]))
+    put(out, wrench_of(record, done.wrench))
+    for i in range(6 if whole else 3):
+        unit = (1.0 if i % 3 == 0 else 0.0), (1.0 if i % 3 == 1 else 0.0), (1.0 if i % 3 == 2 else 0.0)
+        of_wrench, (x, y, s) = times(0.0 if i > 2 else 1.0, unit), times(1.0 if i > 2 else 0.0, unit)
+        bar = pull_back(framed, done, known, (x, y, spins * s), seen(record, of_wrench))
+        put(at(out, 3 + 3 * i), wrench_of(record, bar.twist))
+        if whole:
+            x, y, s = plus((bar.state[0], bar.state[1], spins * bar.state[2]), (1.0 - spins) * s, (0.0, 0.0, 1.0))
+            put(at(out, 21 + 3 * i), (x, y, s))
+
+
+STEPS = step_functions("published", (step, slopes), pull_back=pull_back)

@@ -25,7 +25,7 @@ from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, reader
 from planarfriction.kernels import contacts
 from planarfriction.kernels.cell_passes import CellKind, Element
-from planarfriction.kernels.cell_steps import functions_of_kind
+from planarfriction.kernels.cell_steps import rates_of, steps_of
 from planarfriction.kernels.cells import LEVERS, Lever
 from planarfriction.kernels.contacts import ModelFunctions
 from planarfriction.kernels.forward import forward
@@ -106,7 +106,8 @@ def cell_functions(element: Element, law: Any, lever: Lever) -> CellFunctions:
     fields = [("law", law), ("count", int), ("cells", Doubles), ("weights", Doubles)]
     record = NamedTuple(f"{law.__name__}Cells", fields)
     kind = CellKind(element.name, element, lever, 5 if lever is LEVERS else 2, law=law, linear=False)
-    return CellFunctions(record, *functions_of_kind(kind, reader(record)))
+    read = reader(record)
+    return CellFunctions(record, rates_of(kind, read), steps_of(kind, read))
 
 
 def fingerprint(names: Sequence[str], *functions: Callable) -> str:

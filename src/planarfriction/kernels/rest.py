@@ -10,7 +10,7 @@ from planarfriction.compiler.calls import call
 from planarfriction.compiler.memory import Doubles, Place, at
 from planarfriction.kernels.body import SystemRecord, read
 from planarfriction.kernels.integration import RunRecord, read_run
-from planarfriction.kernels.vectors import put, three, times
+from planarfriction.kernels.vectors import copy, put, three, times
 
 # Distance that a body is moved to see whether it rests, in full deflections of the bristles: on that way they go from
 # one side to the other, all but exp(-10) of it. Steps grow from one far below any swing to one that no bristle
@@ -48,8 +48,7 @@ def at_rest(run: Place, piece: int, since: float) -> None:
     verdict[1] = 0.0
     if motion.breaks[piece] < motion.settled or not speed + motion.stop_time * change < motion.stop_speed:
         return
-    for i in range(run.states):
-        y[i] = run.progress.y[i]
+    copy(run.progress.y, y, run.states)
     put(push, (0.0, 0.0, 0.0))
     force = _force(run, system, piece, since)
     put(push, three(at(run.stages.rate, system.bristles) if force > 0.0 else velocity))

@@ -27,7 +27,7 @@ from planarfriction.kernels.rest import at_rest, speed_of
 from planarfriction.kernels.small_matrices import applied
 from planarfriction.kernels.springs import spring_drift
 from planarfriction.kernels.step_control import MOTION, fitted, growth
-from planarfriction.kernels.vectors import Vector, applied_back, norm, plus, put, three, times
+from planarfriction.kernels.vectors import Vector, applied_back, clear, copy, norm, plus, put, three, times
 
 DONE, PAUSED, STEP_TOO_SMALL, AT_REST, APART = range(5)
 """Outcomes of `advance`."""
@@ -90,19 +90,16 @@ def _record(run: RunRecord, system: SystemRecord, piece: int, since: float, stat
     """Write the next sample from a state."""
     out, m = run.output, run.progress.cursor[SAMPLE]
     call(system.rates, (run.system, piece, since, state, run.stages.rate))
-    for i in range(6):
-        out.body[6 * m + i] = state[system.bristles + i]
+    copy(at(state, system.bristles), at(out.body, 6 * m), 6)
     for c in range(system.size):
         load, row = load_of(system, piece, since, c), m * system.size + c
         load = load if system.work.covered[c] > 0.0 else 0.0
         out.load[row] = load
         put(at(out.wrench, 3 * row), times(load, three(at(system.work.wrench, 3 * c))))
     if exists(out.bristles):
-        for i in range(system.bristles):
-            out.bristles[m * system.bristles + i] = state[i]
+        copy(state, at(out.bristles, m * system.bristles), system.bristles)
     if exists(out.pressure):
-        for i in range(2):
-            out.pressure[2 * m + i] = state[system.bristles - 2 + i]
+        copy(at(state, system.bristles - 2), at(out.pressure, 2 * m), 2)
     run.progress.cursor[SAMPLE] = m + 1
 
 
@@ -110,7 +107,7 @@ def _record(run: RunRecord, system: SystemRecord, piece: int, since: float, stat
 def _time_slope(system: SystemRecord, piece: int, y: Doubles, slope: Doubles) -> None:
     """Write `df/dt` of the body's accelerations [3]: forces, loads and anchors of springs are linear in time."""
     motion, total = system.motion, three(at(system.motion.force, 6 * piece + 3))
-    total = plus(total, 1.0, spring_drift(motion, system.springs, piece, y[system.bristles + 5]))
+    total = plus(total, 1.0, spring_drift(system, piece, y[system.bristles + 5]))
     for c in range(system.size):
         load = system.contacts.count[c] * motion.load[(2 * piece + 1) * system.size + c]
         total = plus(total, load, applied_back(maps_of(system, c)[0], at(system.work.wrench, 3 * c)))
@@ -144,11 +141,10 @@ def _drift(run: RunRecord, system: SystemRecord, piece: int, since: float, step:
 @kernel
 def forget_unloaded(system: SystemRecord, piece: int, y: Doubles) -> None:
     """Clear the bristles of contacts without load on the whole piece: they start again from rest."""
-    load, first = system.motion.load, 2 * piece * system.size
+    load, first, state = system.motion.load, 2 * piece * system.size, system.contacts.state
     for c in range(system.size):
         if load[first + c] == 0.0 and load[first + system.size + c] == 0.0:
-            for i in range(system.contacts.state[c], system.contacts.state[c + 1]):
-                y[i] = 0.0
+            clear(at(y, state[c]), state[c + 1] - state[c])
 
 
 @kernel
@@ -265,8 +261,7 @@ def _accept(run: RunRecord, system: SystemRecord, piece: int, step: float, last:
         instant = reached if sample == time else sample - begin
         extend(run, (instant - since) / step, 1.0, 0.0, progress.y, run.stages.argument)
         _record(run, system, piece, instant, run.stages.argument)
-    for i in range(run.states):
-        progress.y[i] = run.stages.new[i]
+    copy(run.stages.new, progress.y, run.states)
     progress.statistics[STEPS] += 1
     progress.clock[SINCE] = reached
     return time

@@ -33,10 +33,10 @@ class Rule(NamedTuple):
     """Derivative of the result by argument i, or of result r by argument i for the key (r, i); kept on the tape."""
     pulls: Mapping[int, str] = _NONE
     """Cotangent of argument i, where a derivative of a vector would be a matrix."""
-    names: Mapping[str, Any] = _NONE
-    """Functions that the texts name, beside `NAMES`."""
     pushes: Mapping[int, str] = _NONE
     """Change of the result with argument i, where `pulls` has its cotangent."""
+    names: Mapping[str, Any] = _NONE
+    """Functions that the texts name, beside `NAMES`."""
 
 
 @kernel
@@ -79,11 +79,6 @@ def _slip_by_breakaway(deflection: float, breakaway: float) -> float:
     return formulas.bristle_decay_by_breakaway(xp, slip_slope(deflection, breakaway), deflection, breakaway)
 
 
-def _vectors(results: str, pulls: dict, pushes: dict) -> Rule:
-    """Return the rule of a function of vectors, from its cotangents and its changes."""
-    return Rule(results, {}, pulls, {}, pushes)
-
-
 NAMES: dict[str, Any] = {
     "dot": dot, "formulas": formulas, "log_or_0": _log, "per": per, "placed": placed, "plus": plus,
     "power_slope": _power_slope, "ratio": ratio, "slip_by_breakaway": _slip_by_breakaway, "slip_slope": slip_slope,
@@ -97,17 +92,18 @@ RULES: dict[Any, Rule] = {
     ast.Mult: Rule("s", {0: "{1}", 1: "{0}"}),
     ast.Div: Rule("s", {0: "1.0 / {1}"}),  # only the numerator: `derive` writes other quotients as products
     ast.USub: Rule("s", {0: "-1.0"}),
-    plus: _vectors(
+    plus: Rule(
         "v",
+        {},
         {0: "{b}", 1: "dot({b}, {2})", 2: "times({1}, {b})"},
         {0: "{d}", 1: "times({d}, {2})", 2: "times({1}, {d})"},
     ),
-    times: _vectors("v", {0: "dot({b}, {1})", 1: "times({0}, {b})"}, {0: "times({d}, {1})", 1: "times({0}, {d})"}),
-    dot: _vectors("s", {0: "times({b}, {1})", 1: "times({b}, {0})"}, {0: "dot({d}, {1})", 1: "dot({0}, {d})"}),
-    vectors.square: _vectors("s", {0: "times(2.0 * {b}, {0})"}, {0: "2.0 * dot({0}, {d})"}),
+    times: Rule("v", {}, {0: "dot({b}, {1})", 1: "times({0}, {b})"}, {0: "times({d}, {1})", 1: "times({0}, {d})"}),
+    dot: Rule("s", {}, {0: "times({b}, {1})", 1: "times({b}, {0})"}, {0: "dot({d}, {1})", 1: "dot({0}, {d})"}),
+    vectors.square: Rule("s", {}, {0: "times(2.0 * {b}, {0})"}, {0: "2.0 * dot({0}, {d})"}),
     # times the unit vector: one over a norm of 1e-160 leaves no room for another factor
     vectors.norm: Rule(
-        "s", {"per": "per({t})"}, {0: "times({b}, times({per}, {0}))"}, {}, {0: "ratio(dot({0}, {d}), {t})"}
+        "s", {"per": "per({t})"}, {0: "times({b}, times({per}, {0}))"}, {0: "ratio(dot({0}, {d}), {t})"}
     ),
     math.sqrt: Rule("s", {0: "0.5 * per({t})"}),
     per: Rule("s", {0: "-{t} * {t}"}),
@@ -130,6 +126,6 @@ QUOTIENT = Rule("s", {0: "{2}", 1: "-{t} * {2}"})
 """Rule of a quotient, whose third argument is one over the denominator."""
 
 
-def rule(function: Callable, results: str, slopes: dict, pulls: dict | None = None, **names: Any) -> None:
+def rule(function: Callable, results: str, slopes: dict, **names: Any) -> None:
     """Give a function a `Rule`, whose texts may name the functions `names`."""
-    RULES[function] = Rule(results, slopes, pulls or {}, names)
+    RULES[function] = Rule(results, slopes, {}, {}, names)

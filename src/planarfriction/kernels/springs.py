@@ -21,6 +21,12 @@ STIFFNESS, DAMPING, TORSION, TORSION_DAMPING, AT_X, AT_Y = range(6)
 
 
 @kernel
+def _spring(system: Any, piece: int, i: int) -> tuple[Doubles, Doubles]:
+    """Return the constants of spring i, and its anchor on a piece."""
+    return at(system.motion.spring, 6 * i), at(system.motion.anchor, 6 * (piece * system.springs + i))
+
+
+@kernel
 def _arm(spring: Doubles, theta: float) -> Vector:
     """Return the lever arm of the point of a spring, world axes."""
     cos, sin = math.cos(theta), math.sin(theta)
@@ -37,11 +43,11 @@ def _force(spring: Doubles, anchor: Doubles, since: float, body: Doubles, rx: fl
 
 
 @kernel
-def spring_wrench(motion: Any, count: int, piece: int, since: float, body: Doubles) -> Vector:
+def spring_wrench(system: Any, piece: int, since: float, body: Doubles) -> Vector:
     """Return the wrench of all springs on the body at its centre of mass."""
     total = (0.0, 0.0, 0.0)
-    for i in range(count):
-        spring, anchor = at(motion.spring, 6 * i), at(motion.anchor, 6 * (piece * count + i))
+    for i in range(system.springs):
+        spring, anchor = _spring(system, piece, i)
         rx, ry = _arm(spring, body[5])
         fx, fy = _force(spring, anchor, since, body, rx, ry)
         twist = spring[TORSION] * (anchor[2] + since * anchor[5] - body[5])
@@ -51,11 +57,11 @@ def spring_wrench(motion: Any, count: int, piece: int, since: float, body: Doubl
 
 
 @kernel
-def spring_drift(motion: Any, count: int, piece: int, theta: float) -> Vector:
+def spring_drift(system: Any, piece: int, theta: float) -> Vector:
     """Return the change of `spring_wrench` with the time alone."""
     total = (0.0, 0.0, 0.0)
-    for i in range(count):
-        spring, anchor = at(motion.spring, 6 * i), at(motion.anchor, 6 * (piece * count + i))
+    for i in range(system.springs):
+        spring, anchor = _spring(system, piece, i)
         rx, ry = _arm(spring, theta)
         fx, fy = spring[STIFFNESS] * anchor[3], spring[STIFFNESS] * anchor[4]
         total = plus(total, 1.0, (fx, fy, rx * fy - ry * fx + spring[TORSION] * anchor[5]))
@@ -64,18 +70,11 @@ def spring_drift(motion: Any, count: int, piece: int, theta: float) -> Vector:
 
 @kernel
 def add_spring_slopes(
-    motion: Any,
-    count: int,
-    piece: int,
-    since: float,
-    body: Doubles,
-    per_shift: float,
-    to_pose: Doubles,
-    matrix: Doubles,
+    system: Any, piece: int, since: float, body: Doubles, per_shift: float, to_pose: Doubles, matrix: Doubles
 ) -> None:
     """Add the accelerations by pose [3, 3], times `per_shift`, to `to_pose`, and with those by velocity to `matrix`."""
-    for i in range(count):
-        spring, anchor = at(motion.spring, 6 * i), at(motion.anchor, 6 * (piece * count + i))
+    for i in range(system.springs):
+        spring, anchor = _spring(system, piece, i)
         k, c, (rx, ry), spin = spring[STIFFNESS], spring[DAMPING], _arm(spring, body[5]), body[2]
         fx, fy = _force(spring, anchor, since, body, rx, ry)
         # columns: changes of the force and of the torque by a unit of x, y, theta; the arm turns with theta
@@ -92,6 +91,6 @@ def add_spring_slopes(
         )
         for j in range(3):
             for m in range(3):
-                weight = motion.inverse_mass[m]
+                weight = system.motion.inverse_mass[m]
                 to_pose[3 * m + j] += weight * per_shift * by_pose[j][m]
                 matrix[3 * m + j] += weight * (by_velocity[j][m] + per_shift * by_pose[j][m])

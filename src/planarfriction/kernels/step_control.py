@@ -44,15 +44,6 @@ def growth(pace: Pace, error: float, order: float, most: float) -> float:
 
 
 @kernel
-def length(pace: float, local: float, reach: float, remaining: float) -> float:
-    """Return the length of a step of derivatives, `pace` steps of the motion, whose step there is `local` long.
-
-    It ends within `reach`, and is `fitted` to the rest.
-    """
-    return fitted(xp.minimum(pace * local, reach), remaining)
-
-
-@kernel
 def judged(pace: float, error: float, h: float, local: float) -> tuple[bool, float]:
     """Return True if a step of derivatives is accepted, and the pace of the next.
 

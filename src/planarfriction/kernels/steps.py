@@ -201,8 +201,7 @@ def _jacobians(table: Stepped, b: int, z: Doubles, inputs: Doubles, out: Doubles
     else:
         call(table.function, (_record(table, b), z, inputs, dt, new, unit))
         clear(by_load, s)
-        for m in range(3):
-            wrench_twist[9 + m] = unit[m]
+        copy(unit, at(wrench_twist, 9), 3)
     for m in range(9):
         wrench_twist[m] = load * unit[3 + m]
     for m in range(3 * s):

@@ -22,7 +22,7 @@ import numpy as np
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.memory import Doubles
-from planarfriction.kernels.vectors import Vector
+from planarfriction.kernels.vectors import Vector, clear
 
 BILINEAR, POTENTIAL, ELLIPSOID, CELLS = 0, 1, 2, 3
 
@@ -61,21 +61,13 @@ def _sines(x: float, y: float, s: float, polar: float) -> Vector:
 
 
 @kernel
-def bilinear_blend(
-    low_left: float, low_right: float, high_left: float, high_right: float, a: float, b: float
-) -> Vector:
-    """Bilinear value from four corners and its differences along the polar angle and the azimuth."""
-    low = low_left + b * (low_right - low_left)
-    high = high_left + b * (high_right - high_left)
-    left = low_left + a * (high_left - low_left)
-    right = low_right + a * (high_right - low_right)
-    return low + a * (high - low), high - low, right - left
-
-
-@kernel
 def _corners(data: Doubles, p: int, row: int, a: float, b: float) -> Vector:
-    """`bilinear_blend` of one component at a place in a table."""
-    return bilinear_blend(data[p], data[p + 4], data[p + row], data[p + row + 4], a, b)
+    """Bilinear value of one component at a place in a table, and differences along polar angle and azimuth."""
+    low = data[p] + b * (data[p + 4] - data[p])
+    high = data[p + row] + b * (data[p + row + 4] - data[p + row])
+    left = data[p] + a * (data[p + row] - data[p])
+    right = data[p + 4] + a * (data[p + row + 4] - data[p + 4])
+    return low + a * (high - low), high - low, right - left
 
 
 @kernel
@@ -83,29 +75,8 @@ def _bilinear(data: Doubles, start: int, size: int, x: float, y: float, s: float
     i, j, a, b, _, _ = place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
-    hx, hy, hs = (
-        _corners(data, p, row, a, b)[0],
-        _corners(data, p + 1, row, a, b)[0],
-        _corners(data, p + 2, row, a, b)[0],
-    )
-    return hx * speed, hy * speed, hs * speed
-
-
-@kernel
-def bilinear_frame(size: int, x: float, y: float, s: float, polar: float) -> tuple[Vector, Vector, Vector]:
-    """Radial direction, and the slopes of the table coordinates in space, for the Jacobian of `_bilinear`."""
-    per_segment = size / (0.5 * math.pi)
-    sin_p, cos_p, sin_a, cos_a = _sines(x, y, s, polar)
-    per_azimuth = per_segment / sin_p
-    radial = (sin_p * cos_a, sin_p * sin_a, cos_p)
-    polar_slope = (per_segment * cos_p * cos_a, per_segment * cos_p * sin_a, -per_segment * sin_p)
-    return radial, polar_slope, (-per_azimuth * sin_a, per_azimuth * cos_a, 0.0)
-
-
-@kernel
-def bilinear_inset(size: int, a: float, polar: float) -> float:
-    """Position within the polar cell at which the Jacobian is taken: the axis has none."""
-    return xp.where(polar < _AXIS, _AXIS * size / (0.5 * math.pi), a)
+    hx, hy, hs = _corners(data, p, row, a, b), _corners(data, p + 1, row, a, b), _corners(data, p + 2, row, a, b)
+    return hx[0] * speed, hy[0] * speed, hs[0] * speed
 
 
 @kernel
@@ -113,8 +84,12 @@ def _bilinear_jacobian(data: Doubles, start: int, size: int, x: float, y: float,
     i, j, a, b, polar, _ = place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
-    radial, polar_slope, azimuth_slope = bilinear_frame(size, x, y, s, polar)
-    a = bilinear_inset(size, a, polar)
+    per_segment = size / (0.5 * math.pi)
+    sin_p, cos_p, sin_a, cos_a = _sines(x, y, s, polar)
+    radial, per_azimuth = (sin_p * cos_a, sin_p * sin_a, cos_p), per_segment / sin_p
+    polar_slope = (per_segment * cos_p * cos_a, per_segment * cos_p * sin_a, -per_segment * sin_p)
+    azimuth_slope = (-per_azimuth * sin_a, per_azimuth * cos_a, 0.0)
+    a = xp.where(polar < _AXIS, _AXIS * per_segment, a)  # the axis has no slope by the azimuth
     for i in range(3):
         h, h_polar, h_azimuth = _corners(data, p + i, row, a, b)
         for j in range(3):
@@ -244,8 +219,7 @@ def _cells_jacobian(
     data: Doubles, start: int, size: int, x: float, y: float, s: float, speed: float, out: Doubles
 ) -> None:
     radial = (x / speed, y / speed, s / speed)
-    for i in range(9):
-        out[i] = 0.0
+    clear(out, 9)
     for m in range(size):
         px, py, w = data[start + m], data[start + size + m], data[start + 2 * size + m]
         ux, uy = x - s * py, y + s * px

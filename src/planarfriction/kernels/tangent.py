@@ -27,7 +27,7 @@ from planarfriction.compiler.memory import Doubles, Place, arrays_at, at
 from planarfriction.kernels.body import (
     NO_LOAD,
     SystemRecord,
-    function_of,
+    functions_of,
     hardly_loaded,
     linearisation_of,
     load_of,
@@ -36,7 +36,7 @@ from planarfriction.kernels.body import (
     record_of,
     seen_by,
 )
-from planarfriction.kernels.contacts import CHANGE, ROWS
+from planarfriction.kernels.contacts import ROWS
 from planarfriction.kernels.path import Path, Stretch, Tolerances, hold, node_after
 from planarfriction.kernels.rosenbrock import forget_unloaded
 from planarfriction.kernels.sdirk import (
@@ -51,8 +51,8 @@ from planarfriction.kernels.sdirk import (
     variation_of,
 )
 from planarfriction.kernels.small_matrices import applied
-from planarfriction.kernels.step_control import judged, length
-from planarfriction.kernels.vectors import Vector, applied_back, plus, put, three, times
+from planarfriction.kernels.step_control import fitted, judged
+from planarfriction.kernels.vectors import Vector, applied_back, clear, copy, plus, put, three, times
 
 FRICTION, SIZE, MASS, INERTIA, LOAD = 0, 1, 2, 3, 4
 """Parameters; each is a factor, 1 as the scene is."""
@@ -94,7 +94,7 @@ def change_of(
     first = system.contacts.state[c]
     states = at(y, first), at(dy, first), linearisation_of(system, c), at(dz, first), at(dzdot, first)
     by = (1.0 if parameter == FRICTION else 0.0), (1.0 if parameter == SIZE else 0.0)
-    call(function_of(system, c, CHANGE), (record_of(system, piece, c), *states, system.work.rows, *by))
+    call(functions_of(system, c).change, (record_of(system, piece, c), *states, system.work.rows, *by))
 
 
 @kernel
@@ -120,8 +120,7 @@ def partial_of(
 ) -> None:
     """Write `df/dp` of an input at the state linearised last; of a prescribed velocity, `df/d slope`."""
     o, inverse_mass = system.bristles, system.motion.inverse_mass
-    for i in range(o + 6):
-        out[i] = 0.0
+    clear(out, o + 6)
     if parameter == VELOCITY:
         out[o + place] = 1.0
     elif parameter == FORCE:
@@ -156,19 +155,15 @@ def wrench_by_input(
 
     The workspace holds the state, linearised last; `w.right` is scratch.
     """
-    rows, load, unit = (
-        arrays_at(ROWS, system.work.rows),
-        load_of(system, piece, since, c),
-        three(at(system.work.wrench, 3 * c)),
-    )
+    rows, load = arrays_at(ROWS, system.work.rows), load_of(system, piece, since, c)
+    unit, state = three(at(system.work.wrench, 3 * c)), system.contacts.state
     more = gained_load(parameter, place, c, load)
     put(rows.d_wrench, (0.0, 0.0, 0.0))
     if parameter in (FRICTION, SIZE) or (more > 0.0 and system.contacts.reference[c] > 0.0):
         put(rows.twist, applied(maps_of(system, c)[0], seen_by(system, c, y)))
         put(rows.wrench, unit)
         put(rows.d_twist, (0.0, 0.0, 0.0))
-        for m in range(system.contacts.state[c], system.contacts.state[c + 1]):
-            w.right[m] = 0.0
+        clear(at(w.right, state[c]), state[c + 1] - state[c])
         follow_load(system, c, y, load, more, w.right)
         change_of(system, piece, c, y, w.rate, w.right, parameter, out)
     return plus(times(load, three(rows.d_wrench)), more, unit)
@@ -222,7 +217,8 @@ def propagate(
     while since < until:
         k = node_after(path, k, last, since)
         local, remaining = path.since[k + 1] - path.since[k], until - since
-        h = length(w.pace[0], local, path.since[xp.minimum(k + MOST, last)] - since, remaining)
+        reach = path.since[xp.minimum(k + MOST, last)] - since
+        h = fitted(xp.minimum(w.pace[0] * local, reach), remaining)
         _step(address, path, k, last, since, h, slope, drives, w)
         taken += 1
         error, known = 0.0, 1.0 if since > 0.0 else 0.0
@@ -242,18 +238,17 @@ def forget(address: Place, piece: int, slope: np.ndarray) -> None:
     """Clear the slopes [P, n] of contacts without load on a piece, at its end."""
     system = read(address)
     for p in range(slope.shape[0]):
-        forget_unloaded(system, piece, slope[p])
+        forget_unloaded(system, piece, at(pointer(slope), p * slope.shape[1]))
 
 
 @jit
 def settle(address: Place, piece: int, slope: np.ndarray) -> None:
     """Clear the slopes [P, n] of contacts that start a piece with hardly any load (see `body.settle_all`)."""
-    system = read(address)
+    system, state = read(address), read(address).contacts.state
     for c in range(system.size):
         if hardly_loaded(system, piece, c):
             for p in range(slope.shape[0]):
-                for m in range(system.contacts.state[c], system.contacts.state[c + 1]):
-                    slope[p, m] = 0.0
+                clear(at(pointer(slope), p * slope.shape[1] + state[c]), state[c + 1] - state[c])
 
 
 @jit
@@ -270,11 +265,8 @@ def wrench_slopes(
     call(system.rates, (address, piece, since, y, rate))
     call(system.linearise, (address, piece, y))
     for c in range(system.size):
-        load, (a, g, _), unit = (
-            load_of(system, piece, since, c),
-            maps_of(system, c),
-            three(at(system.work.wrench, 3 * c)),
-        )
+        load, (a, g, _) = load_of(system, piece, since, c), maps_of(system, c)
+        unit, first = three(at(system.work.wrench, 3 * c)), system.contacts.state[c]
         put(rows.twist, applied(a, seen_by(system, c, y)))
         put(rows.wrench, unit)
         wrench[c, 0], wrench[c, 1], wrench[c, 2] = times(load, unit)
@@ -284,8 +276,7 @@ def wrench_slopes(
             more = gained_load(drives.kind[p], drives.place[p], c, load)
             if drives.kind[p] == NORMAL_FORCE:
                 more *= drives.weight[p, 0] + drives.weight[p, 1] * since
-            for m in range(system.contacts.state[c], system.contacts.state[c + 1]):
-                dz[m] = slope[p * n + m]
+            copy(at(slope, p * n + first), at(dz, first), system.contacts.state[c + 1] - first)
             follow_load(system, c, y, load, more, dz)
             change_of(system, piece, c, y, rate, dz, drives.kind[p], at(rate, n))
             out[c, 0, p], out[c, 1, p], out[c, 2, p] = plus(times(load, three(rows.d_wrench)), more, unit)

@@ -51,6 +51,11 @@ class Branch(NamedTuple):
     no: Block
 
 
+def _asking(text: str) -> Callable[[Any, Any], Any]:
+    """Return an operator of two numbers whose result is a truth."""
+    return lambda one, other: one.trace.note(text, "bool", one, other)
+
+
 class Number:
     """A number of which the name is known, not the value."""
 
@@ -95,29 +100,15 @@ class Number:
     def __abs__(self) -> Number:
         return self._noted("$fabs({0})", self)
 
-    def __lt__(self, other: Any) -> Number:
-        return self._asked("{0} < {1}", other)
-
-    def __le__(self, other: Any) -> Number:
-        return self._asked("{0} <= {1}", other)
-
-    def __gt__(self, other: Any) -> Number:
-        return self._asked("{0} > {1}", other)
-
-    def __ge__(self, other: Any) -> Number:
-        return self._asked("{0} >= {1}", other)
-
-    def __eq__(self, other: Any) -> Number:  # type: ignore[override]
-        return self._asked("{0} == {1}", other)
-
-    def __ne__(self, other: Any) -> Number:  # type: ignore[override]
-        return self._asked("{0} != {1}", other)
+    __lt__, __le__ = _asking("{0} < {1}"), _asking("{0} <= {1}")
+    __gt__, __ge__ = _asking("{0} > {1}"), _asking("{0} >= {1}")
+    __eq__, __ne__ = _asking("{0} == {1}"), _asking("{0} != {1}")  # type: ignore[assignment]
 
     def __and__(self, other: Any) -> Any:
-        return self._asked("{0} && {1}", other) if isinstance(other, Number) else other and self
+        return _asking("{0} && {1}")(self, other) if isinstance(other, Number) else other and self
 
     def __or__(self, other: Any) -> Any:
-        return self._asked("{0} || {1}", other) if isinstance(other, Number) else other or self
+        return _asking("{0} || {1}")(self, other) if isinstance(other, Number) else other or self
 
     __rand__, __ror__, __hash__ = __and__, __or__, None  # type: ignore[assignment]
 
@@ -126,9 +117,6 @@ class Number:
 
     def _noted(self, text: str, *arguments: Any) -> Number:
         return self.trace.note(text, kind_of(arguments), *arguments)
-
-    def _asked(self, text: str, other: Any) -> Number:
-        return self.trace.note(text, "bool", self, other)
 
 
 def _key(argument: Any) -> Any:

@@ -10,7 +10,7 @@ import dis
 import functools
 import math
 from collections.abc import Callable
-from types import CodeType, FunctionType
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -59,7 +59,8 @@ def _placed(a: Any, i: int, x: Any) -> tuple:
 
 def finished(function: FunctionType) -> Callable[..., Any]:
     """Let a twin with jumps join its ways."""
-    return joined(function) if _has_jumps(function.__code__) else function
+    jumps = {*dis.hasjrel, *dis.hasjabs}
+    return joined(function) if any(each.opcode in jumps for each in dis.get_instructions(function)) else function
 
 
 def joined(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -71,10 +72,6 @@ def joined(function: Callable[..., Any]) -> Callable[..., Any]:
         return called(*arguments) if symbol is None else symbol.trace.call(called, arguments)
 
     return call
-
-
-def _has_jumps(code: CodeType) -> bool:
-    return any(each.opcode in dis.hasjrel or each.opcode in dis.hasjabs for each in dis.get_instructions(code))
 
 
 SYMBOLS = (

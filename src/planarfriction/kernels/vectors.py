@@ -12,7 +12,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import Doubles
+from planarfriction.compiler.memory import Doubles, pointer_to
 
 Vector = tuple[float, ...]
 """Vector in compiled code, or a matrix row by row."""
@@ -96,9 +96,7 @@ def _spread(add: bool) -> Callable[..., Any]:
         return [number for each in parts for number in numbers(builder, *each)]
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        pointed = isinstance(signature.args[0], types.CPointer)
-        first = args[0] if pointed else context.make_array(signature.args[0])(context, builder, args[0]).data
-        at = args[1]
+        first, at = pointer_to(context, builder, signature.args[0], args[0], types.float64), args[1]
         for number in numbers(builder, signature.args[3], args[3]):
             place = builder.gep(first, [at])
             builder.store(builder.fadd(builder.load(place), number, flags=_FLAGS) if add else number, place)
@@ -125,14 +123,13 @@ def scatter(typingctx: Any, row: types.Type, at: types.Type, stride: types.Type,
 
 @intrinsic(prefer_literal=True)
 def gathered(typingctx: Any, row: types.Type, at: types.Type, stride: types.Type, count: types.Type) -> Any:
-    """Return `row[at]`, `row[at + stride]`, ... as a tuple of a constant count."""
+    """Return `row[at]`, `row[at + stride]`, ... of an array or a pointer as a tuple of a constant count."""
     if not isinstance(count, types.IntegerLiteral):
         return None
     result = types.UniTuple(types.float64, count.literal_value)
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        first = context.make_array(signature.args[0])(context, builder, args[0]).data
-        at, numbers = args[1], []
+        first, at, numbers = pointer_to(context, builder, signature.args[0], args[0], types.float64), args[1], []
         for _ in range(result.count):
             numbers.append(builder.load(builder.gep(first, [at])))
             at = builder.add(at, args[2], flags=("nsw",))
@@ -143,22 +140,10 @@ def gathered(typingctx: Any, row: types.Type, at: types.Type, stride: types.Type
 
 def reader_of(count: int) -> Any:
     """Return a kernel `(row, first, stride)` that returns so many numbers of a pointer as a tuple."""
-    result = types.UniTuple(types.float64, count)
-
-    @intrinsic
-    def take(typingctx: Any, row: types.Type, first: types.Type, stride: types.Type) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            place, numbers = args[1], []
-            for _ in range(count):
-                numbers.append(builder.load(builder.gep(args[0], [place])))
-                place = builder.add(place, args[2], flags=("nsw",))
-            return context.make_tuple(builder, result, numbers)
-
-        return result(row, types.intp, types.intp), generate
 
     @kernel
     def taken(row: Doubles, first: int, stride: int) -> Vector:
-        return take(row, first, stride)
+        return gathered(row, first, stride, count)
 
     return taken
 

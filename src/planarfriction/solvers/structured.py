@@ -54,11 +54,8 @@ _MOST_PROCESSES = 3
 @contextlib.contextmanager
 def compiled_together() -> Iterator[None]:
     """Let other processes compile functions of the solver in this block, if they are not on disk yet."""
-    if kernels.advance in _loaded:
-        yield
-        return
-    functions = dict(enumerate(kernels.FUNCTIONS))
-    jobs = {function: job for job, function in functions.items() if missing(function, signature_of(function))}
+    functions = () if kernels.advance in _loaded else kernels.FUNCTIONS
+    jobs = {function: i for i, function in enumerate(functions) if missing(function, signature_of(function))}
     processes = min(threads.processors() - 1, _MOST_PROCESSES, len(jobs) - 1)
     if processes < 1 or not together.possible():
         yield
