@@ -112,36 +112,6 @@ def test_values_of_any_kind_have_labels():
     assert data.model.values.tolist() == ["sticky", "plain"] and data.y.shape == (2, 1, 2)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"values": {}}, "values must be a mapping from names to lists of values"),
-        ({"values": {"": [1.0]}}, "name of a swept quantity in values must be a text that is not empty"),
-        ({"values": {"grip": 1.0}}, "grip must be a list of numbers, texts or booleans"),
-        ({"values": {"grip": []}}, "grip must have at least one value"),
-        ({"values": {"grip": [1.0, 1.0]}}, "grip must have each value once, got 1.0 2 times"),
-        ({"values": {"grip": [1.0, "a"]}}, "grip must be a list of numbers, texts"),
-        ({"values": {"grip": [PATCH]}}, "a mapping from labels to values"),
-        ({"values": {"grop": [1.0]}}, "make_scene must take the swept quantities by name"),
-        (
-            {"values": {"status": [1.0]}, "make_scene": lambda status: grip(status)},
-            "not be one of status, failure, run",
-        ),
-        ({"values": {"time": [1.0]}, "make_scene": lambda time: grip(time)}, "not be that of a variable"),
-        ({"make_scene": lambda grip: 1.0}, "make_scene must return a Scene, got float"),
-        ({"measure": 3}, "measure must be a function of a Solution"),
-        ({"measure": lambda solution: object()}, "must return numbers, texts, or arrays of them"),
-        ({"progress": float}, "progress must be a function of a Progress, got TypeError: float() argument"),
-        ({"executor": 3}, "executor must be a concurrent.futures.Executor"),
-        ({"make_scene": lambda grip: 1 / 0}, "all 3 runs failed; the first: grip=1.0: make_scene: ZeroDivisionError"),
-    ],
-)
-def test_mistakes_are_one_line(arguments, words):
-    with pytest.raises(pf.FrictionError) as caught:
-        pf.sweep(**{"make_scene": grip, "values": {"grip": GRIPS}, **arguments})
-    assert words in str(caught.value) and "\n" not in str(caught.value)
-
-
 # ---------------------------------------------------------------------- what a run is
 
 
@@ -251,9 +221,9 @@ def test_a_sweep_goes_on_where_another_has_ended(tmp_path):
 def test_progress_is_told_twice_a_second_and_at_the_end(monkeypatch):
     clock, told = [100.0], []
     monkeypatch.setattr(running, "time", SimpleNamespace(monotonic=lambda: clock[0]))
-    grid = SimpleNamespace(size=8)
-    book = SimpleNamespace(found=2, new=0, failed=1, damaged=0)
-    going = running.Sweeping(None, grid, None, None, book, told.append)  # pyright: ignore
+    going = running.Sweeping(grip, {"grip": np.arange(8.0)}, None, None, told.append)
+    book = going.book
+    book.found, book.failed = 2, 1
     for passed, at_once, count in ((0.4, False, 0), (0.2, False, 1), (0.4, False, 1), (0.1, False, 2), (0.1, True, 3)):
         clock[0] += passed
         book.new += 1

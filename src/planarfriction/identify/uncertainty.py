@@ -8,12 +8,11 @@ slides, each counts as one observation.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.identify.fit import Fit
-from planarfriction.identify.parameters import ALL, PRIOR
+from planarfriction.identify.parameters import ALL, PRIOR, Coordinates
 
 EXCESS = 1.25
 """Largest reduced chi-square that is still put down to the estimate of the noise."""
@@ -38,9 +37,38 @@ HUGE, RIDGE = 1e200, 1e-10
 """Variance that stands for an infinite one during a change of coordinates, and share of the largest curvature that
 holds parameters on which no sample depends."""
 
+NEAR = 4.0
+"""Mean square of the residuals over that of the noise up to which a rough fit is near the data: steps are coarse."""
 
-@dataclass(frozen=True)
-class Uncertainty:
+
+class Fit(NamedTuple):
+    """Problem with its best values."""
+
+    problem: Any
+    """`Problem` that was solved."""
+    coordinates: Coordinates
+    x: np.ndarray
+    """Coordinates `[F + K]`."""
+    values: np.ndarray
+    """Values `[F + K]`."""
+    at_bound: np.ndarray
+    """Mask of the coordinates that lie on a bound, `[F + K]`."""
+    noise: np.ndarray
+    """Noise of each channel, `[3]`, or of the channels of each slide, `[S, 3]`."""
+    sigma: list[np.ndarray]
+    """Standard deviation of each residual, `[T, 3]` of each log or slide."""
+    starts: tuple[int, int]
+    """Number of starting points that led to this minimum, and number of all."""
+    cost: float
+    """Half the sum of the squared residuals."""
+
+    @property
+    def near(self) -> bool:
+        """True if hardly more than noise is left."""
+        return 2.0 * self.cost <= NEAR * self.problem.numbers
+
+
+class Uncertainty(NamedTuple):
     """Covariance and residuals of a fit of logs, with its tests."""
 
     covariance: np.ndarray

@@ -172,5 +172,5 @@ def _slip(angle_of: Any, wanted: float, speed: float) -> float:
     from scipy.optimize import brentq
 
     # from far to the right to far to the left the force turns from one side of the normal to the other
-    off = lambda x: angle_of(speed * x / (1.0 - abs(x))) - wanted  # noqa: E731
-    return (lambda x: speed * x / (1.0 - abs(x)))(brentq(off, -0.999999, 0.999999, xtol=1e-14))  # pyright: ignore
+    slip: Any = lambda x: speed * x / (1.0 - abs(x))  # noqa: E731
+    return slip(brentq(lambda x: angle_of(slip(x)) - wanted, -0.999999, 0.999999, xtol=1e-14))

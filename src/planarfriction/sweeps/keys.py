@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 LAYOUT = 3
 """Number of the layout of stored runs: files of another layout do not count."""
 
-_JSON = json.JSONEncoder(sort_keys=True)
-
 KEPT = 32
 """Number of models, with the maps they have built, and of plain forms that are kept for later scenes."""
 
@@ -103,7 +101,7 @@ class Keys:
 
 
 def _digest(value: Any) -> str:
-    return hashlib.sha256(_JSON.encode(value).encode(errors="surrogatepass")).hexdigest()[:32]
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode(errors="surrogatepass")).hexdigest()[:32]
 
 
 def _kept(held: dict[Any, Any], key: Any, make: Callable[[], Any]) -> Any:

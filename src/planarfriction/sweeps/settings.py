@@ -65,7 +65,8 @@ class Settable:
             self(**{path: each[-1] for path, each in values.items()})
 
     def _changed(self, table: Mapping[str, Any], path: str, value: Any) -> dict[str, Any]:
-        tables = _tables(table)
+        tables = table.get("contact", [])
+        tables = tables if isinstance(tables, list) else [tables]
         names = self._contacts(tables)
         for number, name in enumerate(names):
             if path.startswith(f"{name}."):
@@ -84,11 +85,6 @@ class Settable:
         default = "contact" if len(tables) == 1 else "contact {}"
         given = [each.get("name") if isinstance(each, Mapping) else None for each in tables]
         return [str(name or default.format(number)) for number, name in enumerate(given, 1)]
-
-
-def _tables(table: Mapping[str, Any]) -> list[Any]:
-    tables = table.get("contact", [])
-    return tables if isinstance(tables, list) else [tables]
 
 
 def _set(table: Any, parts: list[str], value: Any, path: str, where: str, valid: Sequence[str] | None = None) -> Any:
