@@ -317,28 +317,6 @@ def test_a_flush_face_that_slides_pushes_along_the_edge_of_its_friction_cone(sid
 # ---------------------------------------------------------------------- what is refused
 
 
-def test_bad_input_is_refused_in_one_line():
-    path = straight((-0.06, 0.0), (0.0, 0.0))
-    cases = [
-        (lambda: Slider(SURFACES["exact"], [[0, 0], [1, 0], [0.2, 0.2], [0, 1]]), "outline must be convex"),
-        (lambda: Slider(PATCH, SQUARE), "surface must be a limit surface"),
-        (lambda: Pusher(-0.1), "mu must be >= 0"),
-        (lambda: push(slider(), Pusher(), straight((0.0, 0.0), (0.1, 0.0))), "begin outside the slider"),
-        (lambda: push(slider(), Pusher(), pf.Signal.constant([0.0, 0.0])), "path must be a Signal of two"),
-        (lambda: push(slider(), Pusher(0.1, 0.02), path), "path must have 3 columns"),
-        (lambda: push(slider(), Pusher(), path, rtol=0.0), "rtol must be > 0"),
-        (lambda: motion_cone(SURFACES["exact"], (0.0, 0.0), (0.0, 0.0), 0.1), "normal"),
-        (lambda: plan_push(slider(), Pusher(), (0.1, 0.0, 0.0)), "be a point with friction"),
-        (lambda: plan_push(slider(), Pusher(0.3), (0.0, 0.0, 0.0)), "goal must differ"),
-        (lambda: plan_push(slider(), Pusher(0.3), (0.1, 0.0, 0.0), margin=1.0), "margin must be >= 0 and < 1"),
-        (lambda: plan_push(slider(), Pusher(0.3), (0.1, 0.0, 0.0), edges=[4]), "edges"),
-    ]
-    for call, words in cases:
-        with pytest.raises(pf.FrictionError, match=words) as caught:
-            call()
-        assert "\n" not in str(caught.value)
-
-
 def test_polygons_with_an_edge_along_an_axis_are_sliders_and_stars_are_not():
     corners = 0.05 * np.exp(2j * np.pi * (np.arange(5) - 0.5) / 5)  # one edge stands upright on the right
     corners = np.stack([corners.real, corners.imag], -1)
