@@ -450,14 +450,6 @@ def test_any_executor_gives_the_same_bits():
     assert turned.x.identical(reference().x) and turned.run.identical(reference().run)
 
 
-def test_processes_give_the_same_bits_and_take_no_lambda():
-    with concurrent.futures.ProcessPoolExecutor(2, FRESH) as pool:
-        with pytest.raises(pf.FrictionError, match="measure must be a function that other processes can import"):
-            pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=lambda solution: 1.0)
-        data = pf.sweep(grip, {"grip": GRIPS, "mass": MASSES}, executor=pool)
-    assert data.identical(reference())
-
-
 class Handed(concurrent.futures.ThreadPoolExecutor):
     """Records how many scenes it is handed at a time, and refuses to hand on one of them."""
 
@@ -550,12 +542,14 @@ def leave(solution: pf.Solution) -> float:
 
 # Python 3.11 tells futures of a pool that broke, also those that were cancelled a moment before: its thread raises
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
-def test_an_executor_that_dies_is_an_error_in_one_line(tmp_path):
-    with (
-        concurrent.futures.ProcessPoolExecutor(1, FRESH) as pool,
-        pytest.raises(SweepError, match="finished runs are kept"),
-    ):
-        pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=leave, out=tmp_path)
+def test_processes_give_the_same_bits_take_no_lambda_and_may_die(tmp_path):
+    with concurrent.futures.ProcessPoolExecutor(1, FRESH) as pool:
+        with pytest.raises(pf.FrictionError, match="measure must be a function that other processes can import"):
+            pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=lambda solution: 1.0)
+        data = pf.sweep(grip, {"grip": GRIPS, "mass": MASSES}, executor=pool)
+        with pytest.raises(SweepError, match="finished runs are kept"):
+            pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=leave, out=tmp_path)
+    assert data.identical(reference())
     with pytest.raises(SweepError, match="the executor ended"):  # it takes no more
         pf.sweep(grip, {"grip": GRIPS}, executor=pool)
 

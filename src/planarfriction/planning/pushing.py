@@ -163,7 +163,7 @@ def _follow(scenery: Scenery, start: np.ndarray, time: np.ndarray, rtol: float) 
         if what == "mode":
             held = mode
         elif what == "closes":
-            contact = scenery.flush(contact, now, q)
+            contact = scenery.flush(now, q)
         else:
             contact = None
     raise InvalidValueError("path", f"change the contact of the pusher at most {MOST_PHASES} times", f"t = {now:g} s")

@@ -105,7 +105,7 @@ class Scenery:
         """Return the distance of all that does not touch yet [m]."""
         return min(gap for gap, each in self.features(t, q) if not _same(contact, each, len(self._lengths))) + self.near
 
-    def flush(self, contact: Touch, t: float, q: np.ndarray) -> Touch:
+    def flush(self, t: float, q: np.ndarray) -> Touch:
         """Return the face at the edge that it has closed with."""
         c, s = math.cos(self.pose(t)[2] - q[2]), math.sin(self.pose(t)[2] - q[2])
         along = self.slider.inward @ [c, s]
@@ -196,7 +196,7 @@ def touch_after(scenery: Scenery, t: float, q: np.ndarray) -> tuple[float, Touch
             at = brentq(off, low, high, xtol=1e-14 * max(abs(high), 1.0))
             near = [each for gap, each in scenery.features(at, q) if gap < 100.0 * scenery.near]  # pyright: ignore
             if len(near) > 1:
-                return at, scenery.flush(near[0], at, q)  # pyright: ignore
+                return at, scenery.flush(at, q)  # pyright: ignore
             return at, min(scenery.features(at, q))[1]  # pyright: ignore
         low, before = high, after
     return None

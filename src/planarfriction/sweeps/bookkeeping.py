@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.scenes import Scene
 from planarfriction.scenes.signal import SAME_TIME
 from planarfriction.scenes.solution import History
 from planarfriction.sweeps.quantities import Grid
@@ -20,8 +21,6 @@ from planarfriction.writing import make_folder, replacing, write_text
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from planarfriction.scenes import Scene
 
 MOST_NUMBERS = 2 * 10**9
 """Largest number of numbers of one variable in memory: 16 GB."""

@@ -11,16 +11,13 @@ import operator
 import types
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from planarfriction import __version__
 from planarfriction.errors import InvalidValueError
+from planarfriction.scenes import Scene, Signal
 from planarfriction.scenes.files import scene_to_dict
 from planarfriction.scenes.model_files import model_to_dict
-from planarfriction.scenes.signal import Signal
-
-if TYPE_CHECKING:
-    from planarfriction.scenes import Scene
 
 LAYOUT = 3
 """Number of the layout of stored runs: files of another layout do not count."""

@@ -9,15 +9,13 @@ import secrets
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction.errors import FrictionError, InvalidValueError, one_line
-from planarfriction.scenes.solution import History, Solution
-
-if TYPE_CHECKING:
-    from planarfriction.scenes import Scene
+from planarfriction.scenes import Scene, Solution
+from planarfriction.scenes.solution import History
 
 FAILED = "failed"
 """Status of a run that ended with an error; the others are those of a `Solution`."""

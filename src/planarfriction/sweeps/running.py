@@ -24,7 +24,7 @@ from planarfriction import validation
 from planarfriction.compiler import threads
 from planarfriction.described import described
 from planarfriction.errors import InvalidValueError, SweepError, SweepInterrupted
-from planarfriction.scenes import Scene
+from planarfriction.scenes import Scene, Solution
 from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, Index
 from planarfriction.sweeps.keys import Keys
 from planarfriction.sweeps.quantities import check_takes, grid_of
@@ -33,8 +33,6 @@ from planarfriction.sweeps.settings import Settable
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from planarfriction.scenes import Solution
 
 _BETWEEN = 0.5
 """Time between two reports of progress [s]."""
