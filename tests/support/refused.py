@@ -121,7 +121,7 @@ CALLS: dict[str, list[Callable[[], Any]]] = {
             ("held", "yes"), ("held", 2), ("held", np.nan), ("held", np.ones(3)), ("turns", -1), ("turns", 0.5),
             ("name", 3),
         )),
-        lambda: Log.from_motion(TIME, np.zeros((300, 3)), np.zeros((300, 3)), 1.0, name=10**5000),  # pyright: ignore
+        lambda: Log.from_motion(TIME, np.zeros((300, 3)), np.zeros((300, 3)), 1.0, name=10**5000),
         lambda: Log.from_axis(TIME, TIME, 1.0), lambda: differentiated(np.zeros(20), np.zeros((20, 3))),
         lambda: turned(np.where(TIME < 2.0, ANGLE, ANGLE + 2.0)),
         lambda: turned(np.where(TIME < 2.0, ANGLE, ANGLE + np.pi)),  # of a rectangle that looks the same
@@ -148,12 +148,12 @@ CALLS: dict[str, list[Callable[[], Any]]] = {
             {"start": {"mu": 0.5}}, {"start": 3}, {"surface": "table"}, {"surface": pf.ReducedModel}, {"samples": 10},
             {"model": "best"}, {"nuisance": ("delays",)}, {"nuisance": "bias"},
         )),
-        lambda: identify_lugre(LOG, PATCH, options={"starts": 1}),  # pyright: ignore
-        lambda: identify_lugre(LOG, MODEL), lambda: identify_lugre([], PATCH),  # pyright: ignore
+        lambda: identify_lugre(LOG, PATCH, options={"starts": 1}),
+        lambda: identify_lugre(LOG, MODEL), lambda: identify_lugre([], PATCH),
         lambda: identify_lugre(LOG, SOFT, model="distributed"), lambda: identify_lugre(LOG, POINT),
         lambda: identify_lugre(changed(wrench=0.0 * LOG.wrench, name="dead"), PATCH),
         lambda: identify_lugre(changed(normal_force=1.0 + TIME), SOFT),
-        lambda: identify_motion([], PATCH, BODY), lambda: identify_motion(FREE, PATCH, 0.37),  # pyright: ignore
+        lambda: identify_motion([], PATCH, BODY), lambda: identify_motion(FREE, PATCH, 0.37),
         lambda: identify_motion(FREE, PATCH, BODY, parameters=("sigma_0",)),
         lambda: identify_motion(FREE, PATCH, BODY, samples=2),
     ],
@@ -188,7 +188,7 @@ CALLS: dict[str, list[Callable[[], Any]]] = {
         )),
         lambda: gripped(scene=plate(body=dataclasses.replace(plate().body, gravity=(0.0, 0.0)))),
         lambda: holding_load(DOWN, PATCH, 0.0), lambda: holding_load(DOWN, PATCH, 1.0, margin=-0.1),
-        lambda: holding_load((0.0, 1.0), PATCH, 1.0), lambda: holding_load(DOWN, None, 1.0),  # pyright: ignore
+        lambda: holding_load((0.0, 1.0), PATCH, 1.0), lambda: holding_load(DOWN, None, 1.0),
         lambda: dynamic_holding_load(DOWN, PATCH), lambda: dynamic_holding_load((0.0, 1.0), MODEL),
         lambda: dynamic_holding_load(DOWN, pf.DistributedModel(PATCH, pf.CoulombStribeck(mu_c=1.0))),
         lambda: dynamic_holding_load((0.0, 1.0, 0.1), pf.DistributedModel(POINT, LAW)),
@@ -197,7 +197,7 @@ CALLS: dict[str, list[Callable[[], Any]]] = {
         )),
     ],
     "pushes": [
-        lambda: Slider(SURFACE, [[0, 0], [1, 0], [0.2, 0.2], [0, 1]]), lambda: Slider(PATCH, SQUARE),  # pyright: ignore
+        lambda: Slider(SURFACE, [[0, 0], [1, 0], [0.2, 0.2], [0, 1]]), lambda: Slider(PATCH, SQUARE),
         lambda: Pusher(-0.1), lambda: pushed(path=pf.Signal.sampled([0.0, 1.0], [[0.0, 0.0], [0.1, 0.0]], "linear")),
         lambda: pushed(path=pf.Signal.constant([0.0, 0.0])), lambda: pushed(pusher=Pusher(0.1, 0.02)),
         lambda: pushed(rtol=0.0), lambda: motion_cone(SURFACE, (0.0, 0.0), (0.0, 0.0), 0.1),
@@ -209,9 +209,9 @@ CALLS: dict[str, list[Callable[[], Any]]] = {
     "online": [
         lambda: FrictionObserver(PATCH), lambda: observer(tolerance=0.0), lambda: observer(sensors=Sensors),
         lambda: observer(batch=2).update(Measurement(0.0, np.zeros((3, 3)), 1.0)), lambda: Sensors(quantum=0.0),
-        lambda: estimate().interval(1.0), lambda: Hold(None), lambda: Hold(observer(), probability=0.7),  # pyright: ignore
+        lambda: estimate().interval(1.0), lambda: Hold(None), lambda: Hold(observer(), probability=0.7),
         lambda: SlideBy(observer(), 0.0), lambda: TurnBy(observer(), []),
-        lambda: TurnBy(observer(), 1.0, duration=-1.0), lambda: Hinge(observer()).update(5.0),  # pyright: ignore
+        lambda: TurnBy(observer(), 1.0, duration=-1.0), lambda: Hinge(observer()).update(5.0),
         lambda: Hinge(observer(), reserve=0.0),
         *(lambda kind=kind, goal=goal: kind(observer(sensors=Sensors(slip_rate=0.0)), *goal) for kind, goal in (
             (SlideBy, [0.1]), (TurnBy, [0.1]), (Hinge, []),

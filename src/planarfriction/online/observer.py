@@ -139,30 +139,11 @@ class FrictionObserver:
         prior = np.array([validation.positive(name, value) for name, value in spreads.items()])
         n, numbers = kernels.N, model.law.numbers
         middle = np.log([numbers.mu_c, numbers.mu_s / numbers.mu_c, 1.0])
-        kind, size, data = surface.numbers
-        frame = surface._frame()
-        back = np.linalg.inv(frame)
-        known = self.sensors
-        place = known.quantum / max(known.slip_rate, 1.0)
-        noise = np.abs(back.T) @ (known.force_noise, known.force_noise, known.torque_noise)
-        self._filter = kernels.Filter(
-            kind,
-            size,
-            data,
-            _planes(surface),
-            frame,
-            back,
-            -back.T.copy(),
-            surface.contact_radius,
+        self._filter = _settings(
+            model,
+            surface,
             load,
-            _growth(model.patch, load),
-            numbers.v_s,
-            numbers.gamma,
-            numbers.sigma_2,
-            np.maximum(noise, _LEAST_NOISE) ** 2,
-            known.quantum,
-            place,
-            np.abs(frame) @ (place, place, place / known.base) / math.sqrt(12.0),
+            self.sensors,
             validation.positive("model_error", model_error),
             validation.non_negative("drift", drift),
             validation.positive("saturation", saturation),
@@ -225,6 +206,35 @@ class FrictionObserver:
 def estimate_of(found: np.ndarray) -> Estimate:
     """Return the estimate in records of the compiled filter."""
     return Estimate._make(found[name] for name in Estimate._fields)._replace(determined=found["determined"] > 0)
+
+
+def _settings(model: FrictionModel, surface: LimitSurface, load: float, sensors: Sensors, *rest: Any) -> Any:
+    """Return what the filter reads and never changes; `rest` are its last fields."""
+    kind, size, data = surface.numbers
+    frame, numbers = surface._frame(), model.law.numbers
+    back = np.linalg.inv(frame)
+    place = sensors.quantum / max(sensors.slip_rate, 1.0)
+    noise = np.abs(back.T) @ (sensors.force_noise, sensors.force_noise, sensors.torque_noise)
+    return kernels.Filter(
+        kind,
+        size,
+        data,
+        _planes(surface),
+        frame,
+        back,
+        -back.T.copy(),
+        surface.contact_radius,
+        load,
+        _growth(model.patch, load),
+        numbers.v_s,
+        numbers.gamma,
+        numbers.sigma_2,
+        np.maximum(noise, _LEAST_NOISE) ** 2,
+        sensors.quantum,
+        place,
+        np.abs(frame) @ (place, place, place / sensors.base) / math.sqrt(12.0),
+        *rest,
+    )
 
 
 def _planes(surface: LimitSurface) -> np.ndarray:
