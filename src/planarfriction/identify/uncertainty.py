@@ -122,7 +122,9 @@ def uncertainty(fit: Fit) -> Uncertainty:
     plain, bread = inverse * max(reduced_chi2, 1.0), np.where(np.isfinite(inverse), inverse, 0.0)
     factor = np.sqrt(np.maximum(_over_time(fit, residual, jacobian, pull, neighbours, bread) / np.diag(plain), 1.0))
     factor = np.where(np.isfinite(factor), factor, 1.0)
-    whole = plain * np.outer(factor, factor) + _of_twists(fit, jacobian, bread)
+    moved = problem.twist_residuals(fit.values, fit.sigma, DRAWS)
+    shifts = np.zeros((1, len(bread))) if moved is None else moved @ jacobian @ bread
+    whole = plain * np.outer(factor, factor) + shifts.T @ shifts / len(shifts)
     return Uncertainty(
         whole * ALLOWANCE**2,
         jacobian,
@@ -200,15 +202,6 @@ def _over_time(fit: Fit, residual, jacobian, pull, neighbours: float, bread: np.
         sums = upto[lags + 1 :] - upto[: -lags - 1]
         filling = filling + sums.T @ sums / (lags + 1.0)
     return np.maximum(np.einsum("ij,jk,ik->i", bread, filling, bread), 0.0)
-
-
-def _of_twists(fit: Fit, jacobian: np.ndarray, bread: np.ndarray) -> np.ndarray:
-    """Compute the covariance of the values from drawn errors of the twists."""
-    moved = fit.problem.twist_residuals(fit.values, fit.sigma, DRAWS)
-    if moved is None:
-        return np.zeros((len(fit.values),) * 2)
-    shifts = moved @ jacobian @ bread
-    return shifts.T @ shifts / len(shifts)
 
 
 def _held_out(fit: Fit, residual, jacobian, pull) -> tuple[np.ndarray, np.ndarray]:
