@@ -51,16 +51,18 @@ class Trial:
         return float(falls.mean()), float(scatter), [float(each.mean()) for each in halves]
 
     @property
-    def spread(self) -> dict[str, float]:
-        """Standard error of each estimate: by leaving out groups (jackknife), and by the shift to `again`.
+    def others(self) -> list[dict[str, float]]:
+        """Estimates of other fits, which terms that are missing shift by other amounts."""
+        return [self.again]
 
-        Terms that are missing shift that one by another amount.
-        """
+    @property
+    def spread(self) -> dict[str, float]:
+        """Standard error of each estimate: by leaving out groups (jackknife), and the largest shift to `others`."""
         n, names = len(self.folds), list(self.values)
-        table = np.array([[each[name] for name in names] for each in (self.values, self.again, *self.folds)])
-        folds, shift = table[2:], table[1] - table[0]
+        table = np.array([[each[name] for name in names] for each in (self.values, *self.others, *self.folds)])
+        folds, shifts = table[-n:], table[:-n] - table[0]
         jackknife = np.sqrt((n - 1) / n * ((folds - folds.mean(axis=0)) ** 2).sum(axis=0))
-        return dict(zip(names, np.hypot(jackknife, shift).tolist(), strict=True))
+        return dict(zip(names, np.hypot(jackknife, np.abs(shifts).max(axis=0)).tolist(), strict=True))
 
     def interval(self, name: str) -> tuple[float, float]:
         """Compute the 95 % interval of an estimate from its spread; factors for those searched by logarithm."""
