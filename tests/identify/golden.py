@@ -25,15 +25,14 @@ from planarfriction.identify import (
 )
 from planarfriction.identify.checks import check_logs, check_sampling, size_of, with_findings
 from planarfriction.identify.decimation import decimated, redrawn, samples_of
-from planarfriction.identify.fit import Fit
 from planarfriction.identify.motion import SlideProblem
 from planarfriction.identify.motion import _identification as result_of_slides
 from planarfriction.identify.parameters import USUAL
 from planarfriction.identify.problem import LogProblem
-from planarfriction.identify.rig import first_noise
+from planarfriction.identify.rig import wrench_noise
 from planarfriction.identify.search import guess_starts, misfit
 from planarfriction.identify.slides import start_of, start_slopes
-from planarfriction.identify.uncertainty import uncertainty
+from planarfriction.identify.uncertainty import Fit, uncertainty
 from planarfriction.identify.verdicts import Candidate
 from planarfriction.identify.wrenches import _identification, _start_laws
 from planarfriction.scenes import driven
@@ -106,7 +105,7 @@ def fit_at(problem: LogProblem) -> Fit:
     )
     values = np.concatenate([start, rig])
     coordinates = problem.coordinates(start)
-    noise, sigma = problem.estimate_noise(values, first_noise(problem.logs))
+    noise, sigma = problem.estimate_noise(values, wrench_noise(problem.logs))
     x, free = coordinates.of(values), np.zeros(len(values), dtype=bool)
     cost = 0.5 * float((problem.residual(values, sigma) ** 2).sum())
     return Fit(problem, coordinates, x, values, free, noise, sigma, (1, 2), cost)

@@ -350,12 +350,6 @@ def test_run_writes_logs_that_identify_reads(solution, tmp_path, capsys):
     assert "has the contacts other, pad: choose one of them" in capsys.readouterr().err
 
 
-@pytest.mark.filterwarnings("error")
-def test_a_patch_of_one_point_is_refused_in_one_line(log):
-    with pytest.raises(InvalidValueError, match="patch must be wider than a point for an identification"):
-        check_logs([log], pf.ContactPatch.points([[0.0, 0.01]]))
-
-
 @pytest.mark.parametrize(
     "names",
     [

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from planarfriction.derivatives import PARAMETERS, parameters_of
-from planarfriction.errors import InvalidValueError
-from planarfriction.identify import FitOptions, Log
+from planarfriction.identify import Log
 from planarfriction.identify.decimation import WINDOW, decimated, farthest, samples_of
 from planarfriction.identify.simulators import SIMULATORS, PartsPrediction, Prediction
 from planarfriction.models import ReducedModelPublished
@@ -148,8 +147,3 @@ def test_memory_is_bounded():
     assert most < 20 * time.nbytes
     assert kept < 20_000 * 8 * 50
     assert sum(len(gap.dt) for gap in cut.gaps) < 2 * 20_000
-
-
-def test_the_number_of_samples_is_checked():
-    with pytest.raises(InvalidValueError, match="samples must be an integer >= 1000, got 10"):
-        FitOptions(samples=10)

@@ -13,7 +13,6 @@ import planarfriction as pf
 from planarfriction.cli import main
 from planarfriction.cli.app import app
 from planarfriction.cli.output import write_csv
-from planarfriction.errors import InvalidValueError
 from planarfriction.identify import Log, candidate_motions, current_estimate, design_experiment
 from planarfriction.identify.experiments import MotionPlan, _Information
 from planarfriction.identify.logs import columns_of
@@ -106,39 +105,6 @@ def test_what_the_logs_tell_replaces_the_guess(slide):
     assert patch is PATCH  # a slide tells no radius
     assert law.mu_c == fit.estimates["mu_c"] and law.mu_s == fit.estimates["mu_s"]
     assert law.sigma_1 == pytest.approx(0.5 * sum(fit.intervals()["sigma_1"]))
-
-
-def test_the_table_fits_80_columns(motions):
-    text = str(plan(motions.values()))
-    assert text.startswith("Next motion to measure: ") and max(map(len, text.splitlines())) <= 80
-    assert all(name in text for name in (*motions, "sigma_1"))
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"parameters": ["mu"]}, "parameters must be one of"),
-        ({"parameters": ["mu_c"], "wanted": ["v_s"]}, "must be one of mu_c"),
-        ({"motions": Log(np.arange(20.0), np.zeros((20, 3)), np.zeros((20, 3)), 1.0)}, "twist of log must move"),
-        ({"noise": (1.0, 0.0, 1.0)}, "noise"),
-        ({"nuisance": ["lag"]}, "nuisance"),
-        ({"motions": []}, "Log"),
-        ({"motions": 3}, "Log"),
-        ({"parameters": 3}, "parameters must be a list"),
-    ],
-)
-def test_what_is_wrong_is_one_line(options, words):
-    with pytest.raises(InvalidValueError, match=words):
-        design_experiment(PATCH, LAW, **options)
-
-
-@pytest.mark.parametrize(
-    "options",
-    [{"speed": 0.0}, {"spin": -1.0}, {"duration": 0.01}, {"rate": 1e9}, {"normal_force": 0}, {"normal_force": []}],
-)
-def test_motions_that_no_rig_makes_are_refused(options):
-    with pytest.raises(InvalidValueError):
-        candidate_motions(PATCH, LAW, **options)
 
 
 def test_motions_keep_to_what_the_rig_can_do():

@@ -239,21 +239,6 @@ def test_a_table_fits_eighty_columns_and_a_repl(chosen):
     assert chosen._repr_html_().startswith("<pre>parameter")
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [({"model": "best"}, "model"), ({"nuisance": ("delays",)}, "nuisance"), ({"nuisance": "bias"}, "list")],
-)
-def test_bad_choices_are_named(log, options, words):
-    with pytest.raises(pf.FrictionError, match=words):
-        fitted(log, PATCH, **options)
-
-
-def test_patches_that_follow_their_load_have_one_model(log):
-    patch = pf.ContactPatch.disc(0.012, cells=11, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
-    with pytest.raises(pf.FrictionError, match="model must be 'reduced-published' if the patch changes with the load"):
-        fitted(log, patch, model="distributed")
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["exact", "delay", "drift", "bias", "twist", "distributed", "rim"])
 def test_intervals_hold_the_truth(name, monkeypatch):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planarfriction.identify import Log
-from planarfriction.identify.rig import Rig, SmoothTwist, _joined, first_noise, jitter, least_noise, wrench_noise
+from planarfriction.identify.rig import Rig, SmoothTwist, _joined, jitter, least_noise, wrench_noise
 
 FORCES = np.array([3.0, -2.0, 0.04])
 
@@ -81,7 +81,7 @@ def test_noise_of_several_logs_is_a_mean_square_over_samples():
         logs.append(Log(np.arange(count) * 1e-3, np.ones((count, 3)), np.array([1.0, 4.0, 0.3]) + noise, 2.0))
     squares = [len(log.time) * jitter(log.wrench) ** 2 for log in logs]
     expected = np.sqrt(np.sum(squares, axis=0) / 4000)
-    assert first_noise(logs) == pytest.approx(expected)
+    assert wrench_noise(logs) == pytest.approx(expected)
     assert expected == pytest.approx(np.sqrt(0.75 * 0.02**2 + 0.25 * 0.06**2) * np.array([1.0, 2.0, 0.1]), rel=0.05)
     half = [0.5 * (log.wrench - log.wrench.mean(axis=0)) for log in logs]
     assert wrench_noise(logs, half) == pytest.approx(0.5 * expected, rel=1e-9)

@@ -10,7 +10,7 @@ from typing import Any
 from tests.identify import golden as fits
 from tests.joints import golden as joints
 from tests.limit_surface import golden as surfaces
-from tests.support import computed, recorded, replies, shown
+from tests.support import computed, recorded, refused, replies, shown
 
 FOLDER = Path(__file__).parents[1] / "recorded"
 
@@ -33,7 +33,7 @@ SUBJECTS: dict[str, Callable[[], Any]] = {
     "surfaces": each_of(surfaces.SOURCES),
     **{each.__name__: each for each in (
         computed.patches, computed.pushes, computed.grips, computed.online, computed.scenes, computed.films,
-        replies.replies, replies.swept, replies.explored,
+        replies.replies, replies.swept, replies.explored, refused.refused,
     )},
 }  # fmt: skip
 """Name of a file -> function that computes what it holds."""

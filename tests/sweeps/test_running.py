@@ -112,36 +112,6 @@ def test_values_of_any_kind_have_labels():
     assert data.model.values.tolist() == ["sticky", "plain"] and data.y.shape == (2, 1, 2)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"values": {}}, "values must be a mapping from names to lists of values"),
-        ({"values": {"": [1.0]}}, "name of a swept quantity in values must be a text that is not empty"),
-        ({"values": {"grip": 1.0}}, "grip must be a list of numbers, texts or booleans"),
-        ({"values": {"grip": []}}, "grip must have at least one value"),
-        ({"values": {"grip": [1.0, 1.0]}}, "grip must have each value once, got 1.0 2 times"),
-        ({"values": {"grip": [1.0, "a"]}}, "grip must be a list of numbers, texts"),
-        ({"values": {"grip": [PATCH]}}, "a mapping from labels to values"),
-        ({"values": {"grop": [1.0]}}, "make_scene must take the swept quantities by name"),
-        (
-            {"values": {"status": [1.0]}, "make_scene": lambda status: grip(status)},
-            "not be one of status, failure, run",
-        ),
-        ({"values": {"time": [1.0]}, "make_scene": lambda time: grip(time)}, "not be that of a variable"),
-        ({"make_scene": lambda grip: 1.0}, "make_scene must return a Scene, got float"),
-        ({"measure": 3}, "measure must be a function of a Solution"),
-        ({"measure": lambda solution: object()}, "must return numbers, texts, or arrays of them"),
-        ({"progress": float}, "progress must be a function of a Progress, got TypeError: float() argument"),
-        ({"executor": 3}, "executor must be a concurrent.futures.Executor"),
-        ({"make_scene": lambda grip: 1 / 0}, "all 3 runs failed; the first: grip=1.0: make_scene: ZeroDivisionError"),
-    ],
-)
-def test_mistakes_are_one_line(arguments, words):
-    with pytest.raises(pf.FrictionError) as caught:
-        pf.sweep(**{"make_scene": grip, "values": {"grip": GRIPS}, **arguments})
-    assert words in str(caught.value) and "\n" not in str(caught.value)
-
-
 # ---------------------------------------------------------------------- what a run is
 
 
@@ -251,9 +221,9 @@ def test_a_sweep_goes_on_where_another_has_ended(tmp_path):
 def test_progress_is_told_twice_a_second_and_at_the_end(monkeypatch):
     clock, told = [100.0], []
     monkeypatch.setattr(running, "time", SimpleNamespace(monotonic=lambda: clock[0]))
-    grid = SimpleNamespace(size=8)
-    book = SimpleNamespace(found=2, new=0, failed=1, damaged=0)
-    going = running.Sweeping(None, grid, None, None, book, told.append)  # pyright: ignore
+    going = running.Sweeping(grip, {"grip": np.arange(8.0)}, None, None, told.append)
+    book = going.book
+    book.found, book.failed = 2, 1
     for passed, at_once, count in ((0.4, False, 0), (0.2, False, 1), (0.4, False, 1), (0.1, False, 2), (0.1, True, 3)):
         clock[0] += passed
         book.new += 1
@@ -480,14 +450,6 @@ def test_any_executor_gives_the_same_bits():
     assert turned.x.identical(reference().x) and turned.run.identical(reference().run)
 
 
-def test_processes_give_the_same_bits_and_take_no_lambda():
-    with concurrent.futures.ProcessPoolExecutor(2, FRESH) as pool:
-        with pytest.raises(pf.FrictionError, match="measure must be a function that other processes can import"):
-            pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=lambda solution: 1.0)
-        data = pf.sweep(grip, {"grip": GRIPS, "mass": MASSES}, executor=pool)
-    assert data.identical(reference())
-
-
 class Handed(concurrent.futures.ThreadPoolExecutor):
     """Records how many scenes it is handed at a time, and refuses to hand on one of them."""
 
@@ -580,12 +542,14 @@ def leave(solution: pf.Solution) -> float:
 
 # Python 3.11 tells futures of a pool that broke, also those that were cancelled a moment before: its thread raises
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
-def test_an_executor_that_dies_is_an_error_in_one_line(tmp_path):
-    with (
-        concurrent.futures.ProcessPoolExecutor(1, FRESH) as pool,
-        pytest.raises(SweepError, match="finished runs are kept"),
-    ):
-        pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=leave, out=tmp_path)
+def test_processes_give_the_same_bits_take_no_lambda_and_may_die(tmp_path):
+    with concurrent.futures.ProcessPoolExecutor(1, FRESH) as pool:
+        with pytest.raises(pf.FrictionError, match="measure must be a function that other processes can import"):
+            pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=lambda solution: 1.0)
+        data = pf.sweep(grip, {"grip": GRIPS, "mass": MASSES}, executor=pool)
+        with pytest.raises(SweepError, match="finished runs are kept"):
+            pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=leave, out=tmp_path)
+    assert data.identical(reference())
     with pytest.raises(SweepError, match="the executor ended"):  # it takes no more
         pf.sweep(grip, {"grip": GRIPS}, executor=pool)
 

@@ -103,37 +103,6 @@ def test_contacts_are_called_what_they_are_called_in_results():
     assert Settable(table)(**{"contact 2.count": 4}).contacts[1].count == 4
 
 
-@pytest.mark.parametrize(
-    ("path", "value", "words"),
-    [
-        (
-            "body.mas",
-            1.0,
-            "body has mass, inertia, position, angle, velocity, gravity, outline, size, got 'mas' (did you",
-        ),
-        ("finger.law.mu_c", 1.0, "velocity, spring, fingers, got 'finger' (did you mean 'fingers'?)"),
-        ("fingers.lwa.mu_c", 1.0, "got 'lwa' (did you mean 'law'?)"),
-        ("fingers.law.mu", 1.0, "fingers.law has kind, mu_c, mu_s, v_s, sigma_0, sigma_1"),
-        ("fingers.patch.radios", 1.0, "got 'radios' (did you mean 'radius'?)"),
-        ("body.position.2", 1.0, "be an index from 0 to 1 in body.position, got '2'"),
-        ("body.position.x", 1.0, "be an index from 0 to 1 in body.position, got 'x'"),
-        ("body.mass.x", 1.0, "must end at body.mass, which is 0.2, got 'x' after it"),
-        ("body", 1.0, "be one value, not a table of them: body.mass"),
-        ("fingers", 1.0, "be one value, not a table of them: fingers.name"),
-        ("force.values", 1.0, "the scene has no 'force'"),
-        ("body.mass", -1.0, "mass must be > 0, got -1.0"),
-        ("body.mass", "heavy", "mass must be a number, got 'heavy'"),
-        ("", 1.0, "name a value of the scene"),
-    ],
-)
-def test_paths_that_lead_nowhere_say_what_there_is(file, path, value, words):
-    with pytest.raises(pf.FrictionError) as caught:
-        Settable(file)(**{path: value})
-    assert words in str(caught.value)
-    with pytest.raises(pf.FrictionError):  # before any run
-        pf.sweep(file, {path: [value]})
-
-
 # ---------------------------------------------------------------------- texts
 
 
@@ -155,16 +124,6 @@ def test_texts_are_values(text, path, values):
     found, labels = parse(text)
     assert found == path and list(labels.values()) == values
     assert [type(each) for each in labels.values()] == [type(each) for each in values]
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["x", "=", "=1", "x=", "x=1:2:1", "x=1:2:0.5", "x=1:1:3", "x=a:2:3", "x=nan", "x=1,,2", "x=1,1", "x=[1", "x={a"],
-)
-def test_texts_that_are_none_are_one_line(text):
-    with pytest.raises(pf.FrictionError) as caught:
-        parse(text)
-    assert "\n" not in str(caught.value) and "--set" in str(caught.value)
 
 
 # ---------------------------------------------------------------------- commands

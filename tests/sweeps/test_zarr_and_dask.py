@@ -50,11 +50,6 @@ def test_a_folder_becomes_a_store_finished_or_not(tmp_path, measure):
     assert data.identical(reference() if measure is None else pf.sweep(grip, VALUES, measure=measure))
 
 
-def test_a_zarr_store_is_no_folder_of_runs(tmp_path):
-    with pytest.raises(pf.errors.InvalidValueError, match=r"out must be a folder .*to_zarr"):
-        pf.sweep(grip, VALUES, out=tmp_path / "all.zarr")
-
-
 def slow_end(solution: pf.Solution) -> dict[str, float]:
     time.sleep(0.02)
     return end(solution)

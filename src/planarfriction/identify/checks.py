@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -74,8 +74,7 @@ STILL, SLOWED, JUMP = 2, 0.1, 2.0
 speed of the jump over the same."""
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """Property of a log that does not look as it should."""
 
     name: str
@@ -96,25 +95,23 @@ def check_logs(logs: Sequence[Log], patch: ContactPatch) -> tuple[Finding, ...]:
 
     Raises InvalidValueError, one line, for what no fit can make sense of.
     """
-    findings = tuple(finding for log in logs for finding in check_log(log, patch))
-    _refuse(findings)
-    return findings
+    return _accepted(finding for log in logs for finding in check_log(log, patch))
 
 
-def check_slides(slides: Sequence[Slide], patch: ContactPatch, body: MassProperties) -> list[Finding]:
+def check_slides(slides: Sequence[Slide], patch: ContactPatch, body: MassProperties) -> tuple[Finding, ...]:
     """Check slides of a body on `patch`: units of time, places and angles, and trackers that froze.
 
     Raises InvalidValueError, one line, for what no fit can make sense of.
     """
-    findings = [each for each in (check_slide_units(slides, patch, body), *map(check_frozen, slides)) if each]
-    _refuse(findings)
-    return findings
+    return _accepted(each for each in (check_slide_units(slides, patch, body), *map(check_frozen, slides)) if each)
 
 
-def _refuse(findings: Sequence[Finding]) -> None:
+def _accepted(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    findings = tuple(findings)
     for finding in findings:
         if finding.refuses:
             raise InvalidValueError(finding.name, finding.rule, finding.found)
+    return findings
 
 
 def with_findings(result: Identification, logs: Sequence[Log], findings: Sequence[Finding]) -> Identification:
@@ -144,8 +141,7 @@ def check_log(log: Log, patch: ContactPatch) -> list[Finding]:
 # ---------------------------------------------------------------------- work and direction
 
 
-@dataclass(frozen=True)
-class Sliding:
+class Sliding(NamedTuple):
     """Samples of a log that slide, S of them, and the N cells of its patch."""
 
     twist: np.ndarray
@@ -172,14 +168,8 @@ class Sliding:
         rows = np.flatnonzero(np.all([*enough, speed > 0.0, force > 0.0, log.normal_force > 0.0], axis=0))
         rows = rows[:: max(1, -(-len(rows) // MOST))]
         since = log.twist[1:, 2] if log.held else log.twist[:-1, 2]
-        steps = 0.5 * (log.twist[1:, 2] + since) * np.diff(log.time)
-        turned = np.concatenate([[0.0], np.cumsum(steps)])
+        turned = np.append(0.0, np.cumsum(0.5 * (log.twist[1:, 2] + since) * np.diff(log.time)))
         return cls(log.twist[rows], log.wrench[rows], turned[rows], few.levers(), weights, log.channels)
-
-    @property
-    def power(self) -> np.ndarray:
-        """Power of the wrench `[S]` [W]."""
-        return np.einsum("si,si->s", self.twist, self.wrench)
 
     def friction(self, twist: np.ndarray, scale: float) -> np.ndarray:
         """Compute wrenches `[S, 3]` of dry friction under a load of 1 at the twists, on the patch times `scale`."""
@@ -204,11 +194,10 @@ class Sliding:
 
 def check_work(log: Log, sliding: Sliding) -> Finding | None:
     """Check that friction takes work from the moving body; a wrench that gives work has the wrong sign."""
-    power = sliding.power
+    power = np.einsum("si,si->s", sliding.twist, sliding.wrench)
     if len(power) < LEAST or power[power > 0.0].sum() <= AGAINST * np.abs(power).sum():
         return None
-    _, words = _best_reading(sliding)
-    rule = f"act on the moving body, against its motion (it does {words})"
+    rule = f"act on the moving body, against its motion (it does {_best_reading(sliding)[1]})"
     found = f"power > 0 in {100.0 * np.mean(power > 0.0):.4g} % of the samples that slide"
     return Finding(f"wrench of {log.name}", rule, found, refuses=True)
 
@@ -217,7 +206,7 @@ def check_directions(log: Log, sliding: Sliding, size: float) -> Finding | None:
     """Check that the wrench points against the sliding as the patch says, or name a reading that fits far better."""
     if len(sliding.twist) < LEAST:
         return None
-    as_read, _ = sliding.best(sliding.twist, sliding.wrench)
+    as_read = sliding.best(sliding.twist, sliding.wrench)[0]
     if as_read < MISREAD:
         return None
     found = _best_reading(sliding)

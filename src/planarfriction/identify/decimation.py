@@ -107,22 +107,19 @@ def _decimated(log: Log, size: float, edges: np.ndarray, count: int) -> Decimate
         speed += scale * np.where(np.abs(values) > still[-1], np.abs(values), 0.0)
     path = np.concatenate([[0.0], np.cumsum(speed[1:] * np.diff(log.time))])
     chosen = farthest(features(log, edges, still), count)
-    rows = np.unique(np.concatenate([np.arange(int(edges[i]), int(edges[i + 1])) for i in chosen]))
     around = min(int(np.ceil(LONGEST / log.interval)), WINDOW // 2)
-    mask = np.zeros(len(log.time) + 1, dtype=int)
-    np.add.at(mask, np.maximum(edges[chosen] - around, 0), 1)
-    np.add.at(mask, np.minimum(edges[chosen + 1] + around, len(log.time)), -1)
-    stepped = np.flatnonzero(np.cumsum(mask[:-1]) > 0)
+    fitted, near = np.zeros((2, len(log.time)), dtype=bool)
+    for first, last in zip(edges[chosen], edges[chosen + 1], strict=True):
+        fitted[first:last] = near[max(first - around, 0) : last + around] = True
+    stepped = np.flatnonzero(near)
     spans = np.split(stepped, np.flatnonzero(np.diff(stepped) > 1) + 1)
     parts = [
         Log(log.time[s], log.twist[s], log.wrench[s], log.normal_force[s], log.name, held=log.held)
         for s in (slice(span[0], span[-1] + 1) for span in spans)
     ]
     gaps = [_gap(log, path, a[-1], b[0]) for a, b in itertools.pairwise(spans)]
-    time, twist, wrench, load = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("time", "twist", "wrench", "normal_force")
-    )
-    inner = np.searchsorted(stepped, rows)
+    time, twist, wrench, load = (values[stepped] for values in (log.time, log.twist, log.wrench, log.normal_force))
+    inner = np.flatnonzero(fitted[stepped])
     return DecimatedLog(
         time, twist, wrench, load, log.name, log.turns, log.held, tuple(parts), tuple(gaps), inner, len(log.time)
     )  # fmt: skip

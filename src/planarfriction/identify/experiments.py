@@ -24,12 +24,12 @@ from planarfriction import validation
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
-from planarfriction.identify.logs import Log, as_logs
+from planarfriction.identify.logs import Log, as_tuple
 from planarfriction.identify.options import FitOptions, check_noise
 from planarfriction.identify.parameters import ALL, PRIOR, SHAPE_PRIOR, Coordinates, fitted_law
 from planarfriction.identify.problem import LogProblem
 from planarfriction.identify.result import WIDTH, Identification
-from planarfriction.identify.rig import GROUPS, check_groups, first_noise
+from planarfriction.identify.rig import GROUPS, check_groups, wrench_noise
 from planarfriction.laws import LuGre
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy
@@ -152,26 +152,22 @@ def design_experiment(
     validation.instance("law", law, LuGre, "a LuGre law")
     if "breakaway_ratio" in names and law.elasto_plastic is None:
         raise InvalidValueError("parameters", "contain breakaway_ratio only for elasto-plastic bristles", names)
-    before = () if isinstance(logs, (list, tuple)) and not logs else as_logs("logs", logs)
+    before = () if isinstance(logs, (list, tuple)) and not logs else as_tuple("logs", logs, Log)
     chosen = names if wanted is None else known.check_names(wanted, names)
     if motions is None:
         loads = sorted({float(f"{np.median(log.normal_force):.3g}") for log in before}) or [1.0]
         motions = candidate_motions(patch, law, normal_force=loads)
-    candidates = as_logs("motions", motions)
+    candidates = as_tuple("motions", motions, Log)
     for each in candidates:
         if not each.twist.any():
             raise InvalidValueError(f"twist of {each.name}", "move the contact", "0 throughout")
     sigma = _noise(noise, before, candidates, patch, law)
     information = _Information(patch, law, names, tuple(group for group in groups if group != "twist"), sigma)
     so_far = information.prior() + (information.of_logs(before, groups) if before else 0.0)
-    return _ranked(information, so_far, candidates, [names.index(name) for name in chosen])
-
-
-def _ranked(information: _Information, so_far: np.ndarray, motions: Sequence[Log], pick: Sequence[int]) -> MotionPlan:
-    """Rank motions by the information on the picked parameters that they add to that so far, `[F + S, F + S]`."""
-    start, expected = information.covariance(so_far), [information.expected(each) for each in motions]
+    start, expected = information.covariance(so_far), [information.expected(each) for each in candidates]
     added = [information.of_logs((information.measured(each),), information.groups) for each in expected]
     after = [information.covariance(so_far + each) for each in added]
+    pick = [names.index(name) for name in chosen]
     gains = np.array([_entropy(start, pick) - _entropy(each, pick) for each in after])
     errors, order = np.array([information.errors(each) for each in after]), np.argsort(-gains, kind="stable")
     ranked = tuple(expected[i] for i in order), gains[order], information.errors(start), errors[order]
@@ -267,7 +263,7 @@ def _noise(given: Any, logs: Sequence[Log], motions: Sequence[Log], patch: Conta
     if given is not None:
         return check_noise("noise", given)
     if logs:
-        return first_noise(logs)
+        return wrench_noise(logs)
     load = max(float(motion.normal_force.max()) for motion in motions)
     validation.positive("normal_force of the motions", load)
     force = NOISE * law.mu_c * load

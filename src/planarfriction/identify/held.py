@@ -5,23 +5,18 @@ For each, one Gauss-Newton step of it together with all that was fitted, from wh
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.identify.fit import Fit
 from planarfriction.identify.parameters import ALL, LAW, fitted_law
-from planarfriction.identify.uncertainty import Uncertainty
+from planarfriction.identify.uncertainty import RIDGE, Fit, Uncertainty
 
 DENIED = 4.0
 """Standard errors by which the residuals must move a held value to deny it."""
 
-RIDGE = 1e-10
-"""Share of the largest curvature that holds what no sample shows."""
 
-
-@dataclass(frozen=True)
-class Pull:
+class Pull(NamedTuple):
     """Parameter that was held, and the step that the residuals ask of it."""
 
     name: str

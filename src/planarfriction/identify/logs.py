@@ -34,6 +34,9 @@ force is: no contact and no offset is as small as a nanometre."""
 AT_ONCE = 50_000
 """Number of samples that are differentiated together."""
 
+TWO_LOADS = 1.2
+"""Ratio of loads above which logs show if the stiffness grows with the load."""
+
 TURN, QUARTER = 2.0 * np.pi, 0.5 * np.pi
 """One turn, and largest step of an angle, or change of its step, between two samples that shows the turns [rad]."""
 
@@ -220,9 +223,7 @@ class Log(ByValue):
             place = next(k for k, each in enumerate(WRENCH) if each in found)
             motion = TWIST if TWIST[place] in found else MOTION
             moved[:, place], wrench[:, place] = columns[motion[place]], columns[WRENCH[place]]
-        loads = columns.get("normal_force")
-        if loads is None:
-            loads = np.array(normal_force)
+        loads: Any = columns.get("normal_force", normal_force)
         try:
             if motion is TWIST:
                 held = "theta" in found and "omega" in found and is_mean(columns["t"], moved[:, 2], columns["theta"])
@@ -248,12 +249,12 @@ class Log(ByValue):
         return cls(time, twist, np.stack(wrench, -1)[:, index], load[:, index], name, held=held)
 
 
-def as_logs(name: str, log: Log | Sequence[Log]) -> tuple[Log, ...]:
-    """Return one log or several as a tuple, or raise InvalidValueError."""
-    logs = (log,) if isinstance(log, Log) else tuple(log) if isinstance(log, Sequence) else ()
-    if not logs or not all(isinstance(each, Log) for each in logs):
-        raise InvalidValueError(name, "be a Log or a list of them", log)
-    return logs
+def as_tuple(name: str, value: Any, kind: type) -> tuple[Any, ...]:
+    """Return one record of a kind or several as a tuple, or raise InvalidValueError."""
+    result = (value,) if isinstance(value, kind) else tuple(value) if isinstance(value, Sequence) else ()
+    if not result or not all(isinstance(each, kind) for each in result):
+        raise InvalidValueError(name, f"be a {kind.__name__} or a list of them", value)
+    return result
 
 
 def one_coordinate(logs: Sequence[Log]) -> bool:
@@ -261,6 +262,20 @@ def one_coordinate(logs: Sequence[Log]) -> bool:
     measured = np.any([log.channels for log in logs], axis=0)
     moving = np.any([log.twist.any(axis=0) for log in logs], axis=0)
     return bool(measured.sum() == 1 and not (moving & ~measured).any())
+
+
+def load_ratio(logs: Sequence[Log]) -> float:
+    """Return the largest load over the least, of which no log has 5 % of its samples beyond."""
+    spans = np.array([np.quantile(log.normal_force[log.normal_force > 0.0], (0.05, 0.95)) for log in logs])
+    return float(spans[:, 1].max() / spans[:, 0].min())
+
+
+def mean_load(log: Log) -> float:
+    """Return the mean of the loads > 0 of a log [N], or raise InvalidValueError."""
+    loaded = log.normal_force[log.normal_force > 0.0]
+    if not len(loaded):
+        raise InvalidValueError(f"normal_force of {log.name}", "be > 0 somewhere", "0 everywhere")
+    return float(loaded.mean())
 
 
 def differentiated(time: ArrayLike, motion: ArrayLike, *, window: int = 7) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.checks import check_slides
-from planarfriction.identify.fit import Fit
+from planarfriction.identify.logs import as_tuple
 from planarfriction.identify.parameters import check_names, fitted_law, scaled_patch
 from planarfriction.identify.problem import Problem
 from planarfriction.identify.result import Identification
@@ -18,7 +18,6 @@ from planarfriction.identify.search import interruptible, multistart, refine
 from planarfriction.identify.slides import (
     MassProperties,
     Slide,
-    as_slides,
     contradictions,
     improve_start,
     slide_poses,
@@ -28,7 +27,7 @@ from planarfriction.identify.slides import (
     verdicts_on_weights,
     weights,
 )
-from planarfriction.identify.uncertainty import correlations, uncertainty_over_slides
+from planarfriction.identify.uncertainty import Fit, correlations, uncertainty_over_slides
 from planarfriction.identify.verdicts import Evidence, Verdict, judge_parameter, verdicts_on_turns
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models import ReducedModelPublished
@@ -118,7 +117,7 @@ def identify_motion(
     IdentificationInterrupted
         Ctrl-C, with the best values so far.
     """
-    slides = as_slides(slides)
+    slides = as_tuple("slides", slides, Slide)
     names = check_names(parameters, MOTION_PARAMETERS)
     validation.instance("body", body, MassProperties, "MassProperties")
     if type(start) is not LuGre:  # a subclass may compute something else from the parameters that are fitted
@@ -272,8 +271,13 @@ def _identification(fit: Fit, problem: SlideProblem, left_out: Sequence[Verdict]
         loads=np.array([problem.body.mass * problem.body.gravity]),
     )
     weighed = np.min((noise / fit.noise) ** 2, axis=1)
+    found = [judge_parameter(evidence, i) for i in range(len(problem.names))]
+    if "contact_radius" in problem.names and not evidence.spinning:  # its spread over few slides may be small by chance
+        found[problem.names.index("contact_radius")] = Verdict("contact_radius", False, "no spin")
+    if (count := int((weighed > 0.0).sum())) < FEW:
+        found.append(Verdict("fit", False, f"the errors come from only {count} slides"))
     verdicts = (
-        *_verdicts(evidence, int((weighed > 0.0).sum())),
+        *filter(None, found),
         *verdicts_on_turns(problem.slides),
         *left_out,
         *verdicts_on_weights(problem.slides, weighed, left / np.median(left)),
@@ -297,16 +301,3 @@ def _identification(fit: Fit, problem: SlideProblem, left_out: Sequence[Verdict]
         starts=fit.starts,
         samples=(samples := sum(len(each["time"]) for each in histories), samples),
     )
-
-
-def _verdicts(evidence: Evidence, slides: int) -> list[Verdict]:
-    """Return the verdicts on the parameters, and on the number of slides."""
-    found = []
-    for i, name in enumerate(evidence.names):
-        verdict = judge_parameter(evidence, i)
-        if name == "contact_radius" and not evidence.spinning:  # the spread over few slides may be small by chance
-            verdict = Verdict(name, False, "no spin")
-        found += [] if verdict is None else [verdict]
-    if slides < FEW:
-        found.append(Verdict("fit", False, f"the errors come from only {slides} slides"))
-    return found

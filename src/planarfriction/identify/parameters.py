@@ -16,8 +16,9 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.derivatives import PARAMETERS
 from planarfriction.errors import InvalidValueError
+from planarfriction.identify.logs import Log
 from planarfriction.laws import ElastoPlastic, LuGre
-from planarfriction.patch import ContactPatch
+from planarfriction.patch import ContactPatch, SoftFinger
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,9 @@ STIFFNESS, RADIUS, SECOND_MOMENT = (PARAMETERS.index(each) for each in ("sigma_0
 PRIOR, SHAPE_PRIOR = 3.0, 1.0
 """Standard deviations a priori of logarithms (a factor of 20), of that of the Stribeck exponent and `mu_s/mu_c - 1`."""
 
+CONSTANT = 0.1
+"""Share by which the load of a log may stray from its mean if the patch changes with the load."""
+
 
 def check_names(names: Sequence[str], known: Collection[str] = tuple(ALL)) -> tuple[str, ...]:
     """Return the names as a tuple, each one of the `known` and given once, or raise InvalidValueError."""
@@ -86,6 +90,22 @@ def check_names(names: Sequence[str], known: Collection[str] = tuple(ALL)) -> tu
             "parameters", "contain contact_radius or soft-finger constants, not both", ", ".join(names)
         )
     return names
+
+
+def check_loads(logs: Sequence[Log], loads: Sequence[float], patch: ContactPatch, names: Sequence[str]) -> None:
+    """Check that a fit can take the logs and their mean loads on a patch, and estimate `names` of a soft finger."""
+    if names and not isinstance(patch.pressure, SoftFinger):
+        raise InvalidValueError("patch", f"have a SoftFinger pressure to estimate {', '.join(names)}", patch.name)
+    for name in ("k", "k_per_newton"):
+        if name in names and getattr(patch.pressure, name) is None:
+            raise InvalidValueError("parameters", f"contain {name} only if the SoftFinger has it", name)
+    for log, load in zip(logs, loads, strict=True):
+        if not log.wrench.any():
+            raise InvalidValueError(f"wrench of {log.name}", "not be 0 throughout", "0 in every sample")
+        if patch.depends_on_load and np.abs(log.normal_force / load - 1.0).max() > CONSTANT:
+            rule = "stay within 10 % of its mean if the patch changes with the load (make one log for each load)"
+            found = f"{log.normal_force.min():g} .. {log.normal_force.max():g} N"
+            raise InvalidValueError(f"normal_force of {log.name}", rule, found)
 
 
 class Coordinates:
@@ -220,13 +240,10 @@ class VectorMap:
 
     def vector(self, values: np.ndarray) -> np.ndarray:
         """Return the vector `[P]` of the model for values `[F]`."""
-        return self._evaluate(values)[0]
+        return self.linearised(values)[0]
 
-    def slopes(self, values: np.ndarray) -> np.ndarray:
-        """Compute the derivatives of the vector with respect to the values, `[P, F]`."""
-        return self._evaluate(values)[1]
-
-    def _evaluate(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def linearised(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Compute the vector and its derivatives with respect to the values, `[P, F]`."""
         vector, slopes = self.base.copy(), np.zeros((len(PARAMETERS), len(self.names)))
         for i, name in enumerate(self.names):
             if name in PARAMETERS:

@@ -12,11 +12,9 @@ import numpy as np
 from planarfriction.derivatives import PARAMETERS, parameters_of
 from planarfriction.identify import parameters as known
 from planarfriction.identify.decimation import redrawn
-from planarfriction.identify.loads import check_loads, mean_load
-from planarfriction.identify.logs import Log
-from planarfriction.identify.loss import FEW, SPOILED, softened
+from planarfriction.identify.logs import Log, mean_load
 from planarfriction.identify.options import FitOptions
-from planarfriction.identify.parameters import RADIUS, Coordinates, VectorMap
+from planarfriction.identify.parameters import RADIUS, Coordinates, VectorMap, check_loads
 from planarfriction.identify.rig import Rig, as_measured, smoothed, wrench_noise
 from planarfriction.identify.simulators import SIMULATORS, PartsPrediction, Prediction
 from planarfriction.identify.uncertainty import covariance
@@ -37,12 +35,34 @@ NEARBY = 0.03
 """Change of the values, as a share, up to which derivatives are kept: it moves no estimate by more than this share of
 its standard error, as they decide on the way to the minimum, and meet residuals of noise there."""
 
+SOFT, SPOILED, FEW = 3.0, 6.0, 0.1
+"""Residuals over the noise at which "soft_l1" passes from their squares to their sizes, and above which they are no
+noise, and share of such ones up to which a robust fit ends without them."""
+
+
+def softened(residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return residuals whose squares are the loss "soft_l1" at a scale of `SOFT`, `[M]`, and their derivatives."""
+    root = np.sqrt(1.0 + (residual / SOFT) ** 2)
+    factor = np.sqrt(2.0 / (1.0 + root))  # no difference of like numbers at small residuals
+    return residual * factor, 1.0 / (root * factor)
+
 
 class Problem:
     """Measurements, a model, and the values that vary: F of the contact, then K of the rig.
 
-    Subclasses predict what was measured, and estimate its noise.
+    Subclasses predict what was measured, and estimate its noise from `values` and the `noise` of before. Given `sigma`
+    `[T, 3]` of each log or slide, `linearised` computes the residuals over it, `[M]`, and their derivatives by the
+    values, `[M, F + K]`.
     """
+
+    numbers: Any
+    """Number of measured numbers."""
+    sizes: Callable[..., list[int]]
+    """Return the number of residuals of each log or slide."""
+    linearised: Callable[..., tuple[np.ndarray, np.ndarray]]
+    even_sigma: Callable[..., list[np.ndarray]]
+    """Return the same noise for all samples, `[T, 3]` of each log or slide."""
+    estimate_noise: Callable[..., tuple[np.ndarray, list[np.ndarray]]]
 
     names: tuple[str, ...]
     """Names of the parameters of the contact, `[F]`."""
@@ -65,27 +85,6 @@ class Problem:
     def coordinates(self, start: np.ndarray) -> Coordinates:
         """Return the optimiser's coordinates for a search from values `[F]`."""
         return Coordinates(self.names, start, self.law.mu_c)
-
-    @property
-    def numbers(self) -> int:
-        """Number of measured numbers."""
-        raise NotImplementedError
-
-    def linearised(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Compute the residuals over `sigma`, `[M]`, and their derivatives `[M, F + K]` with respect to the values."""
-        raise NotImplementedError
-
-    def sizes(self) -> list[int]:
-        """Return the number of residuals of each log or slide."""
-        raise NotImplementedError
-
-    def even_sigma(self, noise: np.ndarray) -> list[np.ndarray]:
-        """Return the same noise for all samples, `[T, 3]` of each log or slide."""
-        raise NotImplementedError
-
-    def estimate_noise(self, values: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Estimate the noise at `values`, from the `noise` of before; returns it with sigma `[T, 3]` of each sample."""
-        raise NotImplementedError
 
     def refine_steps(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> bool:
         """Take more steps between two samples if the estimates ask for it; returns True if they do."""
@@ -213,9 +212,8 @@ class LogProblem(Problem):
         jacobian, residual = self.linearised(values, sigma)[1], self.distances(values, sigma)
         twice = self._scaled(self.shown(values, self._predictions(2 * self.steps)), sigma)
         count = len(self.names)
-        pull = np.diag(1.0 / self.rig.widths)
-        rows = np.concatenate([np.zeros((len(pull), count)), pull], axis=1)
-        inverse = covariance(np.concatenate([jacobian, rows]), np.full(len(values), True))
+        pull = np.eye(len(values))[count:] / self.rig.widths[:, None]
+        inverse = covariance(np.concatenate([jacobian, pull]), np.full(len(values), True))
         errors = np.sqrt(np.diag(inverse))[:count]
         sure = errors < KNOWN * np.abs(values[:count])
         moved = (np.where(np.isfinite(inverse), inverse, 0.0) @ (jacobian.T @ (twice - residual)))[:count]
@@ -282,10 +280,8 @@ class LogProblem(Problem):
 
     def _near(self, values: np.ndarray, others: np.ndarray) -> bool:
         """Return True if no value differs by more than `NEARBY` from another one, as a share of its size."""
-        if len(values) != len(others):
-            return False
         centre = [self.base["contact_radius"] if name in ("centre_x", "centre_y") else 0.0 for name in self.names]
-        sizes = np.concatenate([np.maximum(np.abs(values[: len(centre)]), centre), self.rig.widths])[: len(values)]
+        sizes = np.concatenate([np.maximum(np.abs(values[: len(centre)]), centre), self.rig.widths])
         return bool((np.abs(values - others) <= NEARBY * sizes).all())
 
     def _derive(self, values: np.ndarray) -> None:
@@ -293,11 +289,10 @@ class LogProblem(Problem):
         contact, rig = self.split(values)
         found = []
         for i, (prediction, each) in enumerate(zip(self.predictions, self.maps, strict=True)):
-            per_value = each.slopes(contact)
+            vector, per_value = each.linearised(contact)
             rows = np.flatnonzero(per_value.any(axis=1))
-            wrench, slope, later = prediction.sensitivities(
-                each.vector(contact), [PARAMETERS[row] for row in rows], self.rig.delay(rig)
-            )
+            names = [PARAMETERS[row] for row in rows]
+            wrench, slope, later = prediction.sensitivities(vector, names, self.rig.delay(rig))
             shown, factor, of_rig = self.rig.added(i, rig, wrench, later)
             slope = factor[:, None, None] * (slope @ per_value[rows])
             found.append((shown, np.concatenate([slope, of_rig], axis=-1)))
@@ -349,12 +344,10 @@ class LogProblem(Problem):
         for prediction, each, log, twist in zip(self.predictions, self.maps, self.logs, self.twists, strict=True):
             square = np.broadcast_to(noise**2, log.wrench.shape).copy()
             vector = each.vector(contact)
-            channels = np.flatnonzero(twist.noisy & ("twist" in self.rig.groups))
-            base = prediction.wrenches(vector) if len(channels) else None
-            for k in channels:
-                square += (
-                    prediction.moved(vector, *(np.eye(3)[k] * each for each in (twist.left, twist.noise))) - base
-                ) ** 2
+            channels = np.diag(twist.noisy & ("twist" in self.rig.groups))
+            base = prediction.wrenches(vector) if channels.any() else None
+            for one in channels[channels.any(axis=1)]:
+                square += (prediction.moved(vector, one * twist.left, one * twist.noise) - base) ** 2
             sigma.append(np.sqrt(square))
         return sigma
 
@@ -368,11 +361,10 @@ class LogProblem(Problem):
             return None
         random, base = np.random.default_rng(0), self.shown(values)
         result = []
+        both = [*zip(self.twists, noisy, self.logs, strict=True)]
         for _ in range(draws):
-            both = [*zip(self.twists, noisy, strict=True)]
-            drawn = [twist.values + np.where(on, twist.error(random), 0.0) for twist, on in both]
-            between = [(log, twist.noise * on) for log, (twist, on) in zip(self.logs, both, strict=True)]
-            logs = [redrawn(log, noise, random) for log, noise in between]
+            drawn = [twist.values + np.where(on, twist.error(random), 0.0) for twist, on, _ in both]
+            logs = [redrawn(log, twist.noise * on, random) for twist, on, log in both]
             shown = self.shown(values, self._predictions(self.steps, drawn, logs))
             change = [new - old + log.wrench for new, old, log in zip(shown, base, self.logs, strict=True)]
             result.append(self._scaled(change, sigma))

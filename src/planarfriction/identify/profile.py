@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from planarfriction.identify.fit import Fit
 from planarfriction.identify.parameters import ALL
 from planarfriction.identify.search import Descent
-from planarfriction.identify.uncertainty import Uncertainty, covariance_of
+from planarfriction.identify.uncertainty import Fit, Uncertainty, covariance_of
 from planarfriction.identify.verdicts import VAGUE
 
 REACH, NEAR, ROUNDS = 2.0, 0.8, 3

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import html
 import textwrap
 from collections.abc import Mapping
@@ -143,11 +142,9 @@ class Identification(ByValue):
         lines = [f"Identified: {', '.join(known)}." if known else "None of the parameters is identifiable."]
         if 0 < len(known) < len(self.names):
             lines[0] += f" Not identifiable: {', '.join(name for name in self.names if name not in known)}."
-        lines += [f"{_sentence(each.reason)}" for each in self.verdicts if each.parameter == "fit"]
+        reasons = [each.reason for each in self.verdicts if each.parameter == "fit"]
+        lines += [f"{reason[0].upper()}{reason[1:]}." for reason in reasons]
         return "\n".join(textwrap.fill(line, WIDTH) for line in lines)
-
-    def _remark(self, name: str) -> str:
-        return "; ".join(each.reason for each in self.verdicts if each.parameter == name)
 
     def table(self) -> str:
         """Return text in 80 columns: estimates, goodness of fit, correlations, then the verdicts and the rig."""
@@ -157,8 +154,8 @@ class Identification(ByValue):
             spread = _digits(error, 2) if error < 1e3 * max(abs(value), 1e-12) else "unknown"
             between = shown if self.identifiable(name) else "not identifiable"
             lines.append(f"{name:<15}{_digits(value, 5):>12}{spread:>12}  {between:<25}{ALL[name].unit}".rstrip())
-            if reasons := self._remark(name):
-                remarks.append(textwrap.fill(f"{name}: {reasons}", WIDTH, subsequent_indent="  "))
+            if reasons := [each.reason for each in self.verdicts if each.parameter == name]:
+                remarks.append(textwrap.fill(f"{name}: {'; '.join(reasons)}", WIDTH, subsequent_indent="  "))
         heading = f"{'parameter':<15}{'value':>12}{'std. error':>12}  {'95 % interval':<25}unit"
         if self.scores:
             samples = f"{self.samples[0]:,} samples, {len(self.names)} parameters"
@@ -214,7 +211,7 @@ class Identification(ByValue):
                 for each in self.rig
             ],
             "model": self.chosen,
-            "models": [dataclasses.asdict(each) for each in self.scores],
+            "models": [each._asdict() for each in self.scores],
             "residual_correlations": {
                 name: column.tolist()
                 for (name, _), column in zip(self.channels, self.residual_correlations().T, strict=True)
@@ -232,11 +229,6 @@ def _digits(value: float, count: int) -> str:
     """Return a number with `count` significant digits, without an exponent where it has few zeros."""
     text = f"{value:.{count}g}"
     return np.format_float_positional(float(text), trim="-") if 1e-3 <= abs(value) < 1e6 else text
-
-
-def _sentence(text: str) -> str:
-    """Return words as a sentence."""
-    return f"{text[0].upper()}{text[1:]}."
 
 
 def _short(each: Nuisance) -> str:

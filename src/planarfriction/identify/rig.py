@@ -9,8 +9,7 @@ zero, so that what looks like friction in the data shows as a wider interval of 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -56,8 +55,7 @@ SMOOTHNESS = 10.0 ** np.arange(0.0, 10.0, 0.25)
 """Weights of the third differences among which a smooth twist is chosen."""
 
 
-@dataclass(frozen=True)
-class Nuisance:
+class Nuisance(NamedTuple):
     """Quantity of the rig that was estimated along with the contact."""
 
     name: str
@@ -75,8 +73,7 @@ class Nuisance:
         return self.value - 1.96 * self.error, self.value + 1.96 * self.error
 
 
-@dataclass(frozen=True)
-class _Column:
+class _Column(NamedTuple):
     name: str
     unit: str
     log: int | None
@@ -106,6 +103,8 @@ class Rig:
                 columns.append(_Column("load_drift" if k == 1 else f"load_drift_{k}", "-", i, width, k))
         self.columns = tuple(columns)
         self.widths = np.array([each.width for each in columns])
+        self.limits = np.array([LONGEST / DELAY if each.name == "delay" else np.inf for each in columns])
+        """Largest sizes of the values, over their widths, `[K]`."""
 
     def _effects(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the derivatives `[T, K]` of the factor on the wrench of log i, and those `[T, 3, K]` of its zeros."""
@@ -117,11 +116,6 @@ class Rig:
                 changed = factor[:, j] if column.channel is None else zeros[:, column.channel, j]
                 changed[:] = shapes[:, column.degree]
         return factor, zeros
-
-    @property
-    def limits(self) -> np.ndarray:
-        """Largest sizes of the values, over their widths, `[K]`."""
-        return np.array([LONGEST / DELAY if each.name == "delay" else np.inf for each in self.columns])
 
     def delay(self, values: np.ndarray) -> float:
         """Return the delay [s] among the values `[K]`."""
@@ -140,21 +134,17 @@ class Rig:
             slopes[:, :, 0] = factor[:, None] * later
         return factor[:, None] * wrench + by_zeros @ values, factor, slopes
 
-    @property
-    def _scale(self) -> np.ndarray:
-        """Mask `[K]` of the load cell's scale."""
-        return np.array([each.name == "load_scale" for each in self.columns], dtype=bool)
-
     def with_drift(self, values: np.ndarray) -> np.ndarray:
         """Return the widths `[K]`, that of the load cell's scale grown by the cell's drift, half its largest range."""
         drift = max(0.5 * float(np.ptp(self._effects(i)[0] @ values)) for i in range(len(self.logs)))
-        return np.where(self._scale, np.hypot(SCALE, drift / EDGE), self.widths)
+        scales = np.array([each.name == "load_scale" for each in self.columns], dtype=bool)
+        return np.where(scales, np.hypot(SCALE, drift / EDGE), self.widths)
 
     def strains(self, values: np.ndarray) -> list[tuple[float, str]]:
         """Return the size of each value `[K]` over its width and in words, the largest first."""
-        sizes, words = np.abs(values / self.with_drift(values)), []
-        for column, value in zip(self.columns, values, strict=True):
-            words.append(f"{column.name} {value:.2g} {column.unit}".removesuffix(" -"))
+        both = zip(self.columns, values, strict=True)
+        words = [f"{column.name} {value:.2g} {column.unit}".removesuffix(" -") for column, value in both]
+        sizes = np.abs(values / self.with_drift(values))
         return sorted(zip(sizes.tolist(), words, strict=True), reverse=True)
 
     def found(self, values: np.ndarray, errors: np.ndarray) -> tuple[Nuisance, ...]:
@@ -196,28 +186,22 @@ def least_noise(logs: Sequence[Log]) -> np.ndarray:
     return LEAST_NOISE * np.array([force, force, max(largest[2], np.finfo(float).tiny)])
 
 
-def first_noise(logs: Sequence[Log]) -> np.ndarray:
-    """Estimate the noise `[3]` of the wrenches from the logs alone."""
-    return wrench_noise(logs, [log.wrench for log in logs])
-
-
-def wrench_noise(logs: Sequence[Log], residuals: Sequence[np.ndarray]) -> np.ndarray:
+def wrench_noise(logs: Sequence[Log], *residuals: Sequence[np.ndarray]) -> np.ndarray:
     """Estimate the noise `[3]` of the wrench from the jitter of the logs or of the residuals `[T, 3]`, if that is less.
 
     A fit takes the sharp turns of friction out of the signal; its errors extend over many samples and so leave the
     jitter alone. The noise of a channel that no log has is infinite.
     """
     sigmas = []
-    for values in ([log.wrench for log in logs], residuals):
+    for values in ([log.wrench for log in logs], *residuals):
         squares = [len(v) * np.where(log.channels, jitter(v), 0.0) ** 2 for log, v in zip(logs, values, strict=True)]
         samples = np.sum([len(log.time) * log.channels for log in logs], axis=0)
         sigmas.append(np.sqrt(np.sum(squares, axis=0) / np.maximum(samples, 1)))
     measured = np.any([log.channels for log in logs], axis=0)
-    return np.where(measured, np.maximum(np.minimum(*sigmas), least_noise(logs)), np.inf)
+    return np.where(measured, np.maximum(np.min(sigmas, axis=0), least_noise(logs)), np.inf)
 
 
-@dataclass(frozen=True)
-class SmoothTwist:
+class SmoothTwist(NamedTuple):
     """Twist from which noise was removed as far as possible."""
 
     values: np.ndarray
@@ -253,19 +237,17 @@ def smoothed(log: Log) -> SmoothTwist:
     if len(log.parts) > 1:
         return _joined([smoothed(part) for part in log.parts])
     found = as_measured(log)
-    if not log.even or len(log.time) < LEAST_TO_SMOOTH:
-        return found
-    values, noise, left, weights = log.twist.copy(), found.noise, found.left, found.weights
-    size = np.maximum(np.sqrt(np.mean(log.twist**2, axis=0)), np.finfo(float).tiny)
-    for k in np.flatnonzero(noise > QUIET * size):
-        values[:, k], noise[k], left[k], weights[k] = _smooth(log.twist[:, k])
-    return SmoothTwist(values, noise, left, weights)
+    if log.even and len(log.time) >= LEAST_TO_SMOOTH:
+        size = np.maximum(np.sqrt(np.mean(log.twist**2, axis=0)), np.finfo(float).tiny)
+        for k in np.flatnonzero(found.noise > QUIET * size):
+            found.values[:, k], found.noise[k], found.left[k], found.weights[k] = _smooth(log.twist[:, k])
+    return found
 
 
 def as_measured(log: Log) -> SmoothTwist:
     """Return the twist of a log as it was measured, with the noise that it has."""
     noise = jitter(log.twist)
-    return SmoothTwist(log.twist, noise, noise.copy(), np.zeros(3))
+    return SmoothTwist(log.twist.copy(), noise, noise.copy(), np.zeros(3))
 
 
 def _joined(parts: Sequence[SmoothTwist]) -> SmoothTwist:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -11,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from planarfriction.errors import IdentificationInterrupted
-from planarfriction.identify.fit import Fit
 from planarfriction.identify.parameters import ALL, Coordinates
 from planarfriction.identify.problem import LogProblem, Problem
+from planarfriction.identify.uncertainty import Fit
 from planarfriction.laws import LuGre
 
 ROUGH, FINE = 0.1, 1e-3
@@ -61,7 +60,7 @@ def refine(fit: Fit) -> Fit:
         fit = _best(problem, coordinates, [fit.x], noise, sigma, ROUGH if finer else FINE)
     problem.forget()
     found = _best(problem, coordinates, [fit.x], noise, sigma, FINE)
-    return dataclasses.replace(found, starts=starts)
+    return found._replace(starts=starts)
 
 
 def warm_start(problem: LogProblem, lead: Fit, guesses: Sequence[np.ndarray], *, noise: np.ndarray) -> Fit:

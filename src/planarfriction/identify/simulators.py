@@ -20,8 +20,8 @@ from planarfriction.patch import ContactPatch
 CHANGE = 1e-6
 """Step of difference quotients as a share of the parameter: rounding and curvature both stay below 1e-5."""
 
-LEAST_CHANGE = {"centre_x": 1e-3, "centre_y": 1e-3}
-"""Least sizes [m] of which `CHANGE` is a share: a centre may lie at zero."""
+LEAST_CHANGE = 1e-3
+"""Least size [m] of which `CHANGE` is a share: a centre may lie at zero."""
 
 CELLS, DISCS = 400, 200
 """Number of cells above which discs stand for a patch, and number of these: on smooth motions about points inside they
@@ -38,66 +38,39 @@ LAW_NAMES = PARAMETERS[:8]
 CENTRE = [PARAMETERS.index("centre_x"), PARAMETERS.index("centre_y")]
 
 
-class Simulator:
-    """Wrenches of a model whose vector of parameters (`derivatives.PARAMETERS`) varies, from bristles at rest.
+class PublishedSimulator:
+    """Wrenches of `ReducedModelPublished`, whose vector of parameters (`derivatives.PARAMETERS`) varies, from rest.
 
     Twists `[N, 3]` and loads `[N]` are held for `dt` each; wrenches `[N, 3]` and their derivatives `[N, 3, P]` with
     respect to the parameters `names` are those at the ends of the steps.
     """
 
-    model_class: type
-    """Class of the friction model."""
-    own_radius = False
+    own_radius = True
     """True if the contact radius is a number of its own, not that of the cells; the patch may then change with load."""
 
     def __init__(self, patch: ContactPatch, law: LuGre, surface: type[LimitSurface] = LimitSurfaceTablePublished):
-        """Prepare the simulation of a patch of fixed shape."""
+        self._model = self.model(patch, law, surface)
 
     @classmethod
     def model(cls, patch: ContactPatch, law: LuGre, surface: type[LimitSurface]) -> Any:
         """Make the friction model of a patch and a law."""
-        return cls.model_class(patch, law)
+        return ReducedModelPublished(patch, law, surface=surface(patch))
 
     def wrenches(self, twists: np.ndarray, loads: np.ndarray, dt: float, vector: np.ndarray) -> np.ndarray:
         """Compute the wrenches `[N, 3]`."""
-        raise NotImplementedError
-
-    def sensitivities(
-        self, twists: np.ndarray, loads: np.ndarray, dt: float, vector: np.ndarray, names: Sequence[str]
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Compute the wrenches `[N, 3]` and their derivatives `[N, 3, P]`."""
-        raise NotImplementedError
-
-    def work(self, parameters: int) -> float:
-        """Estimate the time that the derivatives of one step take [us]."""
-        raise NotImplementedError
-
-
-class PublishedSimulator(Simulator):
-    """Simulator of `ReducedModelPublished`, in which contact radius and second moment are numbers of their own."""
-
-    model_class = ReducedModelPublished
-    own_radius = True
-
-    def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
-        self._model = self.model(patch, law, surface)
-
-    @classmethod
-    def model(cls, patch, law, surface):
-        return ReducedModelPublished(patch, law, surface=surface(patch))
-
-    def wrenches(self, twists, loads, dt, vector):
         return rollout(self._model, None, twists, loads, dt, parameters=vector).wrenches
 
-    def sensitivities(self, twists, loads, dt, vector, names):
+    def sensitivities(self, twists, loads, dt, vector, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+        """Compute the wrenches `[N, 3]` and their derivatives `[N, 3, P]`."""
         found = rollout_jacobian(self._model, None, twists, loads, dt, names, parameters=vector)
         return found.wrenches, found.d_wrenches
 
-    def work(self, parameters):
+    def work(self, parameters: int) -> float:
+        """Estimate the time that the derivatives of one step take [us]."""
         return 0.3 * parameters
 
 
-class DistributedSimulator(Simulator):
+class DistributedSimulator(PublishedSimulator):
     """Simulator of `DistributedModel` on a fixed patch, which is scaled and moved through its twists and wrenches.
 
     That is exact: a point at `p = c + s (p0 - c0)` has the velocity that its image `p0` has at the twist
@@ -105,11 +78,16 @@ class DistributedSimulator(Simulator):
     """
 
     model_class: type = DistributedModel
+    own_radius = False
 
     def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
         self._radius, self._centre = float(patch.contact_radius()), patch.centre_of_pressure()
         few = patch.discs(DISCS) if self.model_class is DistributedModel and patch.cells > CELLS else patch
-        self._model = self.model_class(few, law)
+        self._model = self.model(few, law, surface)
+
+    @classmethod
+    def model(cls, patch, law, surface):
+        return cls.model_class(patch, law)
 
     def wrenches(self, twists, loads, dt, vector):
         own = vector[: len(LAW_NAMES)]
@@ -138,7 +116,7 @@ class DistributedSimulator(Simulator):
         def differences(first: int, last: int) -> None:
             for name in shape[first:last]:
                 at = PARAMETERS.index(name)
-                change = CHANGE * max(abs(vector[at]), LEAST_CHANGE.get(name, 1e-3))
+                change = CHANGE * max(abs(vector[at]), LEAST_CHANGE)
                 moved = vector + change * (np.arange(len(vector)) == at)
                 slopes[..., names.index(name)] = (self.wrenches(twists, loads, dt, moved) - base) / change
 
@@ -156,7 +134,7 @@ class ReducedSimulator(DistributedSimulator):
     model_class = ReducedModel
 
 
-SIMULATORS: dict[str, type[Simulator]] = {
+SIMULATORS: dict[str, type[PublishedSimulator]] = {
     "reduced-published": PublishedSimulator,
     "reduced": ReducedSimulator,
     "distributed": DistributedSimulator,
@@ -174,7 +152,7 @@ class Prediction:
     later than the motion by a `delay` [s] are read between the nodes, by cubic polynomials with continuous slopes.
     """
 
-    def __init__(self, simulator: Simulator, log: Log, twist: np.ndarray, *, begins: str = "rest", refine: int = 1):
+    def __init__(self, simulator: Any, log: Log, twist: np.ndarray, *, begins: str = "rest", refine: int = 1):
         from scipy.interpolate import Akima1DInterpolator
 
         self.simulator, self.log = simulator, log
@@ -183,18 +161,16 @@ class Prediction:
         self.steps = min(steps * refine, MOST_STEPS)
         self._half = 0.5 * length / self.steps
         grid = np.linspace(log.time[0], log.time[-1], self.steps + 1)
-        nodes = np.clip(grid, log.time[0], log.time[-1])
         if log.held:
-            twists = twist[np.searchsorted(log.time, nodes - EVEN * log.interval)]
+            twists = twist[np.searchsorted(log.time, grid - EVEN * log.interval)]
         else:
-            twists = Akima1DInterpolator(log.time, twist)(nodes)
+            twists = Akima1DInterpolator(log.time, twist)(grid)
         loads = np.interp(grid, log.time, log.normal_force)
         order = np.repeat(np.arange(self.steps + 1), 2)  # 0, 0, 1, 1, 2, 2, ..., steps, steps
         order = order[2:] if log.held else order[1:-1]
-        before = np.zeros(STEADY_STEPS if begins == "steady" else 1, dtype=int)
-        order = np.concatenate([before, order])
+        self._first = STEADY_STEPS - 1 if begins == "steady" else 0
+        order = np.pad(order, (self._first + 1, 0))
         self._inputs: tuple[np.ndarray, np.ndarray, Any] = twists[order], loads[order], self._half
-        self._first = len(before) - 1
         self._between: Any = 0.0
 
     def wrenches(self, vector: np.ndarray, delay: float = 0.0) -> np.ndarray:
@@ -242,7 +218,7 @@ class Prediction:
 class PartsPrediction(Prediction):
     """Simulated wrenches of a decimated log: of its parts, with the motion between them in longer steps."""
 
-    def __init__(self, simulator: Simulator, log: DecimatedLog, twist: np.ndarray, *, begins="rest", refine: int = 1):
+    def __init__(self, simulator: Any, log: DecimatedLog, twist: np.ndarray, *, begins="rest", refine: int = 1):
         self.simulator, self.log = simulator, log
         ends = np.cumsum([len(part.time) for part in log.parts])
         self._parts = [

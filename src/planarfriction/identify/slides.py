@@ -14,7 +14,6 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.derivatives.scene_inputs import STATES
 from planarfriction.equality import ByValue, Checked, checked
-from planarfriction.errors import InvalidValueError
 from planarfriction.identify.logs import increasing, unwrapped
 from planarfriction.identify.options import check_noise
 from planarfriction.identify.verdicts import Verdict
@@ -179,14 +178,6 @@ def predict_slide(model: Any, body: MassProperties, slide: Slide, *, samples: in
         return slide_poses(model, body, slide.time, slide.pose[0], slide.twist)
     start = fit_start(model, body, slide, samples=samples)
     return slide_poses(model, body, slide.time, start[:3], start[3:])
-
-
-def as_slides(slides: Slide | Sequence[Slide]) -> tuple[Slide, ...]:
-    """Return one slide or several as a tuple, or raise InvalidValueError."""
-    result = (slides,) if isinstance(slides, Slide) else tuple(slides)
-    if not result or not all(isinstance(each, Slide) for each in result):
-        raise InvalidValueError("slides", "be a Slide or a list of them", slides)
-    return result
 
 
 # ---------------------------------------------------------------------- slides that friction cannot explain

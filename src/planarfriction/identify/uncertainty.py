@@ -8,12 +8,11 @@ slides, each counts as one observation.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.identify.fit import Fit
-from planarfriction.identify.parameters import ALL, PRIOR
+from planarfriction.identify.parameters import ALL, PRIOR, Coordinates
 
 EXCESS = 1.25
 """Largest reduced chi-square that is still put down to the estimate of the noise."""
@@ -38,9 +37,38 @@ HUGE, RIDGE = 1e200, 1e-10
 """Variance that stands for an infinite one during a change of coordinates, and share of the largest curvature that
 holds parameters on which no sample depends."""
 
+NEAR = 4.0
+"""Mean square of the residuals over that of the noise up to which a rough fit is near the data: steps are coarse."""
 
-@dataclass(frozen=True)
-class Uncertainty:
+
+class Fit(NamedTuple):
+    """Problem with its best values."""
+
+    problem: Any
+    """`Problem` that was solved."""
+    coordinates: Coordinates
+    x: np.ndarray
+    """Coordinates `[F + K]`."""
+    values: np.ndarray
+    """Values `[F + K]`."""
+    at_bound: np.ndarray
+    """Mask of the coordinates that lie on a bound, `[F + K]`."""
+    noise: np.ndarray
+    """Noise of each channel, `[3]`, or of the channels of each slide, `[S, 3]`."""
+    sigma: list[np.ndarray]
+    """Standard deviation of each residual, `[T, 3]` of each log or slide."""
+    starts: tuple[int, int]
+    """Number of starting points that led to this minimum, and number of all."""
+    cost: float
+    """Half the sum of the squared residuals."""
+
+    @property
+    def near(self) -> bool:
+        """True if hardly more than noise is left."""
+        return 2.0 * self.cost <= NEAR * self.problem.numbers
+
+
+class Uncertainty(NamedTuple):
     """Covariance and residuals of a fit of logs, with its tests."""
 
     covariance: np.ndarray
@@ -94,7 +122,9 @@ def uncertainty(fit: Fit) -> Uncertainty:
     plain, bread = inverse * max(reduced_chi2, 1.0), np.where(np.isfinite(inverse), inverse, 0.0)
     factor = np.sqrt(np.maximum(_over_time(fit, residual, jacobian, pull, neighbours, bread) / np.diag(plain), 1.0))
     factor = np.where(np.isfinite(factor), factor, 1.0)
-    whole = plain * np.outer(factor, factor) + _of_twists(fit, jacobian, bread)
+    moved = problem.twist_residuals(fit.values, fit.sigma, DRAWS)
+    shifts = np.zeros((1, len(bread))) if moved is None else moved @ jacobian @ bread
+    whole = plain * np.outer(factor, factor) + shifts.T @ shifts / len(shifts)
     return Uncertainty(
         whole * ALLOWANCE**2,
         jacobian,
@@ -172,15 +202,6 @@ def _over_time(fit: Fit, residual, jacobian, pull, neighbours: float, bread: np.
         sums = upto[lags + 1 :] - upto[: -lags - 1]
         filling = filling + sums.T @ sums / (lags + 1.0)
     return np.maximum(np.einsum("ij,jk,ik->i", bread, filling, bread), 0.0)
-
-
-def _of_twists(fit: Fit, jacobian: np.ndarray, bread: np.ndarray) -> np.ndarray:
-    """Compute the covariance of the values from drawn errors of the twists."""
-    moved = fit.problem.twist_residuals(fit.values, fit.sigma, DRAWS)
-    if moved is None:
-        return np.zeros((len(fit.values),) * 2)
-    shifts = moved @ jacobian @ bread
-    return shifts.T @ shifts / len(shifts)
 
 
 def _held_out(fit: Fit, residual, jacobian, pull) -> tuple[np.ndarray, np.ndarray]:

@@ -7,20 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction.described import described
 from planarfriction.identify.decimation import samples_of
-from planarfriction.identify.fit import Fit
 from planarfriction.identify.held import Pull
-from planarfriction.identify.loads import TWO_LOADS
-from planarfriction.identify.logs import Log
-from planarfriction.identify.loss import SPOILED
+from planarfriction.identify.logs import TWO_LOADS, Log
 from planarfriction.identify.parameters import ALL, SOFT_FINGER, bristles_of
+from planarfriction.identify.problem import SPOILED
 from planarfriction.identify.rig import CHANNELS
-from planarfriction.identify.uncertainty import HELD_OUT, STRAIN, Uncertainty
+from planarfriction.identify.uncertainty import HELD_OUT, STRAIN, Fit, Uncertainty
 
 TWO_SIDED = 1.96
 """Standard errors on either side of the estimate that hold 95 % of a normal distribution."""
@@ -109,8 +107,7 @@ def interval(name: str, value: float, error: float) -> tuple[float, float]:
 # ---------------------------------------------------------------------- choice of the model
 
 
-@dataclass(frozen=True)
-class ModelScore:
+class ModelScore(NamedTuple):
     """Measures of how well one model explains the data."""
 
     model: str
@@ -130,8 +127,7 @@ class ModelScore:
         return f"{self.model} with {self.bristles}"
 
 
-@dataclass(frozen=True)
-class Candidate:
+class Candidate(NamedTuple):
     """Model that was fitted, with its uncertainty."""
 
     fit: Fit
@@ -141,25 +137,14 @@ class Candidate:
     def score(self) -> ModelScore:
         """Measures of how well the model explains the data."""
         problem, u = self.fit.problem, self.uncertainty
-        scores = u.score, u.reduced_chi2, u.rejected
-        return ModelScore(
-            problem.model, bristles_of(problem.law, problem.names), *scores, problem.by_name(self.fit.values)
-        )
+        bristles, estimates = bristles_of(problem.law, problem.names), problem.by_name(self.fit.values)
+        return ModelScore(problem.model, bristles, u.score, u.reduced_chi2, u.rejected, estimates)
 
     def cost(self, sigma: list[np.ndarray]) -> float:
         """Compute half the sum of the squared residuals over `sigma` `[T, 3]` of each log, and of the pulls."""
         fit = self.fit
         pull = fit.coordinates.prior(fit.x)[0]
         return 0.5 * float((fit.problem.residual(fit.values, sigma) ** 2).sum() + (pull**2).sum())
-
-
-def dependence(name: str, interval: tuple[float, float], others: Sequence[ModelScore]) -> str:
-    """Return a text if one of the `others`, which also fit, has an estimate outside the interval, or nothing."""
-    low, high = interval
-    for other in others:
-        if not low <= other.estimates[name] <= high:
-            return f"depends on the model: {other}, which also fits, gives {other.estimates[name]:.3g}"
-    return ""
 
 
 def rivals(best: Candidate, candidates: Sequence[Candidate]) -> list[ModelScore]:
@@ -245,7 +230,11 @@ def judge(
             meaningless = f"{chosen.model} does not explain the data, so this value has no meaning"
             denied = [each for each in held if not each.agrees and abs(each.moves[i]) > MOVED * evidence.errors[i]]
             resting = f"it changes by {denied[0].moves[i]:+.2g} if {denied[0].name} is not held" if denied else ""
-            if reason := meaningless if u.rejected else resting or dependence(name, (low, high), others):
+            for each in others if not u.rejected and not resting else ():
+                if not low <= each.estimates[name] <= high:
+                    resting = f"depends on the model: {each}, which also fits, gives {each.estimates[name]:.3g}"
+                    break
+            if reason := meaningless if u.rejected else resting:
                 verdict = Verdict(name, False, reason)
         if verdict is not None:
             verdicts.append(verdict)

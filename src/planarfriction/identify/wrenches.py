@@ -15,15 +15,13 @@ from planarfriction.identify import parameters as known
 from planarfriction.identify.checks import check_logs, size_of, with_findings
 from planarfriction.identify.decimation import decimated, samples_of
 from planarfriction.identify.held import pulls_of_held
-from planarfriction.identify.loads import TWO_LOADS, load_ratio, mean_load
-from planarfriction.identify.logs import Log, as_logs, one_coordinate
-from planarfriction.identify.loss import SPOILED
+from planarfriction.identify.logs import TWO_LOADS, Log, as_tuple, load_ratio, mean_load, one_coordinate
 from planarfriction.identify.options import FitOptions
 from planarfriction.identify.parameters import fitted_law, scaled_patch
-from planarfriction.identify.problem import LogProblem
+from planarfriction.identify.problem import SPOILED, LogProblem
 from planarfriction.identify.profile import stretches
 from planarfriction.identify.result import Identification
-from planarfriction.identify.rig import CHANNELS, Nuisance, first_noise
+from planarfriction.identify.rig import CHANNELS, Nuisance, wrench_noise
 from planarfriction.identify.search import guess_starts, interruptible, multistart, refine, warm_start
 from planarfriction.identify.simulators import SIMULATORS
 from planarfriction.identify.uncertainty import correlations, uncertainty
@@ -99,7 +97,7 @@ def identify_lugre(
     IdentificationInterrupted
         Ctrl-C, with the best values so far.
     """
-    logs, names = as_logs("log", log), known.check_names(parameters)
+    logs, names = as_tuple("log", log, Log), known.check_names(parameters)
     if names == known.USUAL and one_coordinate(logs):
         names = tuple(name for name in names if name != "contact_radius")
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
@@ -111,9 +109,10 @@ def identify_lugre(
         raise InvalidValueError("model", "be 'reduced' or 'distributed' for a law with a reference_load", model)
     findings = check_logs(logs, patch)
     whole, logs = logs, decimated(logs, size_of(logs[0], patch), options.samples)
-    noise = first_noise(logs) if options.noise is None else np.array(options.noise)
-    if given is not None and not patch.depends_on_load and models != (LEAD,):
-        kinds += _of_fixed_stiffness(kinds, logs)
+    noise = wrench_noise(logs) if options.noise is None else np.array(options.noise)
+    if given is not None and not patch.depends_on_load and models != (LEAD,) and load_ratio(logs) >= TWO_LOADS:
+        usual = float(np.median([mean_load(log) for log in logs]))
+        kinds += [dataclasses.replace(law, reference_load=usual) for law in kinds]
     problems: list[LogProblem] = []
     guesses, leads, candidates, skipped = [], [], [], []
     with interruptible(problems):
@@ -150,22 +149,13 @@ def identify_lugre(
     return with_findings(found, whole, findings)
 
 
-def _of_fixed_stiffness(laws: Sequence[LuGre], logs: Sequence[Log]) -> list[LuGre]:
-    """Return the laws with a stiffness that does not grow with the load, if loads differ enough to tell it."""
-    if load_ratio(logs) < TWO_LOADS:
-        return []
-    usual = float(np.median([mean_load(log) for log in logs]))
-    return [dataclasses.replace(law, reference_load=usual) for law in laws]
-
-
 def _models_to_fit(model: str, patch: ContactPatch, names: Sequence[str]) -> tuple[str, ...]:
     """Return the names of the models to fit; only some take a patch that changes with its load."""
     able = tuple(SIMULATORS)
     if patch.depends_on_load or any(name in known.SOFT_FINGER for name in names):
-        able = tuple(name for name, each in SIMULATORS.items() if each.own_radius)
-        if model not in ("auto", *able):
-            rule = f"be {' or '.join(map(repr, able))} if the patch changes with the load"
-            raise InvalidValueError("model", rule, model)
+        able = (LEAD,)
+        if model not in ("auto", LEAD):
+            raise InvalidValueError("model", f"be {LEAD!r} if the patch changes with the load", model)
     return able if model == "auto" else (model,)
 
 
@@ -191,10 +181,8 @@ def _start_laws(start: Any, bristles: Any, names: Sequence[str]) -> tuple[list[L
     if "breakaway_ratio" in given or "breakaway_ratio" in names:
         kinds = [ElastoPlastic(given["breakaway_ratio"]) if "breakaway_ratio" in given else kinds[0] or USUAL_BRISTLES]
     fields = {name: value for name, value in given.items() if name != "breakaway_ratio"}
-    if "mu_s" not in fields:
-        fields["mu_s"] = max(START_MU_S, fields.get("mu_c", LuGre.mu_c))
-    if "mu_s" in fields and "mu_c" not in fields:
-        fields["mu_c"] = min(LuGre.mu_c, fields["mu_s"])
+    fields.setdefault("mu_s", max(START_MU_S, fields.get("mu_c", LuGre.mu_c)))
+    fields.setdefault("mu_c", min(LuGre.mu_c, fields["mu_s"]))
     return [LuGre(**fields, elasto_plastic=kind) for kind in kinds], given
 
 

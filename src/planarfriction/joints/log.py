@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from planarfriction import validation
 from planarfriction.equality import ByValue, Checked, checked
 from planarfriction.errors import FileError, InvalidValueError
-from planarfriction.identify.logs import LEAST_SAMPLES, increasing, slopes
+from planarfriction.identify.logs import LEAST_SAMPLES, as_tuple, increasing, slopes
 from planarfriction.reading import Table
 
 GRAVITY = 9.81
@@ -219,9 +219,7 @@ class JointLog(ByValue):
 
 def as_joint_logs(logs: JointLog | Sequence[JointLog], plant: Plant) -> tuple[JointLog, ...]:
     """Return one log or several as a tuple, or raise InvalidValueError, for other units than s and rad too."""
-    result = (logs,) if isinstance(logs, JointLog) else tuple(logs) if isinstance(logs, Sequence) else ()
-    if not result or not all(isinstance(each, JointLog) for each in result):
-        raise InvalidValueError("logs", "be a JointLog or a list of them", logs)
+    result = as_tuple("logs", logs, JointLog)
     if len({each.torque is None for each in result}) > 1:
         raise InvalidValueError("logs", "all hold a torque, or none", "some do")
     for log in result:

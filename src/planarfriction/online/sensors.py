@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from planarfriction import validation
-from planarfriction.equality import ByValue, by_parts
+from planarfriction.equality import ByValue, by_parts, checked
 
 GRAVITY = 9.81
 """Gravity [m/s^2]."""
@@ -35,18 +34,13 @@ class Sensors(ByValue):
     Raises InvalidValueError for a value out of range.
     """
 
-    force_noise: float = 0.02
+    force_noise: float = checked(validation.non_negative, default=0.02)
     """Standard deviation of the forces, also of the grip force [N]."""
-    torque_noise: float = 2e-4
+    torque_noise: float = checked(validation.non_negative, default=2e-4)
     """Standard deviation of the torque [N m]."""
-    slip_rate: float = 120.0
+    slip_rate: float = checked(validation.non_negative, default=120.0)
     """Rate of the slip velocity [Hz]; 0 for no such sensor."""
-    quantum: float = 0.95e-3
+    quantum: float = checked(validation.positive, default=0.95e-3)
     """Smallest slip velocity [m/s]: the sensor counts places, so that what a sample leaves out is in the next."""
-    base: float = 0.01
+    base: float = checked(validation.positive, default=0.01)
     """Distance of the two counters whose difference is the spin [m]."""
-
-    def __post_init__(self) -> None:
-        for each in dataclasses.fields(self):
-            check = validation.positive if each.name in ("quantum", "base") else validation.non_negative
-            self._set(**{each.name: check(each.name, getattr(self, each.name))})

@@ -47,8 +47,6 @@ class SliderMotion(NamedTuple):
     """`STICK`, `LEFT` or `RIGHT`."""
     slack: float
     """Distance of the mode from its end: an angle [rad], or a share of the face [-]."""
-    force: np.ndarray
-    """Direction of the pusher's force `[2]`, in the slider's axes."""
     leans: int = 0
     """A face that cannot stay flush: 1 where it turns about its left end, -1 about its right one."""
 
@@ -89,20 +87,13 @@ def motion_at(
         held = LEFT if wanted >= left else RIGHT
     mode = held or (LEFT if wanted >= left else RIGHT if wanted <= right else STICK)
     if mode == STICK:
-        twist, moved, force = _stuck(surface, place, angle + _BEYOND, wanted)
+        twist, moved = _stuck(surface, place, angle + _BEYOND, wanted)
         scale = math.hypot(velocity[0], velocity[1]) / math.hypot(moved[0], moved[1])
-        return SliderMotion(scale * twist, mode, min(wanted - right, left - wanted), force)
+        return SliderMotion(scale * twist, mode, min(wanted - right, left - wanted))
     twist, moved = edges[mode == LEFT]
     scale = (velocity[:2] @ place.normal) / (moved @ place.normal)
-    force = _force(place, angle if mode == LEFT else -angle)
     slack = math.inf if angle == 0.0 else wanted - left if mode == LEFT else right - wanted
-    return SliderMotion(scale * twist, mode, slack, force)
-
-
-def _force(place: TouchPoint, angle: float) -> np.ndarray:
-    """Return a unit force at an angle to the left of the normal."""
-    (x, y), c, s = place.normal.tolist(), math.cos(angle), math.sin(angle)
-    return np.array([c * x - s * y, s * x + c * y])
+    return SliderMotion(scale * twist, mode, slack)
 
 
 def _angle(place: TouchPoint, vector: Any) -> float:
@@ -120,8 +111,8 @@ def pushed_by(surface: LimitSurface, place: TouchPoint, angle: float) -> tuple[n
     return twist, (vx - omega * y, vy + omega * x)
 
 
-def _stuck(surface: LimitSurface, place: TouchPoint, angle: float, wanted: float) -> tuple[np.ndarray, Any, Any]:
-    """Return the twist whose place has a velocity of the wanted angle, that velocity and the direction of the force."""
+def _stuck(surface: LimitSurface, place: TouchPoint, angle: float, wanted: float) -> tuple[np.ndarray, Any]:
+    """Return the twist whose place has a velocity of the wanted angle, and that velocity."""
     from scipy.optimize import brentq
 
     off = lambda each: _angle(place, pushed_by(surface, place, each)[1]) - wanted  # noqa: E731
@@ -129,7 +120,7 @@ def _stuck(surface: LimitSurface, place: TouchPoint, angle: float, wanted: float
         found: float = brentq(off, -angle, angle, xtol=1e-13)  # pyright: ignore
     except ValueError:  # far beyond the end of the mode: a step that will be taken back
         found = math.copysign(angle, -off(angle))
-    return *pushed_by(surface, place, found), _force(place, found)
+    return pushed_by(surface, place, found)
 
 
 # ---------------------------------------------------------------------- a face that lies flush
@@ -145,26 +136,26 @@ def _flush(surface: LimitSurface, place: TouchPoint, mu: float, velocity: np.nda
     stuck = np.array([velocity[0] + omega * y, velocity[1] - omega * x, omega])
     speed = math.hypot(velocity[0], velocity[1]) + abs(omega) * (h + math.hypot(x, y))
 
-    def of(slip: float) -> tuple[np.ndarray, float, float, np.ndarray]:
-        """Return twist, angle of the force, its crossing of the face as a share of the half width, and force."""
+    def of(slip: float) -> tuple[np.ndarray, float, float]:
+        """Return twist, angle of the force, and its crossing of the face as a share of the half width."""
         twist = stuck - slip * np.array([*tangent, 0.0])
         fx, fy, tau = -surface.wrench(twist)
         pressed, along = fx * nx + fy * ny, fx * tangent[0] + fy * tangent[1]
         turn = tau - (x * fy - y * fx)  # about the middle, of the normal force alone
         share = -turn / (pressed * h) if pressed > 0.0 else math.copysign(math.inf, -turn)
-        return twist, math.atan2(along, pressed), share, np.array([fx, fy])
+        return twist, math.atan2(along, pressed), share
 
-    twist, lean, share, force = of(0.0)
+    twist, lean, share = of(0.0)
     mode, slack = STICK, angle - abs(lean)
     if angle == 0.0:
         held = LEFT if lean > 0.0 else RIGHT
     if held in (LEFT, RIGHT) or (not held and slack < 0.0):
         mode = held or (LEFT if lean > 0.0 else RIGHT)
         slip = _slip(lambda u: of(u)[1], angle if mode == LEFT else -angle, speed)
-        twist, _, share, force = of(slip)
+        twist, _, share = of(slip)
         slack = math.inf if angle == 0.0 else slip / speed if mode == LEFT else -slip / speed
     leans = int(math.copysign(1.0, share)) if abs(share) > _EDGE else 0
-    return SliderMotion(twist, mode, min(slack, 1.0 - abs(share)), force, leans)
+    return SliderMotion(twist, mode, min(slack, 1.0 - abs(share)), leans)
 
 
 def _slip(angle_of: Any, wanted: float, speed: float) -> float:
@@ -172,5 +163,5 @@ def _slip(angle_of: Any, wanted: float, speed: float) -> float:
     from scipy.optimize import brentq
 
     # from far to the right to far to the left the force turns from one side of the normal to the other
-    off = lambda x: angle_of(speed * x / (1.0 - abs(x))) - wanted  # noqa: E731
-    return (lambda x: speed * x / (1.0 - abs(x)))(brentq(off, -0.999999, 0.999999, xtol=1e-14))  # pyright: ignore
+    slip: Any = lambda x: speed * x / (1.0 - abs(x))  # noqa: E731
+    return slip(brentq(lambda x: angle_of(slip(x)) - wanted, -0.999999, 0.999999, xtol=1e-14))

@@ -150,7 +150,6 @@ class _ProfileSearch:
         self, grips: Grips, aim: Aim, factors: Sequence[float], times: np.ndarray, between: tuple, holding: float
     ) -> None:
         low, least, high = between
-        self._high = high
         held = times >= SPANS[0] * grips.scene.t_end
         held[-1] = True
         self._grips, self._aim, self._factors, self._times = grips, aim, factors, times

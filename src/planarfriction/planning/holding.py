@@ -62,7 +62,9 @@ def holding_load(wrench: ArrayLike, patch: ContactPatch, mu: float, margin: floa
     if not patch.depends_on_load:
         return (1.0 + margin) * _needed(load, patch, mu, None)
     reach = float(np.hypot(*patch.positions.T).max())
-    low = max(float(np.hypot(*load[:2])), abs(float(load[2])) / reach) / (mu * _strongest(patch))
+    metric = 1.0 if patch.root is None else float(np.linalg.norm(patch.root, ord=2, axis=(-2, -1)).max())
+    strongest = metric * (1.0 + float(np.hypot(*patch.asymmetries().T).max()))  # bounds friction over mu
+    low = max(float(np.hypot(*load[:2])), abs(float(load[2])) / reach) / (mu * strongest)
     tried = low * (1.0 - 1e-9)
     for _ in range(_STEPS):
         if _needed(load, patch, mu, tried) <= tried:
@@ -92,12 +94,6 @@ def _surface(patch: ContactPatch, normal_force: float | None) -> LimitSurface:
     cells = few or (patch.root is not None and patch.root.ndim == 3)
     kind: type[LimitSurface] = LimitSurfaceCells if cells else LimitSurfaceExact
     return kind(patch, normal_force=normal_force)
-
-
-def _strongest(patch: ContactPatch) -> float:
-    """Return an upper bound on friction over mu in any direction."""
-    metric = 1.0 if patch.root is None else float(np.linalg.norm(patch.root, ord=2, axis=(-2, -1)).max())
-    return metric * (1.0 + float(np.hypot(*patch.asymmetries().T).max()))
 
 
 def dynamic_holding_load(

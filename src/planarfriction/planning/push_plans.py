@@ -153,7 +153,7 @@ def plan_push(
             break
         tried = _path(slider, place, x, start)
         both = (path, done), (tried, push(slider, pusher, tried, start=start))
-        path, done = min(both, key=lambda e: _off(e[1], goal))
+        path, done = min(both, key=lambda e: np.abs((e[1].end - goal) * [1.0, 1.0, slider.size]).max())
     ellipsoid = LimitSurfaceEllipsoid(slider.surface.patch, normal_force=slider.surface.normal_force)
     rest = push(Slider(ellipsoid, slider.outline), pusher, path, start=start)
     report = PushReport(
@@ -167,11 +167,6 @@ def plan_push(
 def _triple(values: np.ndarray) -> tuple[float, float, float]:
     x, y, angle = (float(value) for value in values)
     return x, y, angle
-
-
-def _off(done: Push, goal: np.ndarray) -> float:
-    """Return the distance by which a push misses [m]."""
-    return float(np.abs((done.end - goal) * [1.0, 1.0, done.slider.size]).max())
 
 
 def _relative(start: np.ndarray, goal: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.pictures import picture
 from planarfriction.planning.contact_modes import LEFT, RIGHT, STICK, TouchPoint, motion_at
 from planarfriction.planning.slider import Pusher, Slider
-from planarfriction.planning.touch import Scenery, Touch, flush_after, place_of, touch_after
+from planarfriction.planning.touch import FACE, Scenery, Touch, flush_after, place_of, touch_after
 from planarfriction.scenes import Signal
 from planarfriction.scenes.signal import as_signal
 
@@ -124,20 +124,18 @@ def _follow(scenery: Scenery, start: np.ndarray, time: np.ndarray, rtol: float) 
     contact: Touch | None = None
     restless = 0
     for _ in range(MOST_PHASES):
+        if now >= time[-1]:
+            return poses, modes, places
         if contact is None:
-            touched = touch_after(scenery, now, q)
-            until = time[-1] if touched is None else touched[0]
             poses[time > now] = q
+            touched = touch_after(scenery, now, q)
             if touched is None:
                 return poses, modes, places
-            now, contact, held = until, touched[1], ""
+            (now, contact), held = touched, ""
         end = scenery.piece_end(now)
         place, velocity = place_of(scenery, contact, now, q, forward=True)
         if velocity[:2] @ place.normal <= 0.0:
-            contact = None
-            now = np.nextafter(now, np.inf) if now < time[-1] else now
-            if now >= time[-1]:
-                return poses, modes, places
+            now, contact = float(np.nextafter(now, np.inf)), None
             continue
         first = motion_at(slider.surface, place, mu, velocity)
         mode = first.mode if first.mode != held else _neighbour(slider, place, mu, velocity, held)
@@ -160,14 +158,12 @@ def _follow(scenery: Scenery, start: np.ndarray, time: np.ndarray, rtol: float) 
         q, now = run.y[:, -1].copy(), float(run.t[-1])
         poses[time > now] = q
         if run.status == 0:
-            if now >= time[-1]:
-                return poses, modes, places
             continue
         what = next(name for name, each in zip(ends, run.t_events, strict=True) if len(each))
         if what == "mode":
             held = mode
         elif what == "closes":
-            contact = scenery.flush(contact, now, q)
+            contact = scenery.flush(now, q)
         else:
             contact = None
     raise InvalidValueError("path", f"change the contact of the pusher at most {MOST_PHASES} times", f"t = {now:g} s")
@@ -200,7 +196,7 @@ def _phase(scenery: Scenery, contact: Touch, mode: str) -> tuple[Any, dict[str, 
 
     ends: dict[str, Any] = {"mode": lambda t, q: motion(t, *q)[0].slack} if mode else {}
     ends |= {"leaves": approach, "ends": functools.partial(scenery.within, contact)}
-    if scenery.closes(contact):
+    if scenery.pusher.width > 0.0 and contact.kind != FACE:  # something else may begin to touch
         ends["closes"] = functools.partial(scenery.clear, contact)
     for event in ends.values():
         event.terminal, event.direction = True, -1

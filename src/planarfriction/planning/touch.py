@@ -37,7 +37,7 @@ class Scenery:
 
     def __init__(self, slider: Slider, pusher: Pusher, times: np.ndarray, poses: np.ndarray) -> None:
         self.slider, self.pusher = slider, pusher
-        self._times, self._poses = times, poses
+        self._times, self._poses, self.path_end = times, poses, float(times[-1])
         self._rates = np.diff(poses, axis=0) / np.diff(times)[:, None]
         self._ends, self.near = pusher.ends, _NEAR * slider.size
         edges = np.roll(slider.outline, -1, axis=0) - slider.outline
@@ -89,11 +89,6 @@ class Scenery:
         """Return the distance of pusher and slider [m], negative where they overlap."""
         return min(each[0] for each in self.features(t, q))
 
-    @property
-    def path_end(self) -> float:
-        """Time at which the path ends [s]."""
-        return float(self._times[-1])
-
     def not_before(self, t: float, q: np.ndarray) -> float:
         """Return a time up to which a free pusher cannot have gone further than it is away from a slider at rest."""
         import shapely
@@ -106,15 +101,11 @@ class Scenery:
         end = self.piece_end(t)
         return min(end, t + away / speed) if speed * (end - t) > away else end
 
-    def closes(self, contact: Touch) -> bool:
-        """Return True if something else may begin to touch."""
-        return self.pusher.width > 0.0 and contact.kind != FACE
-
     def clear(self, contact: Touch, t: float, q: np.ndarray) -> float:
         """Return the distance of all that does not touch yet [m]."""
         return min(gap for gap, each in self.features(t, q) if not _same(contact, each, len(self._lengths))) + self.near
 
-    def flush(self, contact: Touch, t: float, q: np.ndarray) -> Touch:
+    def flush(self, t: float, q: np.ndarray) -> Touch:
         """Return the face at the edge that it has closed with."""
         c, s = math.cos(self.pose(t)[2] - q[2]), math.sin(self.pose(t)[2] - q[2])
         along = self.slider.inward @ [c, s]
@@ -205,7 +196,7 @@ def touch_after(scenery: Scenery, t: float, q: np.ndarray) -> tuple[float, Touch
             at = brentq(off, low, high, xtol=1e-14 * max(abs(high), 1.0))
             near = [each for gap, each in scenery.features(at, q) if gap < 100.0 * scenery.near]  # pyright: ignore
             if len(near) > 1:
-                return at, scenery.flush(near[0], at, q)  # pyright: ignore
+                return at, scenery.flush(at, q)  # pyright: ignore
             return at, min(scenery.features(at, q))[1]  # pyright: ignore
         low, before = high, after
     return None

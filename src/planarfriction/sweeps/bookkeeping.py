@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.scenes import Scene
 from planarfriction.scenes.signal import SAME_TIME
 from planarfriction.scenes.solution import History
 from planarfriction.sweeps.quantities import Grid
@@ -20,8 +21,6 @@ from planarfriction.writing import make_folder, replacing, write_text
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from planarfriction.scenes import Scene
 
 MOST_NUMBERS = 2 * 10**9
 """Largest number of numbers of one variable in memory: 16 GB."""
@@ -82,9 +81,19 @@ class Bookkeeper:
         return record is not None
 
     def add(self, index: Index, key: str, record: Record, scene: Scene | None) -> None:
-        """Keep the record of a run that has just ended."""
+        """Keep the record of a run that has just ended for the next file, or write the file of a failure."""
         if self._folder is not None:
-            self._store(self._folder / f"{key}.failed.json", key, record, scene)
+            failed = self._folder / f"{key}.failed.json"
+            if record.status != FAILED:
+                self._open[key] = record
+                with contextlib.suppress(OSError):
+                    failed.unlink()
+            elif key:  # there is a scene
+                try:
+                    write_text(failed, failure(record.reason, scene))
+                except FileError:
+                    if not failed.is_dir():
+                        raise
         self.new += 1
         if record.status == FAILED:
             self.failed += 1
@@ -102,40 +111,21 @@ class Bookkeeper:
             self._open.clear()
             self._written = now
 
-    def _store(self, failed: Path, key: str, record: Record, scene: Scene | None) -> None:
-        """Keep the record of a run for the next file, or write the file of a failure."""
-        if record.status != FAILED:
-            self._open[key] = record
-            with contextlib.suppress(OSError):
-                failed.unlink()
-        elif key:  # there is a scene
-            try:
-                write_text(failed, failure(record.reason, scene))
-            except FileError:
-                if not failed.is_dir():
-                    raise
-
     def dataset(self) -> xr.Dataset:
         """Return the whole as one dataset; if the axis is the time, runs may have gone along it differently far."""
         import xarray as xr
 
         variables = self._results()
-        variables |= {
-            name: History(tuple(self.grid.labels), values, {"long_name": OWN[name]})
-            for name, values in self._outcome_arrays().items()
-        }
+        run, status, failure = (np.full(self.grid.shape, text, dtype=object) for text in ("", MISSING, ""))
+        for index, (key, record) in self.runs.items():
+            run[index], status[index], failure[index] = key, record.status, record.reason
+        for name, texts in (("run", run), ("status", status), ("failure", failure)):
+            variables[name] = History(tuple(self.grid.labels), texts.astype(str), {"long_name": OWN[name]})
         variables |= {name: ((name,), np.array(labels)) for name, labels in self.grid.labels.items()}
         coordinates = [name for name, each in variables.items() if each[0] == (name,)]
         return xr.Dataset(variables).set_coords(coordinates)
 
     # ------------------------------------------------------------------ arrays
-
-    def _outcome_arrays(self) -> dict[str, np.ndarray]:
-        """Return the outcomes as arrays of texts over the grid."""
-        run, status, failure = (np.full(self.grid.shape, text, dtype=object) for text in ("", MISSING, ""))
-        for index, (key, record) in self.runs.items():
-            run[index], status[index], failure[index] = key, record.status, record.reason
-        return {"run": run.astype(str), "status": status.astype(str), "failure": failure.astype(str)}
 
     def _results(self) -> dict[str, Any]:
         """Return the variables of all runs over the grid; a run that differs from the first one has failed."""

@@ -11,21 +11,16 @@ import operator
 import types
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from planarfriction import __version__
 from planarfriction.errors import InvalidValueError
+from planarfriction.scenes import Scene, Signal
 from planarfriction.scenes.files import scene_to_dict
 from planarfriction.scenes.model_files import model_to_dict
-from planarfriction.scenes.signal import Signal
-
-if TYPE_CHECKING:
-    from planarfriction.scenes import Scene
 
 LAYOUT = 3
 """Number of the layout of stored runs: files of another layout do not count."""
-
-_JSON = json.JSONEncoder(sort_keys=True)
 
 KEPT = 32
 """Number of models, with the maps they have built, and of plain forms that are kept for later scenes."""
@@ -103,7 +98,7 @@ class Keys:
 
 
 def _digest(value: Any) -> str:
-    return hashlib.sha256(_JSON.encode(value).encode(errors="surrogatepass")).hexdigest()[:32]
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode(errors="surrogatepass")).hexdigest()[:32]
 
 
 def _kept(held: dict[Any, Any], key: Any, make: Callable[[], Any]) -> Any:

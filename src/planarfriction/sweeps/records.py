@@ -9,15 +9,13 @@ import secrets
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction.errors import FrictionError, InvalidValueError, one_line
-from planarfriction.scenes.solution import History, Solution
-
-if TYPE_CHECKING:
-    from planarfriction.scenes import Scene
+from planarfriction.scenes import Scene, Solution
+from planarfriction.scenes.solution import History
 
 FAILED = "failed"
 """Status of a run that ended with an error; the others are those of a `Solution`."""
@@ -100,19 +98,13 @@ def variables(found: Any, measure: Callable[..., Any] | None = None) -> dict[str
         axes = {str(name): found[name] for name in found.coords if found[name].dims == (name,)}
         found = {**{str(name): found[name] for name in found.data_vars}, **axes}
     elif not isinstance(found, Mapping):
-        found = {getattr(found, "name", None) or _name_of(measure): found}
-    return {_checked_name(name): _variable(name, value) for name, value in found.items()}
-
-
-def _name_of(measure: Any) -> str:
-    name = getattr(measure, "__name__", "")
-    return name if name.isidentifier() else "measured"  # as "<lambda>" is not
-
-
-def _checked_name(name: Any) -> str:
-    if not (isinstance(name, str) and name):
-        raise InvalidValueError("measure", "use texts as names of what it returns", name)
-    return name
+        name = getattr(measure, "__name__", "")
+        name = name if name.isidentifier() else "measured"  # as "<lambda>" is not
+        found = {getattr(found, "name", None) or name: found}
+    for name in found:
+        if not (isinstance(name, str) and name):
+            raise InvalidValueError("measure", "use texts as names of what it returns", name)
+    return {name: _variable(name, value) for name, value in found.items()}
 
 
 def _variable(name: str, value: Any) -> History:

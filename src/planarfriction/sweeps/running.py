@@ -24,17 +24,15 @@ from planarfriction import validation
 from planarfriction.compiler import threads
 from planarfriction.described import described
 from planarfriction.errors import InvalidValueError, SweepError, SweepInterrupted
-from planarfriction.scenes import Scene
+from planarfriction.scenes import Scene, Solution
 from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, Index
 from planarfriction.sweeps.keys import Keys
-from planarfriction.sweeps.quantities import Grid, check_takes, grid_of
+from planarfriction.sweeps.quantities import check_takes, grid_of
 from planarfriction.sweeps.records import FAILED, TURN, Batch, Record, reason_of, run_all
 from planarfriction.sweeps.settings import Settable
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from planarfriction.scenes import Solution
 
 _BETWEEN = 0.5
 """Time between two reports of progress [s]."""
@@ -136,9 +134,13 @@ def sweep(
     """
     if executor is not None and not isinstance(executor, Executor):
         raise InvalidValueError("executor", "be a concurrent.futures.Executor, or None", executor)
-    sweeping = _sweeping(make_scene, values, out, measure, progress)
+    sweeping = Sweeping(make_scene, values, out, measure, progress)
     if isinstance(executor, ProcessPoolExecutor):
-        _check_travels(measure)
+        try:
+            pickle.dumps(measure)
+        except Exception as error:
+            rule = "be a function that other processes can import, such as one defined in a module"
+            raise InvalidValueError("measure", rule, reason_of(error)) from None
     book = sweeping.book
     try:
         sweeping.go(executor)
@@ -162,71 +164,38 @@ def finished_runs(
 
     Raises InvalidValueError for an argument that breaks its rule, and FileError for a folder that cannot be written.
     """
-    sweeping = _sweeping(make_scene, values, out, measure, None)
+    sweeping = Sweeping(make_scene, values, out, measure, None)
     for _ in sweeping.jobs():
         pass
     return sweeping.book.dataset()
 
 
-def _sweeping(make_scene: Any, values: Any, out: Any, measure: Any, progress: Any) -> Sweeping:
-    """Check the arguments of a sweep, and prepare it."""
-    grid = grid_of(values)
-    make = _maker(make_scene, grid)
-    for name in OWN:
-        if name in grid.labels:
-            raise InvalidValueError("name of a swept quantity", f"not be one of {', '.join(OWN)}", name)
-    for name, given, of in (("measure", measure, "Solution"), ("progress", progress, "Progress")):
-        if not (given is None or callable(given)):
-            raise InvalidValueError(name, f"be a function of a {of}, or None", given)
-    keys = Keys(measure, kept=out is not None)
-    return Sweeping(make, grid, keys, measure, _bookkeeper(out, grid, timed=measure is None), progress)
-
-
-def _bookkeeper(out: str | Path | None, grid: Grid, timed: bool) -> Bookkeeper:
-    """Make the bookkeeper for a folder, or for the memory."""
-    if out is None:
-        return Bookkeeper(grid, timed)
-    if not str(validation.path("out", out)).isprintable():
-        raise InvalidValueError("out", "be a path of printable characters", ascii(str(out)))
-    if Path(out).suffix == ".zarr":
-        rule = "be a folder (the dataset becomes a zarr store by its own method: data.to_zarr(path, zarr_format=2))"
-        raise InvalidValueError("out", rule, str(out))
-    return Bookkeeper(grid, timed, out)
-
-
-def _maker(make_scene: Any, grid: Grid) -> Callable[..., Scene]:
-    """Return the function that makes scenes, for a function, a scene or a path."""
-    if callable(make_scene):
-        return check_takes(make_scene, list(grid.values))
-    if not isinstance(make_scene, (Scene, str, Path)):
-        raise InvalidValueError("make_scene", "be a function that returns a Scene, a Scene, or a path", make_scene)
-    make = Settable(make_scene)
-    make.check(grid.values)
-    return make
-
-
-def _check_travels(measure: Any) -> None:
-    try:
-        pickle.dumps(measure)
-    except Exception as error:
-        rule = "be a function that other processes can import, such as one defined in a module"
-        raise InvalidValueError("measure", rule, reason_of(error)) from None
-
-
 class Sweeping:
     """Sweep in progress: hands out the runs and gives their results to the bookkeeper."""
 
-    def __init__(
-        self,
-        make_scene: Callable[..., Scene],
-        grid: Grid,
-        keys: Keys,
-        measure: Callable[[Solution], Any] | None,
-        book: Bookkeeper,
-        report: Callable[[Progress], object] | None,
-    ) -> None:
-        self._make_scene, self.grid, self._keys, self._measure = make_scene, grid, keys, measure
-        self.book, self._report = book, report
+    def __init__(self, make_scene: Any, values: Any, out: Any, measure: Any, report: Any) -> None:
+        """Check the arguments of a sweep, and prepare it."""
+        self.grid = grid = grid_of(values)
+        if callable(make_scene):
+            self._make_scene = check_takes(make_scene, list(grid.values))
+        elif isinstance(make_scene, (Scene, str, Path)):
+            self._make_scene = make = Settable(make_scene)
+            make.check(grid.values)
+        else:
+            raise InvalidValueError("make_scene", "be a function that returns a Scene, a Scene, or a path", make_scene)
+        for name in OWN:
+            if name in grid.labels:
+                raise InvalidValueError("name of a swept quantity", f"not be one of {', '.join(OWN)}", name)
+        for name, given, of in (("measure", measure, "Solution"), ("progress", report, "Progress")):
+            if not (given is None or callable(given)):
+                raise InvalidValueError(name, f"be a function of a {of}, or None", given)
+        self._keys, self._measure, self._report = Keys(measure, kept=out is not None), measure, report
+        if out is not None and not str(validation.path("out", out)).isprintable():
+            raise InvalidValueError("out", "be a path of printable characters", ascii(str(out)))
+        if out is not None and Path(out).suffix == ".zarr":
+            rule = "be a folder (the dataset becomes a zarr store by its own method: data.to_zarr(path, zarr_format=2))"
+            raise InvalidValueError("out", rule, str(out))
+        self.book = Bookkeeper(grid, measure is None, out)
         self._ended, self._size = "", 1
         self._begin = self._reported = time.monotonic()
         self._stopped = threading.Event()

@@ -65,8 +65,11 @@ class Settable:
             self(**{path: each[-1] for path, each in values.items()})
 
     def _changed(self, table: Mapping[str, Any], path: str, value: Any) -> dict[str, Any]:
-        tables = _tables(table)
-        names = self._contacts(tables)
+        tables = table.get("contact", [])
+        tables = tables if isinstance(tables, list) else [tables]
+        default = "contact" if len(tables) == 1 else "contact {}"  # as a solution names them
+        given = [each.get("name") if isinstance(each, Mapping) else None for each in tables]
+        names = [str(name or default.format(number)) for number, name in enumerate(given, 1)]
         for number, name in enumerate(names):
             if path.startswith(f"{name}."):
                 parts = path[len(name) + 1 :].split(".")
@@ -77,18 +80,6 @@ class Settable:
             raise InvalidValueError(path, f"be one value, not a table of them: {there}", "the table")
         keys = [key for key in SCENE_KEYS if key != "contact"]
         return _set(table, path.split("."), value, path, "the scene", [*keys, *names, *self._others])
-
-    @staticmethod
-    def _contacts(tables: list[Any]) -> list[str]:
-        """Return the names of the contacts, as a solution has them."""
-        default = "contact" if len(tables) == 1 else "contact {}"
-        given = [each.get("name") if isinstance(each, Mapping) else None for each in tables]
-        return [str(name or default.format(number)) for number, name in enumerate(given, 1)]
-
-
-def _tables(table: Mapping[str, Any]) -> list[Any]:
-    tables = table.get("contact", [])
-    return tables if isinstance(tables, list) else [tables]
 
 
 def _set(table: Any, parts: list[str], value: Any, path: str, where: str, valid: Sequence[str] | None = None) -> Any:

@@ -7,39 +7,22 @@ from planarfriction.online.loops.square_root import ROOT, N
 TWIST, MU, RATIO, SCALE, BIAS = 3, 6, 7, 8, 9
 """Places of the unknowns after the remainder of the count [m], which is the error of a place."""
 
-SLIP = ROOT + N * N
-"""Place of the probability of slip, the first after the root."""
-TIME = SLIP + 1
-"""Place of the time [s]."""
-BOUND = TIME + 1
-"""Place of the log of the largest gauge of the wrench while it stuck."""
-PEAK = BOUND + 1
-"""Place of the log of a recent largest gauge."""
-GAUGE = PEAK + 1
-"""Place of the log of the gauge now."""
-SEEN = GAUGE + 1
-"""Place of the filtered wrench over load (3)."""
-PLACE = SEEN + 3
-"""Place of the recent displacement (3)."""
-REST = PLACE + 3
-"""Place of the time since the last velocity [s]."""
-SUM = REST + 1
-"""Place of the sum of the wrench over load since the last velocity (3)."""
-LOADS = SUM + 3
-"""Place of the sum of the load since the last velocity."""
-COUNT = LOADS + 1
-"""Place of the number of samples since the last velocity."""
-OLD = COUNT + 1
-"""Place of sum (3), loads and count of the samples before the last velocity, with that velocity (3) and its time."""
-CHAIN = OLD + 9
-"""Place of the number of velocities in a row that were those of sliding."""
-BACK = CHAIN + 1
-"""Place of the number of samples in a row that were not later than one before."""
-LEVER = BACK + 1
-"""Place of the share of the torque in the gauge of the wrench."""
-DISSIPATED = LEVER + 1
-"""Place of the recent mean of the dissipated power over that of the force times the speed [-]."""
-TARED = DISSIPATED + 1
-"""Place of 1 once the bias is known: an empty hand showed it, or it is as small as the noise."""
-STATE = TARED + 1
-"""Length of the state."""
+# Places of what the filter remembers:
+SLIP = ROOT + N * N  # the probability of slip, the first after the root
+TIME = SLIP + 1  # the time [s]
+BOUND = TIME + 1  # the log of the largest gauge of the wrench while it stuck
+PEAK = BOUND + 1  # the log of a recent largest gauge
+GAUGE = PEAK + 1  # the log of the gauge now
+SEEN = GAUGE + 1  # the filtered wrench over load (3)
+PLACE = SEEN + 3  # the recent displacement (3)
+REST = PLACE + 3  # the time since the last velocity [s]
+SUM = REST + 1  # the sum of the wrench over load since the last velocity (3)
+LOADS = SUM + 3  # the sum of the load since the last velocity
+COUNT = LOADS + 1  # the number of samples since the last velocity
+OLD = COUNT + 1  # sum (3), loads and count of the samples before the last velocity, with that velocity (3) and its time
+CHAIN = OLD + 9  # the number of velocities in a row that were those of sliding
+BACK = CHAIN + 1  # the number of samples in a row that were not later than one before
+LEVER = BACK + 1  # the share of the torque in the gauge of the wrench
+DISSIPATED = LEVER + 1  # the recent mean of the dissipated power over that of the force times the speed [-]
+TARED = DISSIPATED + 1  # 1 once the bias is known: an empty hand showed it, or it is as small as the noise
+STATE = TARED + 1  # length of the state

@@ -18,30 +18,7 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
 from planarfriction.kernels.vectors import clear
-from planarfriction.online.loops.filter_state import (
-    BACK,
-    BIAS,
-    BOUND,
-    CHAIN,
-    COUNT,
-    DISSIPATED,
-    GAUGE,
-    LEVER,
-    LOADS,
-    MU,
-    OLD,
-    PEAK,
-    PLACE,
-    RATIO,
-    REST,
-    SCALE,
-    SEEN,
-    SLIP,
-    SUM,
-    TARED,
-    TIME,
-    TWIST,
-)
+from planarfriction.online.loops import filter_state as at
 from planarfriction.online.loops.square_root import ROOT, N, measure, reset, spread, variance_of
 
 RESTART = 10.0
@@ -158,13 +135,13 @@ def _normal(x):
 @kernel
 def _scale(settings, s, load):
     """Return the radius at a load over that of the surface."""
-    return math.exp(s[SCALE] + settings.growth * math.log(load / settings.reference))
+    return math.exp(s[at.SCALE] + settings.growth * math.log(load / settings.reference))
 
 
 @kernel
 def _gauge(settings, s, scale, best):
     """Return the gauge of the filtered wrench, the largest `w . dual`; the dual, a twist, goes to `best`."""
-    x, y, z, most = s[SEEN], s[SEEN + 1], s[SEEN + 2] / scale, 0.0
+    x, y, z, most = s[at.SEEN], s[at.SEEN + 1], s[at.SEEN + 2] / scale, 0.0
     for m in range(settings.duals.shape[0]):
         each = x * settings.duals[m, 0] + y * settings.duals[m, 1] + z * settings.duals[m, 2]
         if abs(each) > most:
@@ -172,29 +149,29 @@ def _gauge(settings, s, scale, best):
             sign = 1.0 if each > 0.0 else -1.0
             for i in range(3):
                 best[i] = sign * settings.duals[m, i]
-    s[LEVER] = z * best[2] / max(most, 1e-9)
+    s[at.LEVER] = z * best[2] / max(most, 1e-9)
     return most
 
 
 @kernel
 def _move(settings, s, column):
     """Set the twist to the counted velocity plus what the count left out before, less what it left out at its end."""
-    span = max(s[OLD + 8], 1e-9)
+    span = max(s[at.OLD + 8], 1e-9)
     for i in range(3):
-        if s[CHAIN] <= 2.0:
+        if s[at.CHAIN] <= 2.0:
             reset(s, i, 0.0, settings.remainder[i], column)
-        reset(s, TWIST + i, s[OLD + 5 + i] + s[i] / span, 0.0, column)
+        reset(s, at.TWIST + i, s[at.OLD + 5 + i] + s[i] / span, 0.0, column)
         for j in range(i + 1):
-            s[ROOT + N * (TWIST + i) + j] = s[ROOT + N * i + j] / span
+            s[ROOT + N * (at.TWIST + i) + j] = s[ROOT + N * i + j] / span
         reset(s, i, 0.0, settings.remainder[i], column)
-        s[ROOT + N * (TWIST + i) + i] -= settings.remainder[i] / span
+        s[ROOT + N * (at.TWIST + i) + i] -= settings.remainder[i] / span
 
 
 @kernel
 def _measure(s, h, miss, variance, column):
     """Update the unknowns with a measurement, their logs within bounds."""
     measure(s, h, miss, variance, column)
-    for i in range(MU, BIAS):
+    for i in range(at.MU, at.BIAS):
         s[i] = min(max(s[i], -LARGEST_LOG), LARGEST_LOG)
 
 
@@ -202,20 +179,20 @@ def _measure(s, h, miss, variance, column):
 def _learn(settings, s, h, column, jacobian):
     """Update with the mean wrench and the velocity of the samples before the last velocity, which were sliding."""
     _move(settings, s, column)
-    count = s[OLD + 4]
+    count = s[at.OLD + 4]
     if count == 0.0:
         return
-    load = s[OLD + 3] / count
-    before, power, force2, speed2 = s[SCALE], 0.0, 0.0, 0.0
+    load = s[at.OLD + 3] / count
+    before, power, force2, speed2 = s[at.SCALE], 0.0, 0.0, 0.0
     for i in range(3):
-        w = load * s[OLD + i] / count - s[BIAS + i]
-        power, force2, speed2 = power + w * s[TWIST + i], force2 + w * w, speed2 + s[TWIST + i] * s[TWIST + i]
-    s[DISSIPATED] += (power / math.sqrt(max(force2 * speed2, 1e-300)) - s[DISSIPATED]) / POWERS
-    if s[DISSIPATED] < 0.0:
+        w = load * s[at.OLD + i] / count - s[at.BIAS + i]
+        power, force2, speed2 = power + w * s[at.TWIST + i], force2 + w * w, speed2 + s[at.TWIST + i] * s[at.TWIST + i]
+    s[at.DISSIPATED] += (power / math.sqrt(max(force2 * speed2, 1e-300)) - s[at.DISSIPATED]) / POWERS
+    if s[at.DISSIPATED] < 0.0:
         return  # friction that drives teaches nothing
     for row in range(3):
-        mu, ratio, scale = math.exp(s[MU]), math.exp(s[RATIO]), _scale(settings, s, load)
-        x, y, z = s[TWIST], s[TWIST + 1], scale * s[TWIST + 2]
+        mu, ratio, scale = math.exp(s[at.MU]), math.exp(s[at.RATIO]), _scale(settings, s, load)
+        x, y, z = s[at.TWIST], s[at.TWIST + 1], scale * s[at.TWIST + 2]
         speed = math.sqrt(x * x + y * y + z * z)
         u = sliding(settings.kind, settings.data, 0, settings.size, x, y, z, speed)
         sliding_jacobian(settings.kind, settings.data, 0, settings.size, x, y, z, speed, jacobian)
@@ -230,37 +207,38 @@ def _learn(settings, s, h, column, jacobian):
         for j in range(3):
             unit = (x if j == 0 else (y if j == 1 else z)) / speed
             slope = g * (jacobian[3 * row + j] - along * unit) / speed + by_speed * along * unit
-            h[TWIST + j] = factor * slope * (scale if j == 2 else 1.0)
-        h[MU] = factor * steady * along
-        h[RATIO] = factor * along * mu * ratio * fade
-        h[SCALE] = h[TWIST + 2] * s[TWIST + 2] + (factor * g * along if row == 2 else 0.0)
-        h[BIAS + row] = 1.0
+            h[at.TWIST + j] = factor * slope * (scale if j == 2 else 1.0)
+        h[at.MU] = factor * steady * along
+        h[at.RATIO] = factor * along * mu * ratio * fade
+        h[at.SCALE] = h[at.TWIST + 2] * s[at.TWIST + 2] + (factor * g * along if row == 2 else 0.0)
+        h[at.BIAS + row] = 1.0
         error = settings.model_error * factor * g
         variance = settings.noise[row] / count + error * error
-        _measure(s, h, load * s[OLD + row] / count - factor * g * along - s[BIAS + row], variance, column)
-    s[BOUND] -= s[LEVER] * (s[SCALE] - before)
+        _measure(s, h, load * s[at.OLD + row] / count - factor * g * along - s[at.BIAS + row], variance, column)
+    s[at.BOUND] -= s[at.LEVER] * (s[at.SCALE] - before)
 
 
 @kernel
 def _see(settings, s, v, h, column, jacobian):
     """Take a slip velocity, the mean since the last; return the log of the odds that it is a slip."""
-    span = min(s[REST], PLACE_TIME)
+    span = min(s[at.REST], PLACE_TIME)
     odds, rest, sd2, speed2, far2 = 0.0, 0.7 * settings.quantum, FRESH * FRESH, 0.0, 0.0
     for i in range(3):
-        s[PLACE + i] = s[PLACE + i] * math.exp(-span / PLACE_TIME) + v[i] * span
-        far2 += s[PLACE + i] * s[PLACE + i]
+        s[at.PLACE + i] = s[at.PLACE + i] * math.exp(-span / PLACE_TIME) + v[i] * span
+        far2 += s[at.PLACE + i] * s[at.PLACE + i]
         speed2 += v[i] * v[i]
-        miss = v[i] - (s[TWIST + i] if s[SLIP] > 0.5 else 0.0)
+        miss = v[i] - (s[at.TWIST + i] if s[at.SLIP] > 0.5 else 0.0)
         odds += 0.5 * (v[i] * v[i] / (rest * rest) - miss * miss / sd2) - 0.5 * math.log(sd2 / (rest * rest))
     moves = speed2 > SLOW * SLOW * settings.quantum * settings.quantum
-    if moves and s[CHAIN] >= 2.0:
+    if moves and s[at.CHAIN] >= 2.0:
         _learn(settings, s, h, column, jacobian)
-    s[CHAIN] = s[CHAIN] + 1.0 if moves else 0.0
+    s[at.CHAIN] = s[at.CHAIN] + 1.0 if moves else 0.0
     for i in range(3):
-        s[OLD + i], s[OLD + 5 + i] = s[SUM + i], v[i]
-        s[SUM + i] = 0.0
-        reset(s, TWIST + i, v[i], settings.quantum, column)
-    s[OLD + 3], s[OLD + 4], s[OLD + 8], s[LOADS], s[COUNT], s[REST] = s[LOADS], s[COUNT], s[REST], 0.0, 0.0, 0.0
+        s[at.OLD + i], s[at.OLD + 5 + i] = s[at.SUM + i], v[i]
+        s[at.SUM + i] = 0.0
+        reset(s, at.TWIST + i, v[i], settings.quantum, column)
+    s[at.OLD + 3], s[at.OLD + 4], s[at.OLD + 8] = s[at.LOADS], s[at.COUNT], s[at.REST]
+    s[at.LOADS], s[at.COUNT], s[at.REST] = 0.0, 0.0, 0.0
     return min(max(odds, -8.0), 8.0) + (8.0 if far2 > 16.0 * settings.place * settings.place else 0.0)
 
 
@@ -269,43 +247,43 @@ def _tare(settings, s, wrench, load, h, column):
     """Learn the bias from a wrench of an empty hand, if it may be one."""
     taken = 0.0
     for i in range(3):
-        w = -s[BIAS + i]
+        w = -s[at.BIAS + i]
         for j in range(3):
             w += settings.conjugate[i, j] * wrench[j]
-        friction = math.exp(s[MU]) * load
+        friction = math.exp(s[at.MU]) * load
         variance = settings.noise[i] + friction * friction
-        if w * w < EMPTY * EMPTY * (variance + variance_of(s, BIAS + i, BIAS + i)):
+        if w * w < EMPTY * EMPTY * (variance + variance_of(s, at.BIAS + i, at.BIAS + i)):
             for k in range(N):
-                h[k] = 1.0 if k == BIAS + i else 0.0
+                h[k] = 1.0 if k == at.BIAS + i else 0.0
             _measure(s, h, w, variance, column)
             taken += 1.0
     if taken == 3.0:
-        s[TARED] = 1.0
+        s[at.TARED] = 1.0
 
 
 @kernel
 def _judge(settings, s, load, dt, best):
     """Update the probability of slip with the filtered wrench over load."""
-    sd_s = math.sqrt(variance_of(s, MU, RATIO) + SEEN_ERROR * SEEN_ERROR)
-    sd_c = math.sqrt(variance_of(s, MU, MU) + SEEN_ERROR * SEEN_ERROR)
+    sd_s = math.sqrt(variance_of(s, at.MU, at.RATIO) + SEEN_ERROR * SEEN_ERROR)
+    sd_c = math.sqrt(variance_of(s, at.MU, at.MU) + SEEN_ERROR * SEEN_ERROR)
     level = math.log(max(_gauge(settings, s, _scale(settings, s, load), best), 1e-9))
-    inside = max(0.0, (s[MU] - level) / sd_c - 2.0)
-    begins = CREEPS + BREAKS * _normal((level - s[MU] - s[RATIO]) / sd_s - 1.0)
-    p = s[SLIP]
+    inside = max(0.0, (s[at.MU] - level) / sd_c - 2.0)
+    begins = CREEPS + BREAKS * _normal((level - s[at.MU] - s[at.RATIO]) / sd_s - 1.0)
+    p = s[at.SLIP]
     p = p + (1.0 - p) * min(begins * dt, 0.5) - p * min(LEAVES * dt, 0.5)
     against = math.exp(-0.5 * min(inside * inside, 50.0) * dt / MEMORY)
-    s[SLIP] = p * against / (p * against + 1.0 - p)
-    s[GAUGE] = level
+    s[at.SLIP] = p * against / (p * against + 1.0 - p)
+    s[at.GAUGE] = level
 
 
 @kernel
 def _doubt(settings, s):
     """Return the sum of the flags of numbers that contradict what was assumed."""
-    flags = (0 if s[TARED] > 0.0 else NO_BIAS) + (NO_SIGN if s[DISSIPATED] < 0.0 else 0)
+    flags = (0 if s[at.TARED] > 0.0 else NO_BIAS) + (NO_SIGN if s[at.DISSIPATED] < 0.0 else 0)
     reach = FAR * math.hypot(settings.prior_spread[0], settings.prior_spread[1])
-    far = s[GAUGE] > settings.prior[0] + settings.prior[1] + reach
+    far = s[at.GAUGE] > settings.prior[0] + settings.prior[1] + reach
     for i in range(3):
-        far = far or abs(s[MU + i] - settings.prior[i]) > FAR * settings.prior_spread[i]
+        far = far or abs(s[at.MU + i] - settings.prior[i]) > FAR * settings.prior_spread[i]
     return flags + (NO_RANGE if far else 0)
 
 
@@ -315,24 +293,24 @@ def _estimate(settings, s, e):
     for i in range(3):
         e.twist[i] = 0.0
         for j in range(3):
-            e.twist[i] += settings.back[i, j] * s[TWIST + j] if s[SLIP] > 0.5 else 0.0
-            e.wrench[i] += settings.frame[j, i] * s[BIAS + j]
-    log_s = max(s[MU] + max(s[RATIO], 0.0), s[BOUND])
-    e.mu_c, e.mu_s, e.radius = math.exp(s[MU]), math.exp(log_s), settings.radius * math.exp(s[SCALE])
+            e.twist[i] += settings.back[i, j] * s[at.TWIST + j] if s[at.SLIP] > 0.5 else 0.0
+            e.wrench[i] += settings.frame[j, i] * s[at.BIAS + j]
+    log_s = max(s[at.MU] + max(s[at.RATIO], 0.0), s[at.BOUND])
+    e.mu_c, e.mu_s, e.radius = math.exp(s[at.MU]), math.exp(log_s), settings.radius * math.exp(s[at.SCALE])
     for i in range(3):
         for k in range(3):
             total = 0.0
             for j in range(N):
-                a = s[ROOT + N * (MU if i < 2 else SCALE) + j] + (s[ROOT + N * RATIO + j] if i == 1 else 0.0)
-                b = s[ROOT + N * (MU if k < 2 else SCALE) + j] + (s[ROOT + N * RATIO + j] if k == 1 else 0.0)
+                a = s[ROOT + N * (at.MU if i < 2 else at.SCALE) + j] + (s[ROOT + N * at.RATIO + j] if i == 1 else 0.0)
+                b = s[ROOT + N * (at.MU if k < 2 else at.SCALE) + j] + (s[ROOT + N * at.RATIO + j] if k == 1 else 0.0)
                 total += a * b
             floor = settings.model_error * settings.model_error * (0.5 if i == 0 else 1.0) * (0.5 if k == 0 else 1.0)
             e.covariance[i, k] = total + (floor if (i < 2) == (k < 2) else 0.0)
         e.determined[i] = 1 if e.covariance[i, i] <= settings.variance and e.flags < NO_BIAS else 0
     sd = math.sqrt(e.covariance[1, 1] + SEEN_ERROR * SEEN_ERROR)
-    e.slip, e.about_to_slip = s[SLIP], (1.0 - s[SLIP]) * _normal((s[GAUGE] + NEAR - log_s) / sd)
-    e.margin = 1.0 - math.exp(min(s[GAUGE] - log_s, 50.0))
-    e.gauge = math.exp(s[GAUGE])
+    e.slip, e.about_to_slip = s[at.SLIP], (1.0 - s[at.SLIP]) * _normal((s[at.GAUGE] + NEAR - log_s) / sd)
+    e.margin = 1.0 - math.exp(min(s[at.GAUGE] - log_s, 50.0))
+    e.gauge = math.exp(s[at.GAUGE])
 
 
 @jit
@@ -347,13 +325,13 @@ def update(settings, states, samples, found):
     for p in range(states.shape[0]):
         s, e, flags = states[p], found[p], 0
         now, wrench, load, velocity = samples[p, 0], samples[p, 1:4], samples[p, 4], samples[p, 5:]
-        dt = now - s[TIME]
+        dt = now - s[at.TIME]
         if not xp.in_range(now) or dt <= 0.0:
-            s[BACK] += 1.0 if xp.in_range(now) else 0.0
+            s[at.BACK] += 1.0 if xp.in_range(now) else 0.0
             flags, dt = 2, 0.0
-            s[TIME] = now if s[BACK] >= RESTART else s[TIME]
+            s[at.TIME] = now if s[at.BACK] >= RESTART else s[at.TIME]
         else:
-            s[TIME], s[BACK], dt = now, 0.0, dt if dt <= 1.0 else 1e-3  # the first sample, or a long pause
+            s[at.TIME], s[at.BACK], dt = now, 0.0, dt if dt <= 1.0 else 1e-3  # the first sample, or a long pause
         force = math.hypot(wrench[0], wrench[1])
         good = xp.in_range(load) and xp.in_range(force) and xp.in_range(wrench[2])
         flags += 0 if good else 1
@@ -361,11 +339,11 @@ def update(settings, states, samples, found):
             flags, good = flags + 4, False
         if dt > 0.0:
             if settings.drift > 0.0:
-                spread(s, MU, settings.drift * settings.drift * dt, column)
-            s[PEAK] -= dt / PEAK_TIME
-            s[BOUND] -= settings.drift * math.sqrt(dt)
-            s[REST] += dt
-        before = s[SLIP]
+                spread(s, at.MU, settings.drift * settings.drift * dt, column)
+            s[at.PEAK] -= dt / PEAK_TIME
+            s[at.BOUND] -= settings.drift * math.sqrt(dt)
+            s[at.REST] += dt
+        before = s[at.SLIP]
         if good and load <= settings.least_load and dt > 0.0:
             _tare(settings, s, wrench, load, h, column)
         elif good and dt > 0.0:
@@ -374,26 +352,26 @@ def update(settings, states, samples, found):
                 w = 0.0
                 for j in range(3):
                     w += settings.conjugate[i, j] * wrench[j]
-                s[SEEN + i] += share * ((w - s[BIAS + i]) / load - s[SEEN + i])
-                s[SUM + i] += w / load
-            s[LOADS], s[COUNT] = s[LOADS] + load, s[COUNT] + 1.0
+                s[at.SEEN + i] += share * ((w - s[at.BIAS + i]) / load - s[at.SEEN + i])
+                s[at.SUM + i] += w / load
+            s[at.LOADS], s[at.COUNT] = s[at.LOADS] + load, s[at.COUNT] + 1.0
             _judge(settings, s, load, dt, best)
-            s[PEAK] = max(s[PEAK], s[GAUGE])
-            if s[SLIP] < 0.1:
-                s[BOUND] = max(s[BOUND], s[GAUGE])
+            s[at.PEAK] = max(s[at.PEAK], s[at.GAUGE])
+            if s[at.SLIP] < 0.1:
+                s[at.BOUND] = max(s[at.BOUND], s[at.GAUGE])
         if xp.in_range(velocity[0]) and xp.in_range(velocity[1]) and xp.in_range(velocity[2]) and dt > 0.0:
             for i in range(3):
                 v[i] = 0.0
                 for j in range(3):
                     v[i] += settings.frame[i, j] * velocity[j]
             odds = math.exp(_see(settings, s, v, h, column, jacobian))
-            s[SLIP] = s[SLIP] * odds / (s[SLIP] * odds + 1.0 - s[SLIP])
-        s[SLIP] = min(max(s[SLIP], 1e-9), 1.0 - 1e-9)
-        if before <= 0.5 < s[SLIP] and s[PEAK] > -9.0:
+            s[at.SLIP] = s[at.SLIP] * odds / (s[at.SLIP] * odds + 1.0 - s[at.SLIP])
+        s[at.SLIP] = min(max(s[at.SLIP], 1e-9), 1.0 - 1e-9)
+        if before <= 0.5 < s[at.SLIP] and s[at.PEAK] > -9.0:
             for i in range(N):
-                h[i] = 1.0 if i in (MU, RATIO) else 0.0
-            h[SCALE] = s[LEVER]
-            _measure(s, h, s[PEAK] - s[MU] - s[RATIO], PEAK_ERROR * PEAK_ERROR, column)
+                h[i] = 1.0 if i in (at.MU, at.RATIO) else 0.0
+            h[at.SCALE] = s[at.LEVER]
+            _measure(s, h, s[at.PEAK] - s[at.MU] - s[at.RATIO], PEAK_ERROR * PEAK_ERROR, column)
         e.flags, e.dt, e.normal_force = flags + _doubt(settings, s), dt, load
         for i in range(3):
             e.wrench[i], e.velocity[i] = wrench[i], velocity[i]
