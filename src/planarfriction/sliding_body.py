@@ -148,9 +148,8 @@ class SlidingBody(ByValue):
         if isinstance(self.models, FrictionModel):
             return load[..., None]
         if load.shape[-1:] != (len(self.models),):
-            raise InvalidValueError(
-                "normal_force", f"have shape [..., {len(self.models)}]", f"shape {list(load.shape)}"
-            )
+            rule = f"have shape [..., {len(self.models)}]"
+            raise InvalidValueError("normal_force", rule, f"shape {list(load.shape)}")
         return load
 
     @functools.cached_property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.equality import ByValue
-from planarfriction.patch.disc_friction import disc_friction
+from planarfriction.patch.moments import disc_friction
 from planarfriction.patch.pressure import Pressure
 
 if TYPE_CHECKING:
@@ -126,9 +125,7 @@ class SharedPressure(ByValue, Pressure):
         return shares
 
     def to_dict(self) -> dict[str, Any]:
-        fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        plain = {name: each.tolist() if isinstance(each, np.ndarray) else each for name, each in fields.items()}
-        return {"law": self.law, **plain, "patch": self.patch.to_dict()}
+        return {**super().to_dict(), "patch": self.patch.to_dict()}
 
 
 def _moments(places: np.ndarray, radii: np.ndarray) -> np.ndarray:

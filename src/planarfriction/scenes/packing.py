@@ -122,8 +122,6 @@ class Segments:
 
     def breaks(self, pieces: np.ndarray) -> np.ndarray:
         """Return the times [s] at which pieces begin; that of number `count` is the end."""
-        if self.count == len(self._step):  # a piece is all that lies between two breaks
-            return self._breaks[pieces]
         here = self._behind(pieces)
         begin = (pieces - self._first[here]) * self._step[here] + self._breaks[here]
         return np.where(pieces == self.count, self._breaks[-1], begin)
@@ -178,8 +176,6 @@ class Segments:
 
     def _behind(self, pieces: np.ndarray) -> np.ndarray:
         """Return the break of the signals that pieces lie behind."""
-        if self.count == len(self._step):
-            return pieces
         return np.minimum(np.searchsorted(self._first, pieces, side="right") - 1, len(self._step) - 1)
 
     def _linear(self, signal: tuple[np.ndarray, np.ndarray], pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
