@@ -131,13 +131,15 @@ def to_json(state: State) -> str:
     return json.dumps(data, separators=(",", ":"))
 
 
-def from_json(text: str) -> State:
-    """Return the state of what `to_json` wrote; what is left out has its default.
+def from_link(link: str) -> State:
+    """Return the state of what `to_link` wrote; what is left out has its default.
 
-    Raises `FrictionError` in one line for all else.
+    Raises `FrictionError` in one line for all else, also for a link that is too long.
     """
+    if len(link) > MOST_TEXT:
+        raise InvalidValueError("the link", f"have at most {MOST_TEXT} characters", len(link))
     try:
-        data = json.loads(text)
+        data = json.loads(unquote(link.removeprefix("#")))
     except (ValueError, RecursionError) as error:  # ValueError: also a number of more digits than Python converts
         raise InvalidValueError("the link", "hold a state as JSON", shown(str(error).partition(";")[0])) from None
     validation.keys("the link", data, (), ("patch", "law", *_PLAIN))
@@ -166,13 +168,6 @@ def _drawing(patch: Any) -> Drawing:
 def to_link(state: State) -> str:
     """Return what stands in the address of the page behind its path."""
     return "#" + quote(to_json(state), safe=",:")
-
-
-def from_link(link: str) -> State:
-    """Return the state of a link. Raises `FrictionError` in one line, also for one that is too long."""
-    if len(link) > MOST_TEXT:
-        raise InvalidValueError("the link", f"have at most {MOST_TEXT} characters", len(link))
-    return from_json(unquote(link.removeprefix("#")))
 
 
 @dataclass(frozen=True)

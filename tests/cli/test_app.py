@@ -376,21 +376,15 @@ def coarse(monkeypatch):
         monkeypatch.setattr(f"planarfriction.plots.limit_surface.{name}", 12)
 
 
-def test_limit_surface_of_a_measured_map_is_drawn(coarse, tmp_path):
-    (tmp_path / "pad.csv").write_text("1,1,1\n0,2,0\n", encoding="utf-8")
-    picture = tmp_path / "surface.png"
-    given = ["--pressure", str(tmp_path / "pad.csv"), "--cell-size", "0.001", "--out", str(picture)]
-    assert main(["limit-surface", *given]) == 0
-    assert picture.read_bytes().startswith(b"\x89PNG")
-
-
-def test_limit_surface_is_the_exact_one_alone_or_to_be_turned(coarse, capsys, tmp_path):
+def test_limit_surface_of_a_map_is_the_exact_one_alone_or_to_be_turned(coarse, capsys, tmp_path):
     pytest.importorskip("plotly")
+    (tmp_path / "pad.csv").write_text("1,1,1\n0,2,0\n", encoding="utf-8")
+    command = ["limit-surface", "--pressure", str(tmp_path / "pad.csv"), "--cell-size", "0.001"]
     alone, both, page = (tmp_path / name for name in ("alone.png", "both.png", "both.html"))
-    assert main(["limit-surface", "--out", str(alone), "--alone"]) == 0
+    assert main([*command, "--out", str(alone), "--alone"]) == 0
     assert "(exact)" in capsys.readouterr().out
     for path in (both, page):
-        assert main(["limit-surface", "--surface", "ellipsoid", "--out", str(path)]) == 0
+        assert main([*command, "--surface", "ellipsoid", "--out", str(path)]) == 0
     with Image.open(alone) as one, Image.open(both) as two:
         assert two.width == 2 * one.width
     assert page.read_text(encoding="utf-8").count('"type":"surface"') >= 2

@@ -15,7 +15,7 @@ from planarfriction.identify.logs import columns_of
 from planarfriction.validation import number_in
 from tests.support.identification_logs import clean_log, excitation, noisy
 
-FAST = ["--parameters", "mu_c,contact_radius", "--starts", "1", "--nuisance", "none", "--noise", "5e-3,5e-3,5e-5"]
+FAST = ["--parameters", "mu_c,contact_radius", "--starts", "1", "--nuisance", "none", "--model", "reduced-published"]
 START = [f"--start={name}={value}" for name, value in {"mu_s": 0.65, "v_s": 2e-3, "gamma": 1.4, "sigma_0": 2e4, "sigma_1": 30, "sigma_2": 0.8}.items()]  # fmt: skip  # noqa: E501
 
 

@@ -125,7 +125,7 @@ class SharedPressure(ByValue, Pressure):
         return shares
 
     def to_dict(self) -> dict[str, Any]:
-        return {**super().to_dict(), "patch": self.patch.to_dict()}
+        return {**super().to_dict(), "patch": self.patch.to_dict()}  # pyright: ignore[reportGeneralTypeIssues]
 
 
 def _moments(places: np.ndarray, radii: np.ndarray) -> np.ndarray:

@@ -85,13 +85,16 @@ def frame_times(sampled: np.ndarray, slow: float | None, fps: float) -> tuple[np
     if fps < SLOWEST:
         raise InvalidValueError("fps", f"be at least {SLOWEST:g}", fps)
     span = float(sampled[-1] - sampled[0])
-    if slow is None:
-        slow = _usual_pace(span * fps)
-    else:
+    frames = span * fps
+    if slow is not None:
         slow = validation.positive("slow", slow)
+    elif frames > USUAL_FRAMES:
+        slow = 1.0 / _round_up(frames / USUAL_FRAMES)
+    else:
+        slow = _round_up(LEAST_FRAMES / frames) if 0.0 < frames < LEAST_FRAMES else 1.0
     wanted = slow * span * fps
     if wanted > MOST_FRAMES:
-        rule = f"be at most {MOST_FRAMES / (span * fps):.3g} here, for at most {MOST_FRAMES} frames"
+        rule = f"be at most {MOST_FRAMES / frames:.3g} here, for at most {MOST_FRAMES} frames"
         raise InvalidValueError("slow", rule, slow)
     count = max(round(wanted) + 1, 2) if span > 0.0 else LEAST_FRAMES
     if slow == 1.0 or span == 0.0:
@@ -99,13 +102,6 @@ def frame_times(sampled: np.ndarray, slow: float | None, fps: float) -> tuple[np
     else:
         words = f"   ({slow:g} x slower)" if slow > 1.0 else f"   ({1.0 / slow:g} x faster)"
     return np.linspace(sampled[0], sampled[-1], count), words
-
-
-def _usual_pace(frames: float) -> float:
-    """Return the ratio of playing time to real time of so many `frames` [-]."""
-    if frames > USUAL_FRAMES:
-        return 1.0 / _round_up(frames / USUAL_FRAMES)
-    return _round_up(LEAST_FRAMES / frames) if 0.0 < frames < LEAST_FRAMES else 1.0
 
 
 def _round_up(value: float) -> float:
