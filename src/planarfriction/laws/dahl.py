@@ -35,5 +35,4 @@ class Dahl(FrictionLaw):
 
     @property
     def numbers(self) -> LawNumbers:
-        """The numbers that the law puts into the formulas."""
         return LawNumbers(self.sigma_0, 0.0, 0.0, mu_c=self.mu_c, mu_s=self.mu_c, v_s=_SPEED, gamma=2.0)

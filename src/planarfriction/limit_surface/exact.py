@@ -174,11 +174,9 @@ class LimitSurfaceExact(LimitSurface):
         return sums[:, :3], sums[:, [3, 4, 5, 4, 6, 7, 5, 7, 8]].reshape(-1, 3, 3)
 
     def direction(self, units: np.ndarray) -> np.ndarray:
-        """Return the negative friction `h` `[M, 3]` of unit scaled twists `[M, 3]`, in closed form if there is one."""
         return self.sums(units)[0]
 
     def direction_slope(self, units: np.ndarray) -> np.ndarray:
-        """Return `dh/dV_S` `[M, 3, 3]`, integrated in the same way."""
         return self.sums(units)[1]
 
     @functools.cached_property

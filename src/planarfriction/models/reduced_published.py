@@ -197,7 +197,6 @@ class ReducedModelPublished(FrictionModel):
 
     @property
     def depends_on_load(self) -> bool:
-        """True if the shape of the patch in this model changes with the load."""
         return self.patch.depends_on_load and self.on_load_change != "keep"
 
     @functools.cached_property
@@ -241,7 +240,6 @@ class ReducedModelPublished(FrictionModel):
         return ModelJacobians(by_state, by_twist, np.zeros_like(state), pull, push, by_load)
 
     def with_law(self, law: FrictionLaw) -> Self:
-        """Return the model with another law; see `FrictionModel.with_law`."""
         changed = super().with_law(law)
         changed.__dict__["shapes"] = self.shapes
         return changed

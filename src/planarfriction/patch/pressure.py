@@ -145,7 +145,9 @@ class SoftFinger(Pressure):
 
         Raises InvalidValueError for a load below zero.
         """
-        load = validation.non_negative_numbers("normal_force", normal_force)
+        return self._radius(validation.non_negative_numbers("normal_force", normal_force))
+
+    def _radius(self, load: np.ndarray) -> np.ndarray:
         with np.errstate(over="ignore", under="ignore"):  # a radius of 0 would divide by zero
             radius = np.maximum(self.c * load**self.n, validation.SMALLEST)
         return radius if self.radius_max is None else np.minimum(radius, self.radius_max)
@@ -155,16 +157,18 @@ class SoftFinger(Pressure):
 
         Raises InvalidValueError for a load below zero.
         """
-        load = validation.non_negative_numbers("normal_force", normal_force)
+        return self._exponent(validation.non_negative_numbers("normal_force", normal_force))
+
+    def _exponent(self, load: np.ndarray) -> np.ndarray:
         if self.k_per_newton is None:
             return np.full_like(load, self.k)
         return np.maximum(self.k_per_newton * load, validation.SMALLEST)
 
     def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
         load = np.asarray(1.0 if normal_force is None else normal_force, dtype=float)[..., None]
-        k = self.exponent(load)
+        k = self._exponent(load)
         distance = np.hypot(positions[:, 0], positions[:, 1])
-        ratio = distance / self.radius(load)
+        ratio = distance / self._radius(load)
         inside = ratio < 1.0
         nearest = distance <= distance.min() * (1.0 + SAME_DISTANCE)
         # In logarithms, relative to the largest value: at small k the profile underflows everywhere but at s = 0.
@@ -178,8 +182,8 @@ class SoftFinger(Pressure):
         if not self.depends_on_load:
             return super().ever_loaded(positions)
         distance = np.hypot(positions[:, 0], positions[:, 1])
-        highest = formulas.LARGEST if between is None else between[1]
-        largest = self.radius(1.0 if self.n == 0.0 else highest)
+        highest = np.inf if between is None else between[1]
+        largest = self._radius(np.array(1.0 if self.n == 0.0 else highest))
         return (distance < largest) | (distance <= distance.min() * (1.0 + SAME_DISTANCE))
 
 

@@ -91,7 +91,6 @@ class SharedPressure(ByValue, Pressure):
         return self.patch.depends_on_load
 
     def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
-        """Return the pressures of the discs, `[..., n]` for loads `[...]`."""
         areas = self.sums(self.patch.areas)
         if not self.depends_on_load:
             return self.sums(self.patch.weights()) / areas
