@@ -123,7 +123,7 @@ def test_warming_up_names_its_parts_to_somebody_who_waits(monkeypatch, processor
     monkeypatch.setattr(threads, "processors", lambda: processors)
     monkeypatch.setattr(sys, "executable", shutil.which("false") or pytest.skip("there is no program `false`"))
     monkeypatch.setattr(sys, "stderr", Terminal())
-    monkeypatch.setattr(warm, "_parts", lambda: [warm.Part("first", dict), warm.Part("second", dict)])
+    monkeypatch.setattr(warm, "_parts", lambda: {"first": dict, "second": dict})
     assert list(pf.warm_up()) == ["first", "second"]
     shown = sys.stderr.getvalue()
     assert "\rcompiling: first" in shown and "\rcompiling: second" in shown and "compiled 2 parts" in shown

@@ -64,14 +64,8 @@ class FrictionError(_Travels, Exception):
 class InvalidValueError(FrictionError, ValueError):
     """A parameter breaks its rule: `mu_s must be >= mu_c, got mu_s=0.3, mu_c=0.5`.
 
-    Attributes
-    ----------
-    name
-        Name of the parameter as the caller wrote it.
-    rule
-        The rule it breaks, continuing the sentence "<name> must ...".
-    value
-        The offending value, or the text that describes it; the message shows its first 80 characters.
+    Its attributes are the `name` of the parameter as the caller wrote it, the `rule`, which continues the sentence
+    "<name> must ...", and the `value` or a text that describes it; the message shows its first 80 characters.
     """
 
     def __init__(self, name: str, rule: str, value: Any):
@@ -110,10 +104,7 @@ def needing(package: str, extra: str) -> Iterator[None]:
 class SolverError(FrictionError, RuntimeError):
     """The solver failed; the message suggests a remedy.
 
-    Attributes
-    ----------
-    solution
-        What was computed up to the failure (a `Solution`), or None.
+    Its attribute `solution` is the `Solution` up to the failure, or None.
     """
 
     def __init__(self, message: str, solution: Any = None):

@@ -102,9 +102,7 @@ class SlidingBody(ByValue):
         """
         given = {"twist": twist, "wrench": wrench, "dt": dt, "angle": angle}
         twist, wrench, dt, angle = (validation.finite_numbers(name, value) for name, value in given.items())
-        for name, value in (("twist", twist), ("wrench", wrench)):
-            if value.shape[-1:] != (3,):
-                raise InvalidValueError(name, "have shape [..., 3]", f"shape {list(value.shape)}")
+        twist, wrench = validation.vectors("twist", twist, 3), validation.vectors("wrench", wrench, 3)
         load = self._loads(normal_force)
         validation.broadcast(twist=twist[..., 0], wrench=wrench[..., 0], dt=dt, angle=angle, normal_force=load[..., 0])
         to_patches = geometry.rotate(self._to_patches, angle[..., None]) if angle.any() else self._to_patches
@@ -148,9 +146,8 @@ class SlidingBody(ByValue):
         if isinstance(self.models, FrictionModel):
             return load[..., None]
         if load.shape[-1:] != (len(self.models),):
-            raise InvalidValueError(
-                "normal_force", f"have shape [..., {len(self.models)}]", f"shape {list(load.shape)}"
-            )
+            rule = f"have shape [..., {len(self.models)}]"
+            raise InvalidValueError("normal_force", rule, f"shape {list(load.shape)}")
         return load
 
     @functools.cached_property

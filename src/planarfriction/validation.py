@@ -234,6 +234,14 @@ def vector(name: str, value: Any, size: int) -> np.ndarray:
     return array(name, value, (size,))
 
 
+def vectors(name: str, value: Any, size: int) -> np.ndarray:
+    """Return `value` as a float array `[..., size]` (no copy where it is one), or raise."""
+    result = numbers(name, value)
+    if result.shape[-1:] != (size,):
+        raise InvalidValueError(name, f"have shape [..., {size}]", f"shape {list(result.shape)}")
+    return result
+
+
 def finite_numbers(name: str, value: Any, *, largest: float = LARGEST) -> np.ndarray:
     """Return `value` as a finite float array of any shape (no copy where it is one), no number beyond `largest`."""
     result = numbers(name, value)

@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Callable
 from importlib.util import find_spec
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -19,20 +19,11 @@ from planarfriction.laws import LuGre
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, friction_metric
 from planarfriction.scenes import SolverOptions, in_hand, simulate
 
-_INSTANT = 1e-3
-"""Simulated time [s]: compiling does not depend on how far a run goes."""
+_INSTANT = SolverOptions(t_end=1e-3)
+"""Options of runs: compiling does not depend on how far they go."""
 
 _WIDTH = 60
 """Columns of the line that names what is compiled."""
-
-
-class Part(NamedTuple):
-    """One part of the code that is compiled in one go."""
-
-    words: str
-    """Description in a few words."""
-    work: Callable[[], Any]
-    """Function that uses it, and thereby compiles it or reads it from the cache."""
 
 
 def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float]:
@@ -50,12 +41,12 @@ def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float
     parts, times = _parts(), {}
     code = "from planarfriction import warm; warm.serve()"
     with together.Crew(code, range(len(parts)), processes=threads.processors() - 1) as crew:
-        for job, part in enumerate(parts):
-            told(part.words)
+        for job, (words, work) in enumerate(parts.items()):
+            told(words)
             begin = time.perf_counter()
             if crew.take(job):
-                part.work()
-            times[part.words] = crew.seconds.get(job, time.perf_counter() - begin)
+                work()
+            times[words] = crew.seconds.get(job, time.perf_counter() - begin)
     if shown:
         print(f"\rcompiled {len(times)} parts in {sum(times.values()):.1f} s".ljust(_WIDTH), file=sys.stderr)
     return times
@@ -63,8 +54,8 @@ def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float
 
 def serve() -> None:
     """Compile parts for another process."""
-    parts = _parts()
-    together.serve(lambda job: parts[job].work())
+    parts = list(_parts().values())
+    together.serve(lambda job: parts[job]())
 
 
 def _show(words: str) -> None:
@@ -72,40 +63,34 @@ def _show(words: str) -> None:
     print(f"\rcompiling: {words}".ljust(_WIDTH), end="", file=sys.stderr, flush=True)
 
 
-def _parts() -> list[Part]:
-    """Return parts in an order in which neighbours share functions, which one process then compiles once for them."""
+def _parts() -> dict[str, Callable[[], Any]]:
+    """Return functions that use a part of the code, and thereby compile it or read it from the cache, by its words.
+
+    Neighbours share functions, which one process then compiles once for them.
+    """
     patch, law = ContactPatch.disc(radius=0.01, cells=5), LuGre(mu_s=1.2, elasto_plastic=0.9)
     cells, reduced, published = (MODELS[name](patch, law) for name in ("distributed", "reduced", "reduced-published"))
     grooved = models.DistributedModel(patch.with_friction_metric(friction_metric(0.0, along=1.0, across=0.8)), law)
-    return [
-        *_of(cells, "distributed", *_WORK),
-        *_of(grooved, "anisotropic", "scenes", "rollouts"),
-        *_of(reduced, "reduced", *_WORK),
-        Part("coupled patches", functools.partial(_couple, [cells, reduced, published, grooved])),
-        *([Part("steps inside MuJoCo", _host)] if find_spec("mujoco") else []),
-        Part("derivatives of scenes in reverse", functools.partial(_reverse, reduced)),
-        *_of(published, "reduced-published", *_WORK),
-        Part("limit surfaces", functools.partial(_surfaces, patch)),
-        Part("joints", _joints),
-    ]
+    return {
+        **_of(cells, "distributed", *_WORK),
+        **_of(grooved, "anisotropic", "scenes", "rollouts"),
+        **_of(reduced, "reduced", *_WORK),
+        "coupled patches": functools.partial(_couple, [cells, reduced, published, grooved]),
+        **({"steps inside MuJoCo": _host} if find_spec("mujoco") else {}),
+        "derivatives of scenes in reverse": functools.partial(_reverse, reduced),
+        **_of(published, "reduced-published", *_WORK),
+        "limit surfaces": functools.partial(_surfaces, patch),
+        "joints": _joints,
+    }
 
 
-def _of(model: Any, name: str, *kinds: str) -> list[Part]:
+def _of(model: Any, name: str, *kinds: str) -> dict[str, Callable[[], Any]]:
     """Return parts of these kinds of work with a model."""
-    return [Part(f"{kind}, {name}", functools.partial(_WORK[kind], model)) for kind in kinds]
-
-
-def _simulate(model: Any) -> None:
-    simulate(in_hand(model), t_end=_INSTANT)
-
-
-def _derive(model: Any) -> None:
-    derivatives.scene_sensitivities(in_hand(model), options=SolverOptions(t_end=_INSTANT))
+    return {f"{kind}, {name}": functools.partial(_WORK[kind], model) for kind in kinds}
 
 
 def _reverse(model: Any) -> None:
-    options = SolverOptions(t_end=_INSTANT)
-    derivatives.scene_gradient(in_hand(model), lambda time, motion: np.ones_like(motion), ["mu"], options=options)
+    derivatives.scene_gradient(in_hand(model), lambda time, motion: np.ones_like(motion), ["mu"], options=_INSTANT)
 
 
 def _step(model: Any) -> None:
@@ -156,5 +141,10 @@ def _surfaces(patch: ContactPatch) -> None:
         each.grid_error()  # by the loops of polygons
 
 
-_WORK = {"scenes": _simulate, "steps": _step, "rollouts": _roll, "derivatives of scenes": _derive}
+_WORK: dict[str, Callable[[Any], Any]] = {
+    "scenes": lambda model: simulate(in_hand(model), t_end=_INSTANT.t_end),
+    "steps": _step,
+    "rollouts": _roll,
+    "derivatives of scenes": lambda model: derivatives.scene_sensitivities(in_hand(model), options=_INSTANT),
+}
 """Kinds of work with a model."""

@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 
 from planarfriction import geometry, validation
+from planarfriction.equality import Checked, checked
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceExact, LimitSurfaceTable
 from planarfriction.limit_surface.comparison import directions
@@ -54,12 +55,12 @@ DRAWN = "drawn"
 
 
 @dataclass(frozen=True, eq=False)
-class Drawing:
+class Drawing(Checked):
     """Relative pressures on square cells about the origin, row 0 at the top, and where they come from."""
 
     pressures: np.ndarray
     """Relative pressures, shape `[rows, columns]` [-]; only their ratios matter."""
-    cell_size: float
+    cell_size: float = checked(validation.positive)
     """Side of a cell [m]."""
     name: str = DRAWN
     """Name of the published patch, of the file, or `DRAWN`."""
@@ -67,7 +68,7 @@ class Drawing:
     """Origin of the pressures."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "cell_size", validation.positive("cell_size", self.cell_size))
+        super().__post_init__()
         self.pressures.setflags(write=False)
 
     @classmethod

@@ -62,18 +62,15 @@ class Live:
 
     def soon(self, work: Callable[[Task], None]) -> None:
         """Begin the work in the next pause."""
-        document = self._give_up()
+        document = self.stop()
         self._timer = document.add_timeout_callback(lambda: self._begin(document, work), PAUSE)
 
     def now(self, work: Callable[[Task], None]) -> None:
         """Begin the work at once."""
-        self._begin(self._give_up(), work)
+        self._begin(self.stop(), work)
 
-    def stop(self) -> None:
-        """Give up what is being done."""
-        self._give_up()
-
-    def _give_up(self) -> Any:
+    def stop(self) -> Any:
+        """Give up what is being done; return the document of the page."""
         document: Any = pn.state.curdoc
         self.newest += 1
         if self._timer is not None:

@@ -12,10 +12,13 @@ from urllib.parse import quote, unquote
 import numpy as np
 
 from planarfriction import geometry, validation
+from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError, shown
 from planarfriction.laws import LAWS, FrictionLaw, LuGre
+from planarfriction.limit_surface.comparison import angles
 from planarfriction.planning import holding_load
 from planarfriction.planning.holding import GRAVITY
+from planarfriction.scenes.body import floats
 from planarfriction.scenes.model_files import law_from_dict
 from planarfriction.scenes.section import Section
 from planarfriction_explorer.drawing import MOST_SIDE, Drawing
@@ -25,28 +28,21 @@ FIRST_PATCH = "NonConvex1"
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class State(Checked):
     """A pressure map, a law, a load and a twist; raises `InvalidValueError` for what breaks a rule."""
 
     drawing: Drawing = field(default_factory=lambda: Drawing.published(FIRST_PATCH))
     """Pressure map."""
     law: FrictionLaw = field(default_factory=lambda: LuGre(mu_s=1.2, elasto_plastic=0.9))
     """Friction law."""
-    normal_force: float = 1.0
+    normal_force: float = checked(validation.positive_load, default=1.0)
     """Load [N], which presses the patch."""
-    twist: tuple[float, float, float] = (0.002, -0.008, 1.0)
+    twist: tuple[float, float, float] = checked(floats, 3, default=(0.002, -0.008, 1.0))
     """Twist `(vx, vy, omega)` of the body at the origin of the contact frame [m/s, m/s, rad/s]."""
-    mass: float = 0.05
+    mass: float = checked(validation.positive, default=0.05)
     """Mass of a part that two such contacts hold against gravity [kg]."""
-    lever: float = 0.01
+    lever: float = checked(validation.number, default=0.01)
     """Distance of its centre of mass from the origin, across gravity [m]."""
-
-    def __post_init__(self) -> None:
-        load = validation.positive_load("normal_force", self.normal_force)
-        object.__setattr__(self, "normal_force", load)
-        object.__setattr__(self, "mass", validation.positive("mass", self.mass))
-        object.__setattr__(self, "lever", validation.number("lever", self.lever))
-        object.__setattr__(self, "twist", tuple(validation.vector("twist", self.twist, 3).tolist()))
 
     def changed(self, **values: Any) -> State:
         """Return the state with other values of its fields."""
@@ -135,13 +131,15 @@ def to_json(state: State) -> str:
     return json.dumps(data, separators=(",", ":"))
 
 
-def from_json(text: str) -> State:
-    """Return the state of what `to_json` wrote; what is left out has its default.
+def from_link(link: str) -> State:
+    """Return the state of what `to_link` wrote; what is left out has its default.
 
-    Raises `FrictionError` in one line for all else.
+    Raises `FrictionError` in one line for all else, also for a link that is too long.
     """
+    if len(link) > MOST_TEXT:
+        raise InvalidValueError("the link", f"have at most {MOST_TEXT} characters", len(link))
     try:
-        data = json.loads(text)
+        data = json.loads(unquote(link.removeprefix("#")))
     except (ValueError, RecursionError) as error:  # ValueError: also a number of more digits than Python converts
         raise InvalidValueError("the link", "hold a state as JSON", shown(str(error).partition(";")[0])) from None
     validation.keys("the link", data, (), ("patch", "law", *_PLAIN))
@@ -170,13 +168,6 @@ def _drawing(patch: Any) -> Drawing:
 def to_link(state: State) -> str:
     """Return what stands in the address of the page behind its path."""
     return "#" + quote(to_json(state), safe=",:")
-
-
-def from_link(link: str) -> State:
-    """Return the state of a link. Raises `FrictionError` in one line, also for one that is too long."""
-    if len(link) > MOST_TEXT:
-        raise InvalidValueError("the link", f"have at most {MOST_TEXT} characters", len(link))
-    return from_json(unquote(link.removeprefix("#")))
 
 
 @dataclass(frozen=True)
@@ -210,8 +201,7 @@ def answer(state: State) -> Answer:
     angle = 0.0
     if units[1].any():
         both = np.stack([twist, ellipsoid.twist(units[1])])
-        here, there = geometry.twist_at(both, surface.centre_of_pressure) * scale
-        angle = float(np.degrees(np.arctan2(np.linalg.norm(np.cross(here, there)), here @ there)))
+        angle = float(angles(*(geometry.twist_at(both, surface.centre_of_pressure) * scale)))
     error = float(np.linalg.norm(points[2] - points[1]))
     return Answer(friction, of_surface, of_ellipsoid, points, error, angle, float(-friction @ twist))
 

@@ -48,7 +48,7 @@ def convex_quartic(*coefficients: float) -> np.ndarray:
     return np.linalg.lstsq(quartic_fit.monomials(points), values, rcond=None)[0]
 
 
-KNOWN = convex_quartic(0.3, 0.5, 0.02, 0.1)
+KNOWN, ELLIPSOID = convex_quartic(0.3, 0.5, 0.02, 0.1), convex_quartic(0.0, 0.0, 0.0, 0.0)
 
 
 # ---------------------------------------------------------------------- closed forms
@@ -59,7 +59,7 @@ def test_the_ellipsoid_is_a_quartic(name):
     """Its square, with the Hessian `4 |x|^2 + 8 x x'` >= 4 |x|^2."""
     ellipsoid = pf.LimitSurfaceEllipsoid(PATCHES[name])
     quartic = pf.LimitSurfaceQuartic(PATCHES[name], surface=ellipsoid)
-    assert quartic.quartic == pytest.approx(quartic_fit.ELLIPSOID, abs=1e-12)  # least squares, to rounding
+    assert quartic.quartic == pytest.approx(ELLIPSOID, abs=1e-12)  # least squares, to rounding
     assert quartic.convexity == pytest.approx(4.0, abs=1e-6)  # tolerance of the conic solver
     for twist in samples(quartic, 5):
         assert quartic.wrench(twist) == pytest.approx(ellipsoid.wrench(twist), rel=1e-10, abs=1e-12)
@@ -68,7 +68,7 @@ def test_the_ellipsoid_is_a_quartic(name):
 
 def test_fourth_powers_in_closed_form():
     """`x^4 + y^4 + z^4`, nearly: the wrench of a twist is `V^(1/3)` over the 4/3-norm's root."""
-    powers = 1e-3 * quartic_fit.ELLIPSOID  # strictly convex on the axes too
+    powers = 1e-3 * ELLIPSOID  # strictly convex on the axes too
     powers[(quartic_fit.POWERS == 4).any(axis=1)] += 1.0
     surface = pf.LimitSurfaceQuartic(PATCHES["Square"], coefficients=powers)
     h = surface._direction(np.array([[1.0, 2.0, 3.0]]))[0]

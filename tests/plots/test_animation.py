@@ -20,7 +20,7 @@ from planarfriction.plots import animation, film_files
 from planarfriction.plots.animation import frame_times
 from planarfriction.plots.film import Film
 from planarfriction.plots.limit_surface import scaled_samples
-from planarfriction.plots.panels import CellPanel, SurfacePanel
+from planarfriction.plots.panels import CellPanel, SurfacePanel, level_of
 from planarfriction.plots.track import track_of
 from planarfriction.scenes.slip import bristles_of, slip_field
 from tests.support import synthetic
@@ -31,6 +31,13 @@ LAW = pf.LuGre(mu_c=1.0, mu_s=1.0, sigma_0=1e4, sigma_1=0.0, sigma_2=0.0, elasto
 
 SMALL = {"dpi": 25.0, "slow": 0.1}
 """Pictures of few and small frames."""
+
+
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch):
+    """Draw limit surfaces with few facets: nothing here depends on their number."""
+    for name in ("POLAR", "AZIMUTH"):
+        monkeypatch.setattr(f"planarfriction.plots.panels.{name}", 12)
 
 
 def film_of(run: pf.Solution, frames: int = 5, follow: bool = True) -> Film:
@@ -306,7 +313,7 @@ def test_a_frame_without_load_has_the_surface_of_the_last_load_before():
     run = changed(run, normal_force=np.repeat([0.0, 1.0, 0.0, 3.0, 0.0], 41)[:201, None])
     (panel,) = panels(film_of(run), SurfacePanel)
     low, high = (round(np.log(load) / np.log(1.15)) for load in (1.0, 3.0))
-    assert [panel.level(frame) for frame in range(5)] == [low, low, low, high, high]
+    assert [level_of(panel.track, frame) for frame in range(5)] == [low, low, low, high, high]
     assert {level: float(load) for level, load in panel.levels.items()} == pytest.approx(
         {low: 1.15**low, high: 1.15**high}
     )
@@ -343,7 +350,9 @@ def test_the_patch_and_its_limit_surface_follow_the_load():
     for frame in range(5):
         film.picture(frame)
         shown.append(int((~np.ma.getmaskarray(cells.cells.get_array())).sum()))
-        assert [level for level, each in surface.drawn.items() if each.get_visible()] == [surface.level(frame)]
+        assert [level for level, each in surface.drawn.items() if each.get_visible()] == [
+            level_of(surface.track, frame)
+        ]
     assert shown[0] == 0 and shown[1] > 0
     assert shown == sorted(shown) and shown[4] > shown[1]
     assert len(surface.levels) == 4  # a first frame without load has that of the next

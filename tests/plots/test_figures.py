@@ -67,29 +67,11 @@ def test_cells_are_drawn_in_their_true_size(patch):
     assert drawn.mean(axis=1) == pytest.approx(1e3 * patch.positions, abs=DRAWING)
 
 
-def test_pressure_map_is_heavy_at_the_top_and_in_kilopascal():
-    patch = PUBLISHED_PATCHES["LineGrad"]()
-    figure = plots.plot_patch(patch, normal_force=2.0)
-    (cells,) = patch_axes(figure).collections
-    assert np.asarray(cells.get_array()) == pytest.approx(1e-3 * patch.pressure_values(2.0), rel=1e-12)
-    top = np.argmax([polygon.vertices[:, 1].max() for polygon in cells.get_paths()])
-    assert np.argmax(cells.get_array()) == top
-    assert figure.axes[1].get_ylabel() == "pressure [kPa]"
-    assert labels(patch_axes(figure)) == {"x [mm]", "y [mm]"}
-
-
 def test_ticks_of_lengths_are_in_the_unit_of_their_label():
     axes = style.new_figure(2.0, 2.0).add_subplot()
     for largest, drawn, label, tick in ((0.01, 10.0, "y [mm]", "10"), (3.0, -2000.0, "y [m]", "\N{MINUS SIGN}2")):
         style.show_lengths(axes, largest)  # drawn in mm
         assert (axes.get_ylabel(), axes.yaxis.get_major_formatter()(drawn)) == (label, tick)
-
-
-def test_centre_of_pressure_is_marked():
-    patch = PUBLISHED_PATCHES["LineGrad"]()
-    for line in patch_axes(plots.plot_patch(patch)).get_lines():
-        # 3.174603 mm: the published centre of pressure, given to 1e-6 mm
-        assert (line.get_xdata()[0], line.get_ydata()[0]) == pytest.approx((0.0, 3.174603), abs=1e-6)
 
 
 def test_points_show_the_force_on_each():
@@ -188,12 +170,6 @@ def test_the_facets_of_a_surface_are_small_where_it_is_nearly_flat():
     assert max(steps) < 0.5 * max(before)
 
 
-def test_another_surface_can_stand_beside_it():
-    patch = PUBLISHED_PATCHES["NonConvex1"]()
-    figure = plots.plot_limit_surface(pf.LimitSurfaceExact(patch), beside=pf.LimitSurfaceCells(patch))
-    assert [axes.get_title() for axes in figure.axes] == ["NonConvex1: exact", "sum over the cells"]
-
-
 @pytest.mark.parametrize("beside", ["ellipsoid", None])
 def test_the_surface_to_be_turned_has_the_numbers_of_the_picture(beside):
     pytest.importorskip("plotly")
@@ -239,16 +215,6 @@ def test_histories_show_the_data_in_the_units_of_their_labels():
     for label, values in expected.items():
         assert shown[label] == pytest.approx(np.asarray(values), abs=DRAWING), label
     assert figure.legends == []
-
-
-def test_runs_are_overlaid_and_told_apart():
-    figure = plots.plot_histories({"distributed": synthetic.solution(), "reduced": synthetic.solution(scale=1.1)})
-    for axes in figure.axes:
-        first, second = axes.get_lines()
-        assert to_hex(first.get_color()) != to_hex(second.get_color())
-        assert first.get_linestyle() != second.get_linestyle()
-    (legend,) = figure.legends
-    assert [text.get_text() for text in legend.get_texts()] == ["distributed", "reduced"]
 
 
 def test_every_contact_has_its_line_and_its_entry():
@@ -372,15 +338,6 @@ def test_everything_drawn_is_within_the_view(mounted_on):
     corners = np.concatenate([*outlines(figure), *pads])
     for values, (low, high) in zip(corners.T, (axes.get_xlim(), axes.get_ylim()), strict=True):
         assert low < values.min() and values.max() < high
-
-
-def test_a_body_without_outline_is_its_x_axis_and_points_are_dots():
-    legs = pf.ContactPatch.points([(0.0, 0.1), (-0.1, -0.05), (0.1, -0.05)])
-    run = synthetic.solution(synthetic.scene(mounted_on="body", patch=legs, outline=None))
-    lines = plots.plot_motion(run).axes[0].lines
-    hands = [line for line in lines if len(line.get_xdata()) == 2]
-    dots = [line for line in lines if line.get_marker() == "o"]
-    assert (len(hands), len(dots)) == (motion.INSTANTS, motion.INSTANTS)
 
 
 def test_a_run_of_one_sample_can_be_drawn():

@@ -20,12 +20,10 @@ class Commands(click.Group):
     """Group that looks for commands of other packages only where its own do not suffice: a search takes 10 ms."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the names of all commands that are installed."""
         self.add_installed()
         return super().list_commands(ctx)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return the command called `cmd_name`, or None."""
         if cmd_name not in self.commands:
             self.add_installed()
         return super().get_command(ctx, cmd_name)

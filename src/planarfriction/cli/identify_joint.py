@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -29,10 +30,6 @@ SHORT_HELP = "Estimate the friction of a joint from a torque, a voltage or the g
 @click.option("--out", type=FILE, help="Folder for the estimates (JSON), the picture (PNG) and C source.")
 def joint(
     logs: tuple[Path, ...],
-    mass: float,
-    length: float,
-    arm_mass: float | None,
-    inertia: float | None,
     torque_gain: float | None,
     kp: tuple[float, ...],
     gain: float,
@@ -40,6 +37,7 @@ def joint(
     sag: float,
     terms: str,
     out: Path | None,
+    **plant: Any,
 ) -> int:
     """Estimate the friction of a joint from logs of its motion; say what the logs leave open.
 
@@ -70,8 +68,7 @@ def joint(
     if out is not None:
         make_folder(out)
     with work_progress("identifying") as progress:
-        plant = Plant(inertia, mass, length, arm_mass)
-        fit = identify_joint(read, plant, torque_gain=torque_gain, terms=words, progress=progress)
+        fit = identify_joint(read, Plant(**plant), torque_gain=torque_gain, terms=words, progress=progress)
     print(fit.table())
     if out is not None:
         stem = slug(read[0].name)

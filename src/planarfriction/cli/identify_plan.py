@@ -29,9 +29,8 @@ class FitOrPlan(click.Command):
     ) -> click.Context:
         """Make the context of the fit, or of a subcommand."""
         if args and args[0] in WORDS:
-            return (plan if args[0] == NAME else joint).make_context(
-                f"{info_name} {args[0]}", args[1:], parent, **extra
-            )
+            command = plan if args[0] == NAME else joint
+            return command.make_context(f"{info_name} {args[0]}", args[1:], parent, **extra)
         return super().make_context(info_name, args, parent, **extra)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -96,7 +95,7 @@ def plan(
     patch = find_patch(patch_name, size)
     names, values, spread = identify.parse_names(parameters), identify.parse_start(start), identify.parse_noise(noise)
     if out is not None:
-        output.check_table(out)
+        output.check_kind(out)
     measured = [pf.Log.from_csv(path, normal_force=normal_force[0] if normal_force else None) for path in logs]
     patch, law = _known(measured, patch, names, values, spread)
     loads = list(normal_force) or sorted({float(f"{log.normal_force.mean():.3g}") for log in measured}) or [1.0]

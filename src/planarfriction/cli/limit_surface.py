@@ -11,7 +11,7 @@ import numpy as np
 import planarfriction as pf
 from planarfriction.cli.console import note, print_table
 from planarfriction.cli.options import find_patch, pressure_map
-from planarfriction.cli.output import check_picture, check_table, write_csv, write_picture
+from planarfriction.cli.output import PICTURES, check_kind, write_csv, write_picture
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import SURFACES
 from planarfriction.writing import write_text
@@ -38,11 +38,11 @@ def choose_patch(patch: str | None, pressure: Path | None, size: Mapping[str, An
 def show(patch: pf.ContactPatch, *, surface: str, out: Path | None, alone: bool, csv: Path | None) -> None:
     """Print the numbers of a limit surface; write its picture (alone or beside the ellipsoid) and its samples."""
     if out is not None:
-        check_picture(out, also=(HTML,))
+        check_kind(out, (*PICTURES, HTML), "a picture")
     elif alone:
         raise InvalidValueError("--alone", "be given together with --out", alone)
     if csv is not None:
-        check_table(csv)
+        check_kind(csv)
     shown = SURFACES[surface](patch)
     centre = np.round(1e3 * shown.centre_of_pressure, 9) + 0.0  # no -0 and no rounding errors of symmetric patches
     rows = [

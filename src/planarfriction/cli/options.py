@@ -32,12 +32,8 @@ def find_patch(text: str | None, size: Mapping[str, Any], width: float = WIDTH) 
 
     Circle for None, not for an empty text. `size` holds the options of `map_options` that were given.
 
-    Raises
-    ------
-    InvalidValueError
-        Unknown name (names the nearest), or options of a map that are missing for one or given for a name.
-    FileError
-        The pressure map cannot be read.
+    Raises InvalidValueError for an unknown name, and for options of a map that are missing for one or given for a name;
+    FileError for a pressure map that cannot be read.
     """
     text = USUAL if text is None else text
     width = size.get("width", width)

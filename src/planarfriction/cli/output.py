@@ -17,17 +17,8 @@ PICTURES = (".png", ".pdf", ".svg")
 """Kinds of pictures."""
 
 
-def check_picture(path: Path, *, also: tuple[str, ...] = ()) -> Path:
-    """Return `path` if a picture, or another file of the kinds `also`, can be written there, or raise FileError."""
-    return _check_kind(path, (*PICTURES, *also), "a picture")
-
-
-def check_table(path: Path) -> Path:
-    """Return `path` if a CSV file can be written there, or raise FileError."""
-    return _check_kind(path, (".csv",), "a table")
-
-
-def _check_kind(path: Path, kinds: tuple[str, ...], what: str) -> Path:
+def check_kind(path: Path, kinds: tuple[str, ...] = (".csv",), what: str = "a table") -> Path:
+    """Return `path` if a file of one of the `kinds` can be written there, or raise FileError."""
     if path.suffix.lower() not in kinds:
         raise FileError(f"{path}: {what} ends in {' or '.join(kinds)}")
     return check_writable(path)

@@ -254,6 +254,8 @@ def run(
     **options: Any,
 ) -> int:
     """Simulate each scene, save as soon as it is done, print the comparison, draw; returns the exit code."""
+    from planarfriction.scenes import simulate
+
     scenes = build_scenes(name, model, settings=one_each(settings), t_end=t_end, **options)
     limits: dict[str, Any] = {} if t_end is None else {"t_end": t_end}
     if rtol is not None:
@@ -265,7 +267,8 @@ def run(
     solutions: dict[str, pf.Solution] = {}
     try:
         for label, scene in scenes.items():
-            solutions[label] = _simulate(label, scene, limits)
+            with simulation_progress(label, limits.get("t_end", scene.t_end)) as progress:
+                solutions[label] = simulate(scene, progress=progress, **limits)
             _save(solutions[label], folder, label)
     except SimulationInterrupted as stop:
         return _keep_part(stop.solution, solutions, label, folder)
@@ -277,13 +280,6 @@ def run(
     if folder is not None and pictures:
         _draw(solutions, folder, pictures)
     return 0
-
-
-def _simulate(label: str, scene: pf.Scene, options: dict[str, Any]) -> pf.Solution:
-    from planarfriction.scenes import simulate
-
-    with simulation_progress(label, options.get("t_end", scene.t_end)) as progress:
-        return simulate(scene, progress=progress, **options)
 
 
 def _keep_part(part: pf.Solution, solutions: dict[str, pf.Solution], label: str, folder: Path | None) -> int:

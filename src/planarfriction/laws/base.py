@@ -150,9 +150,8 @@ def is_rate_law(law: Any) -> bool:
 def refuse_rate_law(law: Any, by: str) -> None:
     """Raise for a law whose bristles follow a function of their own, where only the formulas of bristles will do."""
     if is_rate_law(law):
-        raise InvalidValueError(
-            "law", f"have the bristles of LuGre for {by}, not a rate of its own", type(law).__name__
-        )
+        rule = f"have the bristles of LuGre for {by}, not a rate of its own"
+        raise InvalidValueError("law", rule, type(law).__name__)
 
 
 def refuse_fixed_stiffness(law: Any, by: str) -> None:

@@ -35,7 +35,4 @@ class Dahl(FrictionLaw):
 
     @property
     def numbers(self) -> LawNumbers:
-        """The numbers that the law puts into the formulas."""
-        return LawNumbers(
-            sigma_0=self.sigma_0, sigma_1=0.0, sigma_2=0.0, mu_c=self.mu_c, mu_s=self.mu_c, v_s=_SPEED, gamma=2.0
-        )
+        return LawNumbers(self.sigma_0, 0.0, 0.0, mu_c=self.mu_c, mu_s=self.mu_c, v_s=_SPEED, gamma=2.0)

@@ -85,7 +85,6 @@ class LuGre(FrictionLaw):
 
     @property
     def numbers(self) -> LawNumbers:
-        """The numbers that the law puts into the formulas."""
         plain = LawNumbers(self.sigma_0, self.sigma_1, self.sigma_2, self.mu_c, self.mu_s, self.v_s, self.gamma)
         if not isinstance(self.elasto_plastic, ElastoPlastic):
             return plain

@@ -122,10 +122,9 @@ class RateLaw(FrictionLaw):
         if size > 2:
             raise InvalidValueError("axis", f"be that of one or two components for {type(self).__name__}", size)
         count = z.size // size
-        found = (
-            each[:, :size].reshape(shape) for each in self._evaluated(z.reshape(count, size), v.reshape(count, size))
-        )
-        rate, pull = (each[..., 0] if axis is None else np.moveaxis(each, -1, axis) for each in found)
+        found = self._evaluated(z.reshape(count, size), v.reshape(count, size))
+        parts = (each[:, :size].reshape(shape) for each in found)
+        rate, pull = (each[..., 0] if axis is None else np.moveaxis(each, -1, axis) for each in parts)
         return rate, pull
 
     def _evaluated(self, z: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

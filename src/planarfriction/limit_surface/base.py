@@ -237,7 +237,7 @@ class LimitSurface(ByValue):
 
         Raises `InvalidValueError` if `wrench` is zero, not finite or not `[..., 3]`, `SolverError` without a twist.
         """
-        wrench = _vectors("wrench", wrench)
+        wrench = validation.vectors("wrench", wrench, 3)
         if wrench.ndim > 1:
             validation.finite_numbers("wrench", wrench, largest=math.inf)  # before it is copied, whatever its size
         rows = np.array(wrench, order="C").reshape(-1, 3)  # writable, for which loops are compiled
@@ -324,13 +324,11 @@ class CompiledLimitSurface(LimitSurface):
     """Kind of `kernels.surfaces`."""
 
     def direction(self, units: np.ndarray) -> np.ndarray:
-        """Return `h` `[M, 3]` of unit scaled twists `[M, 3]` by compiled loops."""
         h, (_, size, data) = np.empty_like(units), self.numbers
         kernels.sliding_batch(self.kind, data, 0, size, units, h)
         return h
 
     def direction_slope(self, units: np.ndarray) -> np.ndarray:
-        """Return `dh/dV_S` `[M, 3, 3]` at unit scaled twists `[M, 3]` by compiled loops."""
         slopes, (_, size, data) = np.empty((len(units), 9)), self.numbers
         kernels.sliding_jacobian_batch(self.kind, data, 0, size, units, slopes)  # of h |V_S|
         return slopes.reshape(-1, 3, 3) - np.einsum("mi,mj->mij", self.direction(units), units)
@@ -352,15 +350,8 @@ def _unit(scaled: np.ndarray) -> np.ndarray:
     return scaled / _norm(scaled)[:, None]
 
 
-def _vectors(name: str, value) -> np.ndarray:
-    result = validation.numbers(name, value)
-    if result.ndim == 0 or result.shape[-1] != 3:
-        raise InvalidValueError(name, "have shape [..., 3]", f"shape {list(result.shape)}")
-    return result
-
-
 def _rows(name: str, value) -> np.ndarray:
-    return validation.finite_numbers(name, _vectors(name, value), largest=_LARGEST)
+    return validation.finite_numbers(name, validation.vectors(name, value, 3), largest=_LARGEST)
 
 
 def _no_twist(wrench: np.ndarray, angle: float) -> FrictionError:

@@ -36,11 +36,9 @@ class LimitSurfaceCells(CompiledLimitSurface):
         return SurfaceNumbers(self.kind, len(weights), np.concatenate([x / radius, y / radius, weights]))
 
     def direction(self, units: np.ndarray) -> np.ndarray:
-        """Return `h` `[M, 3]` of unit scaled twists `[M, 3]`."""
         return super().direction(units) if self._compiled else cell_sums(self._cell_rows, units)[0]
 
     def direction_slope(self, units: np.ndarray) -> np.ndarray:
-        """Return `dh/dV_S` `[M, 3, 3]` at unit scaled twists `[M, 3]`."""
         return super().direction_slope(units) if self._compiled else cell_sums(self._cell_rows, units)[1]
 
     @property

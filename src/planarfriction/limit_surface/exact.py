@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction.kernels import surfaces
-from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers, _norm
+from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers
 from planarfriction.limit_surface.cells import LimitSurfaceCells
 from planarfriction.limit_surface.loops import closed_forms as kernels
 from planarfriction.limit_surface.loops.twists import exact_twists
@@ -48,70 +48,31 @@ _THICK = 0.9
 Rules = tuple[tuple[float, int], ...]
 
 
-class _Domain:
-    """Domain that a surface is integrated over."""
-
-    loop: ClassVar[Any]
-    """Compiled sums over the domain's record `[M, 9]`."""
-
-    def rows(self, unit: float, rules: Rules = EXACT_RULES) -> Any:
-        """Return the record of the domain for compiled loops, lengths in `unit` [m]."""
-        raise NotImplementedError
-
-    def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray:
-        """Return the sums `[M, 9]` at unit twists `[M, 3]`, lengths in `unit` [m]."""
-        sums = np.empty((len(twists), 9))
-        type(self).loop(self.rows(unit, rules), twists, sums)
-        return sums
-
-
-@dataclass(frozen=True, eq=False)
-class _Elements(_Domain):
+class _Elements(NamedTuple):
     """Points, segments or quads about the centre of pressure, the load of each spread evenly."""
 
     corners: np.ndarray
     """Corners `[N, 1, 2, or 4, 2]` [m]; a triangle has two corners in one place."""
     weights: np.ndarray
     """Share of the load of each, `[N]` [-]; negative for the triangles that a polygon subtracts."""
-    loop = kernels.element_sums
-
-    def rows(self, unit: float, rules: Rules = EXACT_RULES) -> kernels.Elements:
-        corners = self.corners / unit
-        return kernels.Elements(corners, _shape(corners, self.weights), *_gauss_rules(corners.shape[1], rules))
 
 
-@dataclass(frozen=True, eq=False)
-class _Discs(_Domain):
-    """Evenly loaded discs; a ring about the centre of pressure is one less another."""
-
-    radii: np.ndarray
-    """Radii `[K]` [m]."""
-    loads: np.ndarray
-    """Share of the load of each, `[K]` [-]."""
-    places: np.ndarray
-    """Middles about the centre of pressure, `[2, K]` [m]."""
-    loop = kernels.disc_sums
-
-    def rows(self, unit: float, rules: Rules = EXACT_RULES) -> kernels.Discs:
-        return kernels.Discs(self.radii / unit, self.places / unit, self.loads)
+def _rows(domain: Any, unit: float, rules: Rules = EXACT_RULES) -> Any:
+    """Return the record of a domain that a surface is integrated over, for compiled loops, lengths in `unit` [m]."""
+    if isinstance(domain, kernels.Discs):
+        return kernels.Discs(domain.radii / unit, domain.places / unit, domain.loads)
+    if isinstance(domain, kernels.Rings):
+        return domain._replace(inner=domain.inner / unit, outer=domain.outer / unit, radius=domain.radius / unit)
+    corners = domain.corners / unit
+    return kernels.Elements(corners, _shape(corners, domain.weights), *_gauss_rules(corners.shape[1], rules))
 
 
-@dataclass(frozen=True, eq=False)
-class _Rings(_Domain):
-    """A disc or ring about the centre of pressure under a pressure that depends on the radius alone."""
-
-    inner: float
-    outer: float
-    """Radii of the patch [m]."""
-    reach: float
-    """Radius at which the pressure ends [m]."""
-    exponent: float
-    """Exponent of its profile; `_EVEN` for an even pressure."""
-    loop = kernels.ring_sums
-
-    def rows(self, unit: float, rules: Rules = EXACT_RULES) -> kernels.Rings:
-        radii = (self.inner / unit, min(self.outer, self.reach) / unit, self.reach / unit)
-        return kernels.Rings(*_double_exponential(), *radii, self.exponent)
+def _sums(domain: Any, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray:
+    """Return the sums `[M, 9]` over a domain at unit twists `[M, 3]`, lengths in `unit` [m]."""
+    rows, sums = _rows(domain, unit, rules), np.empty((len(twists), 9))
+    loops = {kernels.Discs: kernels.disc_sums, kernels.Rings: kernels.ring_sums, kernels.Elements: kernels.element_sums}
+    loops[type(rows)](rows, twists, sums)
+    return sums
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,16 +137,17 @@ class LimitSurfaceExact(LimitSurface):
         return self.patch.outline.outer, _EVEN  # pyright: ignore[reportOptionalMemberAccess, reportAttributeAccessIssue]
 
     @functools.cached_property
-    def _parts(self) -> _Domain:
-        """Domain that the surface is integrated over."""
+    def _parts(self) -> _Elements | kernels.Discs | kernels.Rings:
+        """Domain that the surface is integrated over, lengths in m."""
         outline, pressure = self._outline, self.patch.pressure
         self.patch.weights(self.normal_force)  # refuses a missing normal force
         if isinstance(outline, RoundOutline):
             if isinstance(pressure, Uniform) and outline.inner <= _THICK * outline.outer:
                 radii = np.array([outline.outer, outline.inner] if outline.inner > 0.0 else [outline.outer])
                 squares = radii**2 * [1.0, -1.0][: len(radii)]
-                return _Discs(radii, squares / squares.sum(), np.zeros((2, len(radii))))
-            return _Rings(outline.inner, outline.outer, *self._soft)
+                return kernels.Discs(radii, np.zeros((2, len(radii))), squares / squares.sum())
+            reach, exponent = self._soft
+            return kernels.Rings(*_double_exponential(), outline.inner, min(outline.outer, reach), reach, exponent)
         if isinstance(outline, PolygonOutline):
             triangles = outline.triangles()
             areas = _area(triangles)
@@ -193,7 +155,7 @@ class LimitSurfaceExact(LimitSurface):
             return _Elements(self._lever_corners(corners), areas / areas.sum())
         x, y, weights = self._loaded_cells()
         if self.patch.has_discs and not self.patch.cell_extents().any():
-            return _Discs(self.patch.lever_radii[self._weights() > 0.0], weights, np.array([x, y]))
+            return kernels.Discs(self.patch.lever_radii[self._weights() > 0.0], np.array([x, y]), weights)
         extents = self.patch.cell_extents()[self.patch.weights(self.normal_force) > 0.0]
         sides = int((extents > 0.0).any(axis=0).sum())
         corners = np.stack([x, y], -1)[:, None] + self._lever_corners(extents[:, None] * _CORNERS[sides])
@@ -204,25 +166,17 @@ class LimitSurfaceExact(LimitSurface):
         return np.stack(self.patch.lever_coordinates(corners[..., 0], corners[..., 1]), -1)
 
     def _radius(self) -> float:
-        return float(self._parts.sums(np.array([[0.0, 0.0, 1.0]]), 1.0, EXACT_RULES)[0, 2])
+        return float(_sums(self._parts, np.array([[0.0, 0.0, 1.0]]), 1.0, EXACT_RULES)[0, 2])
 
-    def sums(self, scaled: np.ndarray, rules: Rules = EXACT_RULES) -> tuple[np.ndarray, np.ndarray]:
-        """Return gradient `[M, 3]` and second derivatives `[M, 3, 3]` of the dissipation at scaled twists `[M, 3]`."""
-        speed = _norm(scaled)
-        moving = speed > 0.0
-        sums = np.zeros((len(scaled), 9))
-        if moving.any():
-            sums[moving] = self._parts.sums(scaled[moving] / speed[moving, None], self.contact_radius, rules)
-        per_speed = np.where(moving, 1.0 / np.where(moving, speed, 1.0), 0.0)
-        slopes = sums[:, [3, 4, 5, 4, 6, 7, 5, 7, 8]] * per_speed[:, None]
-        return sums[:, :3], slopes.reshape(-1, 3, 3)
+    def sums(self, units: np.ndarray, rules: Rules = EXACT_RULES) -> tuple[np.ndarray, np.ndarray]:
+        """Return gradient `[M, 3]` and Hessian `[M, 3, 3]` of the dissipation at unit scaled twists `[M, 3]`."""
+        sums = _sums(self._parts, units, self.contact_radius, rules)
+        return sums[:, :3], sums[:, [3, 4, 5, 4, 6, 7, 5, 7, 8]].reshape(-1, 3, 3)
 
     def direction(self, units: np.ndarray) -> np.ndarray:
-        """Return the negative friction `h` `[M, 3]` of unit scaled twists `[M, 3]`, in closed form if there is one."""
         return self.sums(units)[0]
 
     def direction_slope(self, units: np.ndarray) -> np.ndarray:
-        """Return `dh/dV_S` `[M, 3, 3]`, integrated in the same way."""
         return self.sums(units)[1]
 
     @functools.cached_property
@@ -235,12 +189,10 @@ class LimitSurfaceExact(LimitSurface):
     def _loops(self) -> tuple[kernels.Elements, kernels.Discs, kernels.Rings]:
         """Domains for compiled loops: elements, discs and rings, of which only one is not empty."""
         none = np.zeros(0)
-        elements = _Elements(np.zeros((0, 2, 2)), none).rows(1.0)
-        discs, rings = kernels.Discs(none, np.zeros((2, 0)), none), kernels.Rings(none, none, 0.0, 1.0, 1.0, 1.0)
-        rows = self._parts.rows(self.contact_radius)
-        if isinstance(rows, kernels.Elements):
-            return rows, discs, rings
-        return (elements, rows, rings) if isinstance(rows, kernels.Discs) else (elements, discs, rows)
+        empty = _rows(_Elements(np.zeros((0, 2, 2)), none), 1.0), kernels.Discs(none, np.zeros((2, 0)), none)
+        rows = _rows(self._parts, self.contact_radius)
+        loops = (*empty, kernels.Rings(none, none, 0.0, 1.0, 1.0, 1.0))
+        return tuple(rows if type(each) is type(rows) else each for each in loops)  # pyright: ignore[reportReturnType]
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
         if self._points is not None:

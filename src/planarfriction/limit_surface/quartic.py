@@ -26,12 +26,6 @@ POWERS = np.array([powers for powers in itertools.product(range(4, -1, -1), repe
 MARGIN = 1e-4
 """Least eigenvalue of the certificate, `H'' >= 1e-4 |x|^2`: no facets, no corners (the unit sphere's is 4)."""
 
-ELLIPSOID = np.zeros(15)
-"""Coefficients of `(x^2 + y^2 + z^2)^2`."""
-for _row, _powers in enumerate(POWERS):
-    ELLIPSOID[_row] = {4: 1.0, 2: 2.0}.get(_powers.max(), 0.0) if (_powers % 2 == 0).all() else 0.0
-
-
 _TENSORS = np.zeros((15, 3, 3, 3, 3))
 """Symmetric tensors T of the monomials: `T x x x x`, gradients `4 T x x x`, second derivatives `12 T x x`."""
 for _index in itertools.product(range(3), repeat=4):

@@ -218,13 +218,12 @@ class FrictionModel(ByValue):
         held = None if moments is None else moments_of(moments)
         if held is not None and self.law.reference_load is not None:
             raise InvalidValueError("moments", "be None for a law with a reference_load", "moments")
-        state, twist = validation.numbers("state", state), validation.numbers("twist", twist)
+        state = validation.numbers("state", state)
         inner = self.state_shape
         if state.shape[state.ndim - len(inner) :] != inner:
             wanted = ", ".join(str(n) for n in inner)
             raise InvalidValueError("state", f"have shape [..., {wanted}]", f"shape {list(state.shape)}")
-        if twist.shape[-1:] != (3,):
-            raise InvalidValueError("twist", "have shape [..., 3]", f"shape {list(twist.shape)}")
+        twist = validation.vectors("twist", twist, 3)
         scalars = {"normal_force": normal_force, **more}
         arrays = {name: validation.numbers(name, value) for name, value in scalars.items()}
         batches = {state.shape[: state.ndim - len(inner)], twist.shape[:-1], *(v.shape for v in arrays.values())}

@@ -68,7 +68,6 @@ class ReducedModel(FrictionModel):
 
     @property
     def compiled(self) -> CompiledModel:
-        """Machine form of the model (see `FrictionModel.compiled`)."""
         return self.reduction.compiled
 
     def jacobians(self, state: Any, twist: Any, normal_force: Any) -> ModelJacobians:
@@ -79,7 +78,6 @@ class ReducedModel(FrictionModel):
         return self.reduction.jacobians(state, twist, normal_force)
 
     def with_law(self, law: FrictionLaw) -> Self:
-        """Return the model with another law; see `FrictionModel.with_law`."""
         if is_rate_law(law) != is_rate_law(self.law):
             return dataclasses.replace(self, law=law)
         changed = object.__new__(type(self))

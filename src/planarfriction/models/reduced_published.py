@@ -78,11 +78,6 @@ class PublishedShape(NamedTuple):
         y, x = np.linalg.solve(self.root, self.lever[:2, 2])
         return np.array([x, -y])
 
-    @property
-    def viscous_lever(self) -> np.ndarray:
-        """Map `[3, 3]` of twists to the speeds of viscous friction, `U V` at the centre of pressure."""
-        return np.diag([1.0, 1.0, self.second_moment]) @ self.lever
-
     def rate_slopes(self, lin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return d rate / d state and d rate / d twist `[B, 3, 3]` from linearisations `[B, L]`."""
         scale = np.array([1.0, 1.0, self.contact_radius])
@@ -129,14 +124,10 @@ class PublishedShapes:
             centre = self._patch.lever_coordinates(*self._patch.centre_of_pressure(load))
             return PublishedShape(np.array(centre), 0.0, 0.0, _OfPoint(), self._root)  # pyright: ignore
         surface = self._surface.at(load)
-        same = self.reference if self._rescales else None
-        return PublishedShape(
-            self._centre(surface),
-            surface.contact_radius,
-            float(self._patch.second_moment(load)) if same is None else same.second_moment,
-            surface if same is None else same.surface,
-            self._root,
-        )
+        centre, radius = self._centre(surface), surface.contact_radius
+        if self._rescales:
+            return self.reference._replace(centre_of_pressure=centre, contact_radius=radius)
+        return PublishedShape(centre, radius, float(self._patch.second_moment(load)), surface, self._root)
 
     def _centre(self, surface: LimitSurface) -> np.ndarray:
         return np.array(self._patch.lever_coordinates(*surface.centre_of_pressure))
@@ -182,16 +173,9 @@ class ReducedModelPublished(FrictionModel):
         refuse_fixed_stiffness(self.law, "ReducedModelPublished")
         validation.choice("on_load_change", self.on_load_change, ON_LOAD_CHANGE)
         if self.surface is None:
-            object.__setattr__(self, "surface", LimitSurfaceTablePublished(self.patch))
+            self._set(surface=LimitSurfaceTablePublished(self.patch))
         if not isinstance(self.surface, LimitSurface):
             raise InvalidValueError("surface", "be a limit surface", self.surface)
-        self._check_directions()
-        if self.patch.depends_on_load and self.on_load_change != "rebuild" and self.surface.normal_force is None:
-            raise InvalidValueError(
-                "surface", f"have a normal_force when on_load_change={self.on_load_change!r}", "none"
-            )
-
-    def _check_directions(self) -> None:
         by = type(self).__name__
         refuse_cell_metrics(self.patch, by)
         for patch in (self.patch, self.surface.patch):
@@ -199,6 +183,9 @@ class ReducedModelPublished(FrictionModel):
                 raise InvalidValueError("patch", f"have the same friction forwards and backwards for {by}", "asymmetry")
         if not same_metric(self.patch, self.surface.patch):
             raise InvalidValueError("surface", "have the friction metric of the patch", self.surface.patch.name)
+        if self.patch.depends_on_load and self.on_load_change != "rebuild" and self.surface.normal_force is None:
+            rule = f"have a normal_force when on_load_change={self.on_load_change!r}"
+            raise InvalidValueError("surface", rule, "none")
 
     def shape_at(self, normal_force: float) -> PublishedShape:
         """Return centre of pressure, `r`, `<rho^2>` and limit surface at a load [N]; recent loads are cached.
@@ -210,7 +197,6 @@ class ReducedModelPublished(FrictionModel):
 
     @property
     def depends_on_load(self) -> bool:
-        """True if the shape of the patch in this model changes with the load."""
         return self.patch.depends_on_load and self.on_load_change != "keep"
 
     @functools.cached_property
@@ -244,7 +230,8 @@ class ReducedModelPublished(FrictionModel):
             by_z, by_v = shape.rate_slopes(self.compiled.linearisation(shape, z[rows], v[rows]))
             rate_state[rows], rate_twist[rows] = by_z, by_v
             pull = law.sigma_0 * np.eye(3) + law.sigma_1 * by_z
-            push = law.sigma_1 * by_v + law.sigma_2 * shape.viscous_lever
+            viscous = np.diag([1.0, 1.0, shape.second_moment]) @ shape.lever
+            push = law.sigma_1 * by_v + law.sigma_2 * viscous
             lever, weight = shape.lever.T, -f[rows][:, None, None]
             wrench_state[rows], wrench_twist[rows] = weight * (lever @ pull), weight * (lever @ push)
         blocks = (each.reshape(*load.shape, 3, 3) for each in (rate_state, rate_twist, wrench_state, wrench_twist))
@@ -253,7 +240,6 @@ class ReducedModelPublished(FrictionModel):
         return ModelJacobians(by_state, by_twist, np.zeros_like(state), pull, push, by_load)
 
     def with_law(self, law: FrictionLaw) -> Self:
-        """Return the model with another law; see `FrictionModel.with_law`."""
         changed = super().with_law(law)
         changed.__dict__["shapes"] = self.shapes
         return changed

@@ -13,18 +13,11 @@ from numpy.typing import ArrayLike
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import outline as outlines
+from planarfriction.patch import pressure as pressures
 from planarfriction.patch.grid import MOST_CELLS, Grid, cell_extents, check_cells, point_shares, warn_of_the_unit
 from planarfriction.patch.grid_error import GridError, finer, grid_error
 from planarfriction.patch.moments import Moments
-from planarfriction.patch.pressure import (
-    Pressure,
-    Uniform,
-    as_law,
-    check_not_negative,
-    check_pressure,
-    evaluated,
-    pressure_array,
-)
+from planarfriction.patch.pressure import Pressure, Uniform
 from planarfriction.patch.pressure_maps import map_grid, read_maps
 from planarfriction.patch.tilt import weights_under
 from planarfriction.pictures import picture
@@ -53,11 +46,8 @@ class ContactPatch(Moments):
 
     Source: Waltersson and Karayiannidis 2024, section III.
 
-    Raises
-    ------
-    InvalidValueError
-        No cells, wrong shapes, numbers that are not finite, negative pressure, zero total pressure, a normal force that
-        is negative or missing where it is needed.
+    Raises InvalidValueError for no cells, wrong shapes, numbers that are not finite, negative pressure, zero total
+    pressure, and a normal force that is negative or missing where it is needed.
     """
 
     positions: np.ndarray
@@ -99,9 +89,9 @@ class ContactPatch(Moments):
         areas = validation.positive_array("areas", self.areas, (len(positions),))
         radii = np.zeros(len(positions)) if self.radii is None else self.radii
         radii = validation.non_negative_array("radii", radii, (len(positions),))
-        law = as_law(self.pressure, positions)
+        law = pressures.as_law(self.pressure, positions)
         if not law.depends_on_load:
-            check_pressure(law.relative(positions), positions)
+            pressures.check_pressure(law.relative(positions), positions)
         kept = law.ever_loaded(positions)
         if not kept.any():
             raise InvalidValueError("pressure", "be > 0 on at least one cell", "0 on all of them")
@@ -211,9 +201,9 @@ class ContactPatch(Moments):
         positions = np.zeros((cells, 2))
         positions[:, along] = (np.arange(cells) - (cells - 1) / 2) * (side if along == 0 else -side)
         if callable(profile):
-            profile = evaluated("profile", profile, positions[:, along, None].tolist())
+            profile = pressures.evaluated("profile", profile, positions[:, along, None].tolist())
         elif profile is not None:
-            profile = check_not_negative("profile", pressure_array("profile", profile, (cells,)))
+            profile = pressures.non_negative_array("profile", profile, (cells,))
         size = (side, 0.0) if along == 0 else (0.0, side)
         areas = np.full(cells, grid.cell_area)
         patch = cls(positions, areas, profile, grid, name, size)
@@ -247,7 +237,7 @@ class ContactPatch(Moments):
         """
         positions = validation.array("positions", positions, (None, 2))
         if weights is not None:
-            weights = check_not_negative("weights", pressure_array("weights", weights, (len(positions),)))
+            weights = pressures.non_negative_array("weights", weights, (len(positions),))
         return cls(positions, np.full(len(positions), validation.positive("area", area)), weights, None, name)
 
     @classmethod

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.patch.disc_friction import disc_friction
+from planarfriction.patch.moments import disc_friction
 from planarfriction.patch.outline import with_outline
 from planarfriction.patch.pressure import PerCell
 from planarfriction.patch.shared import SharedPressure, mean_weights
@@ -284,6 +284,8 @@ def _arrangements(period: _Period, n: int) -> list[tuple[int, int, int, int]]:
 
 def _partitions(period: _Period, n: int) -> list[_Partition]:
     """Return the partitions into n clusters that cost little more than the best, the best first."""
+    from planarfriction.kernels import clusters  # compiled code, which a patch alone does not need
+
     points, weights = period.points, period.weights
     ways = [way for way in _arrangements(period, n) if 0 < sum(way) <= len(points)]
     labels, turned = np.empty(len(points), int), np.empty(len(points), bool)
@@ -293,7 +295,7 @@ def _partitions(period: _Period, n: int) -> list[_Partition]:
         k = inside + at_x + at_y + at_both
         for seed in range(min(MOST_SEEDS, max(1, round(WORK / work)))):
             centres, on_axes = np.empty((k, 2)), np.zeros((k, 2), bool)
-            kernels().seeds(points, weights, seed * k, centres)
+            clusters.seeds(points, weights, seed * k, centres)
             order = np.argsort(np.hypot(*centres.T) if period.inverted else centres[:, 0], kind="stable")
             on_axes[order[:at_both] if period.inverted else [], :] = True
             on_axes[order[:at_x], 0] = True
@@ -302,7 +304,7 @@ def _partitions(period: _Period, n: int) -> list[_Partition]:
             on_axes[lowest, 1] = True
             on_axes[lowest[np.argsort(centres[lowest, 0], kind="stable")[:at_both]], 0] = True
             centres[on_axes] = 0.0
-            cost = kernels().lloyd(points, weights, period.inverted, on_axes, STEPS, centres, labels, turned)
+            cost = clusters.lloyd(points, weights, period.inverted, on_axes, STEPS, centres, labels, turned)
             if cost < np.inf:
                 found.append((cost, _Partition(centres, on_axes)))
     found.sort(key=lambda each: each[0])
@@ -318,14 +320,6 @@ def _different(found: list[tuple[float, _Partition]]) -> list[_Partition]:
         if not kept or cost > kept[-1][0] * (1.0 + 1e-6):
             kept.append((cost, partition))
     return [partition for _, partition in kept]
-
-
-@functools.cache
-def kernels() -> Any:
-    """Return the compiled loops, which a patch alone does not need."""
-    from planarfriction.kernels import clusters
-
-    return clusters
 
 
 def _chosen(period: _Period, points: np.ndarray, weights: np.ndarray, squares: np.ndarray, n: int) -> _Partition:
@@ -356,10 +350,12 @@ def _chosen(period: _Period, points: np.ndarray, weights: np.ndarray, squares: n
 
 def _finished(period: _Period, chosen: _Partition) -> _Clusters:
     """Return the discs of a partition and of its images."""
+    from planarfriction.kernels import clusters
+
     points, weights = period.points, period.weights
     k, on_axes, centres = len(chosen.centres), chosen.on_axes, chosen.centres.copy()
     labels, turned = np.empty(len(points), int), np.empty(len(points), bool)
-    kernels().lloyd(points, weights, period.inverted, on_axes, LAST_STEPS, centres, labels, turned)
+    clusters.lloyd(points, weights, period.inverted, on_axes, LAST_STEPS, centres, labels, turned)
     points = np.where(turned[:, None], -points, points)
     share = np.bincount(labels, weights, k)
     for axis in range(2):

@@ -103,9 +103,7 @@ class Grid(Checked):
 
         Raises InvalidValueError for positions of another shape.
         """
-        positions = validation.finite_numbers("positions", positions)
-        if positions.shape[-1:] != (2,):
-            raise InvalidValueError("positions", "have shape [..., 2]", f"shape {list(positions.shape)}")
+        positions = validation.vectors("positions", validation.finite_numbers("positions", positions), 2)
         from_top = self.rows - (positions[..., 1] - self.y_min) / self.cell_height
         from_left = (positions[..., 0] - self.x_min) / self.cell_width
         row, column = (np.floor(np.clip(each, -FARTHEST, FARTHEST)).astype(int) for each in (from_top, from_left))

@@ -132,12 +132,8 @@ def read_pressure_map(path: str | Path, **options: Any) -> np.ndarray:
     `[rows, columns, frames]`), `.asf` (Tekscan ASCII, also as `.csv`; B is empty), or a grey image (brightness is
     pressure, black is none).
 
-    Raises
-    ------
-    FileError
-        The file is missing, of an unknown format, or does not contain what its suffix says.
-    InvalidValueError
-        An option breaks its rule, or has to be given.
+    Raises FileError for a missing file, an unknown format, and content that is not what the suffix says;
+    InvalidValueError for an option that breaks its rule, or has to be given.
     """
     path, reading = validation.path("path", path), map_reading(options)
     readers: dict[str, Any] = {
@@ -291,9 +287,8 @@ def _read_mat(path: Path, _: MapReading) -> np.ndarray:
 def _only(path: Path, names: Sequence[str]) -> str:
     if len(names) != 1:
         found = shown(", ".join(names)) or "none"
-        raise FileError(
-            f"pressure map {path}: the file must hold one array, it has {found}: read it, and pass the array"
-        )
+        text = f"the file must hold one array, it has {found}: read it, and pass the array"
+        raise FileError(f"pressure map {path}: {text}")
     return names[0]
 
 

@@ -12,12 +12,22 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
-from planarfriction.patch.disc_friction import disc_friction
+from planarfriction import formulas, validation
 from planarfriction.patch.metric import Anisotropy
 
 MOST_DEGREE = 40
 """Degree of polynomial moments that are given: beyond it powers are rounding."""
+
+
+def disc_friction(slide: Any, spin: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return `c_t`, `c_s` [-] and the mean speed S of small discs from `|u|^2` and `(a omega)^2`, of any size.
+
+    Friction is `W/S`, `W = (c_t u, c_s kappa a omega)` (see `formulas.disc_friction`).
+    """
+    total = np.asarray(slide + spin)
+    per = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)  # shares of the sum keep in range
+    c_t, c_s, m = formulas.disc_friction(np, slide * per, spin * per)
+    return c_t, c_s, np.sqrt(slide + m * spin)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

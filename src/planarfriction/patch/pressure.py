@@ -52,8 +52,9 @@ class Pressure(Checked):
     def to_dict(self) -> dict[str, Any] | list[float]:
         """Return the law as plain data: `{"law": name, parameter: value, ...}`, or a list of one pressure per cell."""
         fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}  # pyright: ignore
-        plain = {name: list(value) if isinstance(value, tuple) else value for name, value in fields.items()}
-        return {"law": self.law, **{name: value for name, value in plain.items() if value is not None}}
+        given = {name: value for name, value in fields.items() if value is not None}
+        lists = {name: np.asarray(v).tolist() for name, v in given.items() if isinstance(v, (tuple, np.ndarray))}
+        return {"law": self.law, **given, **lists}
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> Pressure:
@@ -247,8 +248,9 @@ def evaluated(name: str, function: Callable[..., Any], points: list[list[float]]
         raise InvalidValueError(name, wanted, f"{type(error).__name__}: {error}") from error
 
 
-def check_not_negative(name: str, values: np.ndarray) -> np.ndarray:
-    """Return `values`, or raise an error that shows the first below zero."""
+def non_negative_array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
+    """Return relative pressures as `pressure_array` does, or raise an error that shows the first below zero."""
+    values = pressure_array(name, value, shape)
     return validation.non_negative_array(name, values, values.shape, largest=np.inf)
 
 

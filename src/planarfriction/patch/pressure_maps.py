@@ -15,7 +15,7 @@ from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch.grid import Grid
 from planarfriction.patch.map_files import MapReading, map_reading, read_pressure_map
-from planarfriction.patch.pressure import Pressure, check_not_negative, pressure_array
+from planarfriction.patch.pressure import Pressure, non_negative_array
 
 
 def title(path: str | Path) -> str:
@@ -42,13 +42,11 @@ class PressureMaps(ByValue, Pressure):
         loads = validation.array("loads", self.loads, (None,))
         if len(loads) == 0 or not (loads[0] > 0.0 and (np.diff(loads) > 0.0).all()):
             raise InvalidValueError("loads", "be increasing and > 0", loads.tolist())
-        values = pressure_array("pressure values", self.values, (len(loads), None))
-        values = check_not_negative("pressure values", values)
+        values = non_negative_array("pressure values", self.values, (len(loads), None))
         peak = values.max(axis=1, initial=0.0)
         if not (peak > 0.0).all():
-            raise InvalidValueError(
-                "pressure values", "have a total > 0 at every load", f"0 at {loads[peak.argmin()]:g} N"
-            )
+            given = f"0 at {loads[peak.argmin()]:g} N"
+            raise InvalidValueError("pressure values", "have a total > 0 at every load", given)
         for each in (loads, values):
             each.setflags(write=False)
         self._set(loads=loads, values=values)
@@ -90,9 +88,6 @@ class PressureMaps(ByValue, Pressure):
 
     def repeated(self, times: int) -> PressureMaps:
         return PressureMaps(self.loads, np.repeat(self.values, times, axis=1))
-
-    def to_dict(self) -> dict[str, Any]:
-        return {"law": self.law, "loads": self.loads.tolist(), "values": self.values.tolist()}
 
 
 def read_maps(pressure: Any, loads: Any = None, **options: Any) -> tuple[Any, tuple[int, int], str | None]:
@@ -149,5 +144,5 @@ def _one_map(pressure: Any, reading: MapReading) -> tuple[np.ndarray, str | None
         values, name = read_pressure_map(pressure, **vars(reading)), title(pressure)
     else:
         values, name = reading.frame_of("pressure", pressure) if isinstance(pressure, np.ndarray) else pressure, None
-    values = check_not_negative(_what(pressure), pressure_array(_what(pressure), values, (None, None)))
+    values = non_negative_array(_what(pressure), values, (None, None))
     return values if name else reading.pressures("pressure", values), name

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.equality import ByValue
-from planarfriction.patch.disc_friction import disc_friction
+from planarfriction.patch.moments import disc_friction
 from planarfriction.patch.pressure import Pressure
 
 if TYPE_CHECKING:
@@ -92,7 +91,6 @@ class SharedPressure(ByValue, Pressure):
         return self.patch.depends_on_load
 
     def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
-        """Return the pressures of the discs, `[..., n]` for loads `[...]`."""
         areas = self.sums(self.patch.areas)
         if not self.depends_on_load:
             return self.sums(self.patch.weights()) / areas
@@ -126,9 +124,7 @@ class SharedPressure(ByValue, Pressure):
         return shares
 
     def to_dict(self) -> dict[str, Any]:
-        fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        plain = {name: each.tolist() if isinstance(each, np.ndarray) else each for name, each in fields.items()}
-        return {"law": self.law, **plain, "patch": self.patch.to_dict()}
+        return {**super().to_dict(), "patch": self.patch.to_dict()}  # pyright: ignore[reportGeneralTypeIssues]
 
 
 def _moments(places: np.ndarray, radii: np.ndarray) -> np.ndarray:

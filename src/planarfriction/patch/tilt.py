@@ -13,9 +13,7 @@ from planarfriction.errors import InvalidValueError
 
 def moments_of(value: Any) -> np.ndarray:
     """Return moments `[..., 2]` [N m], checked."""
-    moments = validation.numbers("moments", value)
-    if moments.shape[-1:] != (2,):
-        raise InvalidValueError("moments", "have shape [..., 2]", f"shape {list(moments.shape)}")
+    moments = validation.vectors("moments", value, 2)
     validation.within_range("moments", moments.min(initial=0.0), moments.max(initial=0.0))
     return moments
 

@@ -44,30 +44,14 @@ def animate_solution(
     its wrench inside its limit surface, for mu_c f_N = 1. Which cells slip is computed by a distributed model with the
     contact's law on the recorded path, whatever the model of the contact, less accurately from samples far apart.
 
-    Parameters
-    ----------
-    solution
-        What to show.
-    path
-        File to write; `.mp4` needs ffmpeg or the extra `[ffmpeg]`.
-    slow
-        How many times slower than real time [-]; below 1 is faster. None: real time if that makes 75 to 300 frames,
-        else the next of 1, 2, 5, 10, ... that does.
-    fps
-        Frames per second, from 0.01 to 50.
-    follow
-        Whether the view follows a body that moves much farther than its size, instead of showing the whole path.
-    dpi
-        Resolution; a picture is 9.6 x 5.4 inches.
-    progress
-        Called with the time of each frame [s].
+    `.mp4` needs ffmpeg or the extra `[ffmpeg]`. `slow` is how many times slower than real time it runs [-], below 1
+    faster; None takes real time if that makes 75 to 300 frames, else the next of 1, 2, 5, 10, ... that does. `fps` are
+    the frames per second, from 0.01 to 50. With `follow` the view follows a body that moves much farther than its size,
+    instead of showing the whole path. `dpi` is the resolution of pictures of 9.6 x 5.4 inches; `progress` is called
+    with the time of each frame [s].
 
-    Raises
-    ------
-    FileError
-        The file is of another kind, cannot be written, or needs ffmpeg, which is missing; or the solution has no scene.
-    InvalidValueError
-        A parameter breaks its rule.
+    Raises FileError for a file of another kind, one that cannot be written, a missing ffmpeg, and a solution without
+    its scene; InvalidValueError for a parameter that breaks its rule.
     """
     from planarfriction.scenes.solution import scene_of
 
@@ -101,13 +85,16 @@ def frame_times(sampled: np.ndarray, slow: float | None, fps: float) -> tuple[np
     if fps < SLOWEST:
         raise InvalidValueError("fps", f"be at least {SLOWEST:g}", fps)
     span = float(sampled[-1] - sampled[0])
-    if slow is None:
-        slow = _usual_pace(span * fps)
-    else:
+    frames = span * fps
+    if slow is not None:
         slow = validation.positive("slow", slow)
+    elif frames > USUAL_FRAMES:
+        slow = 1.0 / _round_up(frames / USUAL_FRAMES)
+    else:
+        slow = _round_up(LEAST_FRAMES / frames) if 0.0 < frames < LEAST_FRAMES else 1.0
     wanted = slow * span * fps
     if wanted > MOST_FRAMES:
-        rule = f"be at most {MOST_FRAMES / (span * fps):.3g} here, for at most {MOST_FRAMES} frames"
+        rule = f"be at most {MOST_FRAMES / frames:.3g} here, for at most {MOST_FRAMES} frames"
         raise InvalidValueError("slow", rule, slow)
     count = max(round(wanted) + 1, 2) if span > 0.0 else LEAST_FRAMES
     if slow == 1.0 or span == 0.0:
@@ -115,13 +102,6 @@ def frame_times(sampled: np.ndarray, slow: float | None, fps: float) -> tuple[np
     else:
         words = f"   ({slow:g} x slower)" if slow > 1.0 else f"   ({1.0 / slow:g} x faster)"
     return np.linspace(sampled[0], sampled[-1], count), words
-
-
-def _usual_pace(frames: float) -> float:
-    """Return the ratio of playing time to real time of so many `frames` [-]."""
-    if frames > USUAL_FRAMES:
-        return 1.0 / _round_up(frames / USUAL_FRAMES)
-    return _round_up(LEAST_FRAMES / frames) if 0.0 < frames < LEAST_FRAMES else 1.0
 
 
 def _round_up(value: float) -> float:

@@ -13,21 +13,9 @@ from matplotlib.patheffects import withStroke
 
 import planarfriction as pf
 from planarfriction import geometry
-from planarfriction.plots import style
+from planarfriction.plots import panels, style
 from planarfriction.plots.motion import body_lines, move, placed
-from planarfriction.plots.panels import (
-    SLIP,
-    STICK,
-    CellPanel,
-    SurfacePanel,
-    cell_polygons,
-    cells_of,
-    centre_mark,
-    colour_cells,
-    has_surface,
-    put_centre,
-    still_speed,
-)
+from planarfriction.plots.panels import CellPanel, SurfacePanel
 from planarfriction.plots.track import Track
 from planarfriction.shown import unit_for
 
@@ -59,7 +47,7 @@ class Film:
         for each, (cells, bar, surface) in zip(chosen, places, strict=True):
             shown = self.figure.add_axes(bar) if bar and each.slip is not None else None
             self.panels.append(CellPanel(self.figure.add_axes(cells), each, bar=shown))
-            if has_surface(each):
+            if panels.has_surface(each):
                 axes = self.figure.add_axes(surface, projection="3d")
                 self.panels.append(SurfacePanel(axes, each, beside=len(chosen) - 1))
         self._draw_body(solution)
@@ -76,11 +64,11 @@ class Film:
     def picture(self, frame: int) -> np.ndarray:
         """Return a frame as red, green and blue `[height, width, 3]`, each a byte."""
         self.show(frame)
-        levels = tuple(each.level(frame) for each in self.panels if isinstance(each, SurfacePanel))
+        surfaces = [each for each in self.panels if isinstance(each, SurfacePanel)]
+        levels = tuple(panels.level_of(each.track, frame) for each in surfaces)
         if levels not in self.backgrounds:
-            for panel in self.panels:
-                if isinstance(panel, SurfacePanel):
-                    panel.choose(panel.level(frame))
+            for panel, level in zip(surfaces, levels, strict=True):
+                panel.choose(level)
             self.canvas.draw()
             self.backgrounds[levels] = self.canvas.copy_from_bbox(self.figure.bbox)
         self.canvas.restore_region(self.backgrounds[levels])
@@ -98,12 +86,12 @@ class Film:
         move(self.body, self.axes, pose)
         self.path.set_data(*(1e3 * track.poses[: frame + 1, :2].T))
         for each, cells, arrow in self.contacts:
-            colour_cells(cells, each, frame)
+            panels.colour_cells(cells, each, frame)
             move([cells], self.axes, each.poses[frame])
             _, centre = each.shape(frame)
             start = 1e3 * placed(centre, each.poses[frame])
             arrow.set_positions(start, start + self.millimetres_per_newton * each.forces[frame])
-        put_centre(self.centre, track.twists[frame], pose[:2], still=self.still)
+        panels.put_centre(self.centre, track.twists[frame], pose[:2], still=self.still)
         self.clock.set_text(f"t = {track.times[frame]:.{self.digits}f} s{self.pace}")
         self.words.set_text(self._moved(frame))
         for panel in self.panels:
@@ -116,14 +104,14 @@ class Film:
         (self.path,) = axes.plot([], [], color="0.45", linewidth=0.9, zorder=5)
         self.contacts = []
         for each in track.contacts:
-            cells = axes.add_collection(cells_of(each, edge="face"), autolim=False)
+            cells = axes.add_collection(panels.cells_of(each, edge="face"), autolim=False)
             cells.set_zorder(4)
             look = {"arrowstyle": "-|>,head_length=5,head_width=2.5", "linewidth": 2.2, "shrinkA": 0, "shrinkB": 0}
             arrow = FancyArrowPatch((0, 0), (1, 1), color=style.PALETTE[2], zorder=7, **look)
             arrow.set_path_effects([withStroke(linewidth=4.2, foreground="white")])
             self.contacts.append((each, cells, axes.add_patch(arrow)))
-        self.centre = centre_mark(axes)
-        self.still = still_speed(track.twists)
+        self.centre = panels.centre_mark(axes)
+        self.still = panels.still_speed(track.twists)
         span = float(track.times[-1] - track.times[0])
         self.digits = int(np.clip(2 - math.floor(math.log10(span)), 2, 9)) if span > 0.0 else 3
         self.clock = axes.text(0.0, 1.06, "", transform=axes.transAxes, va="bottom", fontsize="medium")
@@ -138,7 +126,7 @@ class Film:
         words = f"friction on the body (longest {unit.factor * largest:.3g} {unit.label})"
         handles: list[Any] = [Line2D([], [], color=style.PALETTE[2], linewidth=2.2, label=words), self.centre]
         if len(self.track.contacts) > 1:  # one has its colours beside its cells
-            handles += [Patch(color=STICK, label="sticks"), Patch(color=SLIP, label="slips")]
+            handles += [Patch(color=panels.STICK, label="sticks"), Patch(color=panels.SLIP, label="slips")]
         look = {"frameon": False, "fontsize": "small", "columnspacing": 1.2, "handlelength": 1.4}
         self.figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.03, 0.0), ncols=len(handles), **look)
 
@@ -174,7 +162,7 @@ def _views(solution: pf.Solution, track: Track, follow: bool) -> np.ndarray:
     own = np.concatenate(body_lines(solution))
     of_body, of_world = [own], []
     for each in track.contacts:
-        points = _rim(cell_polygons(each.contact.model.patch).reshape(-1, 2))
+        points = _rim(panels.cell_polygons(each.contact.model.patch).reshape(-1, 2))
         if each.contact.mounted_on == "body":
             of_body.append(placed(points, np.array([*each.contact.position, each.contact.angle])))
         else:

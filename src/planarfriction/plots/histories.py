@@ -143,7 +143,6 @@ def _finish(figure: Any, axes: Sequence[Any], chosen: Sequence[str], known: Mapp
 
 def as_runs(solutions: pf.Solution | Mapping[str, pf.Solution]) -> dict[str, pf.Solution]:
     """Return the solutions by label; a single one is labelled with the name of its scene."""
-
     if not isinstance(solutions, Mapping):
         solution = validation.instance("solutions", solutions, pf.Solution, "a Solution or a table of them by name")
         return {str(solution.scene.name): solution}

@@ -96,7 +96,6 @@ def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any
 
 def _sampled(surface: Any, beside: Any) -> tuple[list[str], list[tuple[np.ndarray, np.ndarray]], float]:
     """Return titles and `scaled_samples` of the surfaces to draw, and the limit of the axes."""
-
     validation.instance("surface", surface, pf.limit_surface.LimitSurface, "a limit surface")
     shown = {f"{surface.patch.name}: {_kind(surface)}": surface}
     if beside is not None:
@@ -155,9 +154,8 @@ def draw_surface(axes: Any, mesh: np.ndarray, directions: np.ndarray, limit: flo
     colours = colormaps["cividis"](0.6 + 0.4 * height / limit)
     colours[..., :3] *= lightness[..., None]
     colours[..., :3] += paler * (1.0 - colours[..., :3])
-    drawn = axes.plot_surface(
-        *np.moveaxis(mesh, -1, 0), rstride=1, cstride=1, facecolors=colours, linewidth=0, antialiased=False, shade=False
-    )
+    plain: dict[str, Any] = {"rstride": 1, "cstride": 1, "linewidth": 0, "antialiased": False, "shade": False}
+    drawn = axes.plot_surface(*np.moveaxis(mesh, -1, 0), facecolors=colours, **plain)
     narrow = style.axes_width(axes) < 0.5 * style.NARROW
     ticks = [-1.0, 0.0, 1.0] if narrow else [-1.0, -0.5, 0.0, 0.5, 1.0]
     for name, label in (("x", "$f_x$"), ("y", "$f_y$"), ("z", "$\\tau/r$")):

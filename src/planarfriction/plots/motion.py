@@ -91,7 +91,6 @@ class _Strobe(NamedTuple):
 
 
 def _strobe(solution: pf.Solution) -> _Strobe:
-
     validation.instance("solution", solution, pf.Solution, "a Solution")
     time, poses = np.asarray(solution.data["time"], dtype=float), body_poses(solution)
     chosen = np.unique(np.linspace(0, len(time) - 1, min(INSTANTS, len(time))).round().astype(int))

@@ -32,12 +32,9 @@ def patch_html(patch: pf.ContactPatch) -> str:
     """Return a thumbnail of the pressure, cells, size, contact radius and centre of pressure of a patch."""
     load = _LOAD if patch.depends_on_load else None
     rows = {"cells": f"{patch.cells}", "size": _size(patch)}
-    try:
+    if (figure := _pressure(patch, load)) is not None:
         rows["contact radius"] = _length(float(patch.contact_radius(load)))
         rows["centre of pressure"] = _point(patch.centre_of_pressure(load))
-        figure = _pressure(patch, patch.weights(load))
-    except FrictionError:  # a shape that there is not at this load
-        figure = None
     if load is not None:
         rows["shown at"] = f"{load:g} N"
     return _beside(figure, f"ContactPatch {patch.name!r}", rows)
@@ -71,11 +68,7 @@ def law_html(law: Any) -> str:
 
 def model_html(model: Any) -> str:
     """Return the pressure of the patch of a model, with its law and its state."""
-    load = _LOAD if model.patch.depends_on_load else None
-    try:
-        figure = _pressure(model.patch, model.patch.weights(load))
-    except FrictionError:  # a shape that there is not at this load
-        figure = None
+    figure = _pressure(model.patch, _LOAD if model.patch.depends_on_load else None)
     rows = {
         "patch": f"{model.patch.name!r} of {model.patch.cells} cells",
         "law": repr(model.law),
@@ -91,8 +84,8 @@ def scene_html(scene: pf.Scene) -> str:
         "body": f"{scene.body.mass:g} kg, {scene.body.inertia:.3g} kg m²",
     }
     rows |= {f"contact {each.name!r}": repr(each).partition(": ")[2].rstrip(")") for each in scene.contacts}
-    patch = scene.contacts[0].model.patch if scene.contacts else None
-    figure = None if patch is None or patch.depends_on_load else _pressure(patch, patch.weights())
+    patch = scene.contacts[0].model.patch
+    figure = None if patch.depends_on_load else _pressure(patch, None)
     return _beside(figure, f"Scene {scene.name!r}", rows)
 
 
@@ -115,7 +108,11 @@ def solution_html(solution: pf.Solution) -> str:
     return _beside(figure, title, rows)
 
 
-def _pressure(patch: pf.ContactPatch, weights: np.ndarray) -> style.PlotFigure:
+def _pressure(patch: pf.ContactPatch, load: float | None) -> style.PlotFigure | None:
+    try:
+        weights = patch.weights(load)
+    except FrictionError:  # a shape that there is not at this load
+        return None
     figure = style.new_figure(1.5, 1.5)
     axes = figure.add_subplot()
     if patch.grid is None:

@@ -161,10 +161,6 @@ class SurfacePanel:
         """Return the artists that change from frame to frame, on top of the surface."""
         return [self.shadow, self.tail, self.arm, self.head]
 
-    def level(self, frame: int) -> Any:
-        """Return the load level of a frame: a key of `levels`."""
-        return _level(self.track, frame)
-
     def choose(self, level: Any) -> None:
         """Show the surface at a level alone."""
         for each, surface in self.drawn.items():
@@ -185,7 +181,7 @@ class SurfacePanel:
         points = np.zeros((len(track.loads), 3))
         for frame, load in enumerate(track.loads):
             if load > 0.0:
-                surface = self.surfaces[self.level(frame)]
+                surface = self.surfaces[level_of(track, frame)]
                 wrench = geometry.wrench_at(track.wrenches[frame], track.shape(frame)[1])
                 points[frame] = wrench / np.array([1.0, 1.0, surface.contact_radius]) / (mu * load)
         return points
@@ -193,7 +189,6 @@ class SurfacePanel:
 
 def surface_at(patch: Any, load: float | None) -> Any:
     """Return the exact limit surface of a patch at a load; a table of it where the cells differ in their friction."""
-
     each_its_own = patch.root is not None and patch.root.ndim == 3
     return (pf.LimitSurfaceTable if each_its_own else pf.LimitSurfaceExact)(patch, normal_force=load)
 
@@ -215,11 +210,11 @@ def _levels(track: ContactTrack) -> dict[Any, float | None]:
     """Return the load [N] of each level at which its surface is drawn; None if the shape does not depend on it."""
     if not track.contact.model.patch.depends_on_load:
         return {None: None}
-    found = sorted({_level(track, frame) for frame, load in enumerate(track.loads) if load > 0.0})
+    found = sorted({level_of(track, frame) for frame, load in enumerate(track.loads) if load > 0.0})
     return {level: LOAD_STEP**level for level in found}
 
 
-def _level(track: ContactTrack, frame: int) -> Any:
+def level_of(track: ContactTrack, frame: int) -> Any:
     """Return the level of the load of a frame; without load, that of the last one before with load, or of the first."""
     if not track.contact.model.patch.depends_on_load:
         return None

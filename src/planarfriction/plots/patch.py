@@ -35,7 +35,6 @@ def plot_patch(
     Raises InvalidValueError unless `patch` is a patch, for a load below zero, without a load that is needed, and for a
     wrong size or axes.
     """
-
     validation.instance("patch", patch, pf.ContactPatch, "a ContactPatch")
     load = 1.0 if normal_force is None else validation.non_negative("normal_force", normal_force)
     weights = patch.weights(normal_force)
@@ -44,9 +43,8 @@ def plot_patch(
     if patch.grid is None:
         drawn, label = _draw_points(axes, patch, weights * load, normal_force)
     else:
-        drawn, label = _draw_cells(
-            axes, patch, patch.grid, patch.tile_weights(normal_force) * load / patch.areas, normal_force
-        )
+        pressure = patch.tile_weights(normal_force) * load / patch.areas
+        drawn, label = _draw_cells(axes, patch, patch.grid, pressure, normal_force)
     figure.colorbar(drawn, ax=axes, label=label)
     mark = {"marker": "+", "markersize": 13, "linestyle": "none"}
     axes.plot(*centre, **mark, markeredgewidth=4.0, color="white")

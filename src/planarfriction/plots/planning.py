@@ -12,7 +12,7 @@ from planarfriction import geometry
 from planarfriction.planning.motions import slide_of
 from planarfriction.plots import style
 from planarfriction.plots.track import body_poses
-from planarfriction.scenes import Solution, simulate
+from planarfriction.scenes import simulate
 from planarfriction.shown import unit_for
 
 INSTANTS = 8
@@ -34,7 +34,8 @@ def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
                   fontsize="small", ha="right", va="bottom")  # fmt: skip
     grip.set_ylabel(f"grip [{force.label}]")
     solutions = [simulate(scene, save_every=end / 400.0) for scene in plan.frictions]
-    slides = [_slide(plan, solution) for solution in solutions]
+    place = [slide_of(plan.scene, each.contact_index(plan.contact), body_poses(each)) for each in solutions]
+    slides = [np.hypot(*each.T) for each in place]  # of the place that was under the grip
     angles = [np.asarray(each.histories["theta"].values) - plan.scene.body.angle for each in solutions]
     angle, length = unit_for("angle", *angles), unit_for("length", *slides)
     factors = [1.0, *(each for each in (plan.report.frictions[0], plan.report.frictions[-1]) if len(solutions) > 1)]
@@ -57,11 +58,6 @@ def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
     for axes in (grip, turn, slide):
         style.tidy(axes)
     return figure
-
-
-def _slide(plan: pf.planning.GripPlan, solution: Solution) -> np.ndarray:
-    """Return the distance of the place that was under the grip from where it was `[T]` [m]."""
-    return np.hypot(*slide_of(plan.scene, solution.contact_index(plan.contact), body_poses(solution)).T)
 
 
 def plot_push(push: pf.planning.Push) -> style.PlotFigure:

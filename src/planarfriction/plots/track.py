@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,8 +34,6 @@ class ContactTrack:
     """Normal force of one of them `[F]` [N]."""
     slip: SlipField | None
     """Slip of the cells; None where the model has no bristles that are known."""
-    _shapes: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict, init=False, repr=False)
-    """The shape of the frame that was asked for last: every part of a picture needs it."""
 
     @functools.cached_property
     def forces(self) -> np.ndarray:
@@ -45,15 +43,10 @@ class ContactTrack:
     def shape(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the share of the load on each cell `[N]` [-], and the centre of pressure `[2]` [m], at a frame."""
         patch, load = self.contact.model.patch, float(self.loads[frame])
-        key = frame if patch.depends_on_load else -1
-        if key not in self._shapes:
-            self._shapes.clear()
-            if patch.depends_on_load and not load > 0.0:
-                self._shapes[key] = np.zeros(len(patch.positions)), np.zeros(2)
-            else:
-                at = load if patch.depends_on_load else None
-                self._shapes[key] = patch.weights(at), patch.centre_of_pressure(at)
-        return self._shapes[key]
+        if patch.depends_on_load and not load > 0.0:
+            return np.zeros(len(patch.positions)), np.zeros(2)
+        at = load if patch.depends_on_load else None
+        return patch.weights(at), patch.centre_of_pressure(at)
 
 
 class Track(NamedTuple):

@@ -112,18 +112,13 @@ class Contact(ByValue):
             self._set(support_velocity=as_signal(f"support_velocity {of_contact}", self.support_velocity, 3))
         validation.choice(f"pressure {of_contact}", self.pressure, ("fixed", "follows"))
         self._set(height=validation.non_negative(f"height {of_contact}", self.height))
-        self._check_pressure(of_contact)
-
+        if self.pressure == "follows":
+            rule = "'fixed' on the world: only a patch of the body follows its load"
+            self._check_cells(of_contact, "pressure", "body", rule)
+        elif self.height > 0.0:
+            raise InvalidValueError(f"height {of_contact}", "be 0 where the pressure is 'fixed'", self.height)
         if validation.instance(f"edge {of_contact}", self.edge, bool, "True or False"):
             self._check_cells(of_contact, "edge", "world", "False on the body: only a pad of the world leaves the body")
-
-    def _check_pressure(self, of_contact: str) -> None:
-        if self.pressure == "fixed":
-            if self.height > 0.0:
-                raise InvalidValueError(f"height {of_contact}", "be 0 where the pressure is 'fixed'", self.height)
-            return
-        rule = "'fixed' on the world: only a patch of the body follows its load"
-        self._check_cells(of_contact, "pressure", "body", rule)
 
     def _check_cells(self, of_contact: str, name: str, mount: str, otherwise: str) -> None:
         """Check that the contact is fixed to its mount, and that its model has bristles on cells."""

@@ -109,16 +109,11 @@ def pressure_from_dict(patch: Section) -> Any:
 # ---------------------------------------------------------------------- members of any family
 
 
+@functools.cache
 def _parameters(make: Callable[..., Any]) -> dict[str, inspect.Parameter]:
     """Return the parameters that are keys of the table of a member."""
     parameters = inspect.signature(make).parameters
     return {name: each for name, each in parameters.items() if name not in _GIVEN}
-
-
-@functools.cache
-def _names(make: type) -> tuple[str, ...]:
-    """Return the keys of the table of a member of this class."""
-    return tuple(_parameters(make))
 
 
 def _described(family: Family, member: Any) -> dict[str, Any]:
@@ -127,7 +122,7 @@ def _described(family: Family, member: Any) -> dict[str, Any]:
     if kind is None:
         rule = f"be one of {', '.join(family)}, or be registered, to be written to a file"
         raise InvalidValueError(family.what, rule, type(member).__name__)
-    values = {name: _plain(member, name) for name in _names(family[kind])}
+    values = {name: _plain(member, name) for name in _parameters(family[kind])}
     return {"kind": kind, **{name: value for name, value in values.items() if value is not None}}
 
 

@@ -122,8 +122,6 @@ class Segments:
 
     def breaks(self, pieces: np.ndarray) -> np.ndarray:
         """Return the times [s] at which pieces begin; that of number `count` is the end."""
-        if self.count == len(self._step):  # a piece is all that lies between two breaks
-            return self._breaks[pieces]
         here = self._behind(pieces)
         begin = (pieces - self._first[here]) * self._step[here] + self._breaks[here]
         return np.where(pieces == self.count, self._breaks[-1], begin)
@@ -178,8 +176,6 @@ class Segments:
 
     def _behind(self, pieces: np.ndarray) -> np.ndarray:
         """Return the break of the signals that pieces lie behind."""
-        if self.count == len(self._step):
-            return pieces
         return np.minimum(np.searchsorted(self._first, pieces, side="right") - 1, len(self._step) - 1)
 
     def _linear(self, signal: tuple[np.ndarray, np.ndarray], pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -213,10 +209,11 @@ class SegmentBatches:
         calls = np.array([calls_of(model.functions, change=sensitivities) for model in self.models])
         self.loading = time.perf_counter() - begin
         """Time to compile the models' functions and the solver's, or to load them from the cache [s]."""
+        mounts = [WORLD if contact.mounted_on == "world" else BODY for contact in contacts]
         self._contacts = Contacts(
             calls=calls,
             record=records,
-            mount=np.array([_mount(scene, contact) for contact in contacts]),
+            mount=np.array(mounts if scene.velocity is None else [BODY_AXES] * len(mounts)),
             place=np.array([[*c.position, np.cos(c.angle), np.sin(c.angle)] for c in contacts], dtype=float),
             count=np.array([contact.count for contact in contacts], dtype=float),
             state=_starts([model.states for model in self.models]),
@@ -381,9 +378,3 @@ def _mover(velocity: Signal | None, breaks: np.ndarray) -> np.ndarray:
     if velocity is None:
         return np.zeros((len(breaks) - 1, 9))
     return np.concatenate([displacement(velocity, breaks[:-1]), *velocity.pieces(breaks)], axis=1)
-
-
-def _mount(scene, contact) -> int:
-    if scene.velocity is not None:
-        return BODY_AXES
-    return WORLD if contact.mounted_on == "world" else BODY

@@ -29,31 +29,24 @@ RTOL, ATOL = 1e-5, 2e-4
 2e-5 rad of the same model's run at a relative tolerance of 1e-9."""
 
 
-def _body(name: str, value: Any) -> Body:
-    """Return `value` if it is a body, or raise."""
-    return validation.instance(name, value, Body, "a Body")
+def _listed(name: str, value: Any, kind: type) -> tuple[Any, ...]:
+    """Return one part of a kind or a list of them as a tuple, or raise."""
+    parts = (value,) if isinstance(value, kind) else value
+    if not isinstance(parts, (list, tuple)) or not all(isinstance(part, kind) for part in parts):
+        raise InvalidValueError(name, f"be a list of {kind.__name__}", value)
+    return tuple(parts)
 
 
 def _contacts(name: str, value: Any) -> tuple[Contact, ...]:
     """Return one contact or a list of contacts as a tuple; raise for none, and for two of the same name."""
-    contacts = (value,) if isinstance(value, Contact) else value
-    if not isinstance(contacts, (list, tuple)) or not all(isinstance(contact, Contact) for contact in contacts):
-        raise InvalidValueError(name, "be a list of Contact", value)
+    contacts = _listed(name, value, Contact)
     if not contacts:
         raise InvalidValueError(name, "hold at least one contact", "none")
     names = [contact.name for contact in contacts]
     for each in names:
         if names.count(each) > 1:
             raise InvalidValueError(name, "have different names", f"{each!r} {names.count(each)} times")
-    return tuple(contacts)
-
-
-def _springs(name: str, value: Any) -> tuple[Spring, ...]:
-    """Return one spring or a list of springs as a tuple, or raise."""
-    springs = (value,) if isinstance(value, Spring) else value
-    if not isinstance(springs, (list, tuple)) or not all(isinstance(spring, Spring) for spring in springs):
-        raise InvalidValueError(name, "be a list of Spring", value)
-    return tuple(springs)
+    return contacts
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +56,7 @@ class Scene(ByValue):
     Raises InvalidValueError, naming the parameter, if the parts do not make a valid scene.
     """
 
-    body: Body = checked(_body)
+    body: Body = checked(validation.instance, Body, "a Body")
     """The body that moves; None: one without weight, moved as `velocity` prescribes."""
     contacts: Sequence[Contact] = checked(_contacts)
     """The contacts it slides on, at least one."""
@@ -91,7 +84,7 @@ class Scene(ByValue):
     """State of the bristles at the start: "rest", relaxed; "equilibrium", carrying the load of a body at rest (with the
     least elastic energy, which determines how contacts share it); "sliding", in the steady state of the initial
     velocity."""
-    springs: Sequence[Spring] = checked(_springs, default=())
+    springs: Sequence[Spring] = checked(_listed, Spring, default=())
     """Springs that tie the body to anchors; one, several or none."""
 
     if TYPE_CHECKING:  # what is given may be more than what is kept

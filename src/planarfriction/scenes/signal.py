@@ -85,9 +85,8 @@ class Signal(ByValue):
         if (steps <= 0.0).any():
             i = int(np.argmax(steps <= 0.0))
             kind = "a duplicate" if steps[i] == 0.0 else "unsorted"
-            raise InvalidValueError(
-                "times", "increase", f"{times[i]:.15g} s, then {times[i + 1]:.15g} s at index {i + 1} ({kind})"
-            )
+            given = f"{times[i]:.15g} s, then {times[i + 1]:.15g} s at index {i + 1} ({kind})"
+            raise InvalidValueError("times", "increase", given)
         validation.choice("hold", self.hold, ("previous", "linear"))
         times.setflags(write=False)
         values.setflags(write=False)
@@ -197,9 +196,8 @@ class Signal(ByValue):
         own = self.breaks
         piece = np.searchsorted(breaks, own, side="right") - 1
         inside = (piece >= 0) & (piece < len(breaks) - 1)
-        inside[inside] = (own[inside] - breaks[piece[inside]] > SAME_TIME) & (
-            breaks[piece[inside] + 1] - own[inside] > SAME_TIME
-        )
+        begin, end = breaks[piece[inside]], breaks[piece[inside] + 1]
+        inside[inside] = np.minimum(own[inside] - begin, end - own[inside]) > SAME_TIME
         if inside.any():
             raise InvalidValueError("breaks", "contain the breaks of the signal", f"none at t = {own[inside][0]:g} s")
         # The middle of a piece finds its interval whatever rounding does to the ends.
@@ -233,9 +231,8 @@ class Signal(ByValue):
         if len(self.times) == 1:
             return f"Signal.constant({self.values[0].tolist()})"
         columns = "" if self.columns is None else f" of {self.columns} values"
-        return (
-            f"Signal({len(self.times)} samples{columns}, {self.times[0]:g} to {self.times[-1]:g} s, hold={self.hold!r})"
-        )
+        span = f"{self.times[0]:g} to {self.times[-1]:g} s"
+        return f"Signal({len(self.times)} samples{columns}, {span}, hold={self.hold!r})"
 
     @functools.cached_property
     def _slopes(self) -> np.ndarray:
@@ -296,10 +293,9 @@ def read_signal(parent: Section, key: str) -> Signal:
     here = parent.section(key)
     with here.located():
         if "sine" in here:
-            sine = (
-                here.only(["sine"]).section("sine").only(["offset", "amplitude", "frequency", "t_end", "dt", "phase"])
-            )
-            required = {name: sine.get(name) for name in ("offset", "amplitude", "frequency", "t_end")}
+            needed = ("offset", "amplitude", "frequency", "t_end")
+            sine = here.only(["sine"]).section("sine").only([*needed, "dt", "phase"])
+            required = {name: sine.get(name) for name in needed}
             with sine.located():
                 return Signal.sine(**{**sine.data, **required})
         if "csv" in here:
@@ -309,9 +305,8 @@ def read_signal(parent: Section, key: str) -> Signal:
                 here.fail("time must be the name of a column, value a name or a list of names")
             signal = Signal.from_csv(here.path("csv"), time=time, value=value, hold=here.get("hold", "previous"))
         else:
-            here.only(
-                ["times", "values", "hold", "dt", *(() if "times" in here or "values" in here else ("csv", "sine"))]
-            )
+            others = () if "times" in here or "values" in here else ("csv", "sine")
+            here.only(["times", "values", "hold", "dt", *others])
             signal = Signal.sampled(here.get("times"), here.get("values"), here.get("hold", "previous"))
         return signal.held(here.get("dt")) if "dt" in here else signal
 

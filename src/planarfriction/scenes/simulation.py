@@ -65,35 +65,15 @@ def simulate(
     checked between its ends. The solver stops exactly at every break of a signal. The first run after an installation
     compiles the solver; a line on the terminal or in the notebook says so.
 
-    Parameters
-    ----------
-    scene
-        Body, contacts and signals.
-    t_end
-        End [s], at most the scene's own.
-    rtol, atol
-        Relative and natural-scale tolerances [-], > 0; the scene's own by default. If only `rtol` is given, `atol`
-        changes in proportion.
-    save_every
-        Recording interval [s]; the scene's own by default. The end is always recorded.
-    bristles
-        "all" also records the state of each contact, as variables `bristles_<contact>`.
-    method
-        `planarfriction.solvers.RODAS4` (default) or `RODAS3`.
-    progress
-        Called with the simulated time [s] from time to time.
-    max_steps
-        Largest number of steps that the solver tries, accepted or rejected: whatever the scene asks for, a run ends.
+    `t_end` [s] is at most the scene's own. The tolerances `rtol` and `atol` [-], > 0, and `save_every` are the scene's
+    own by default; if only `rtol` is given, `atol` changes in proportion. The end is always recorded. `bristles="all"`
+    also records the state of each contact, as variables `bristles_<contact>`. `method` is
+    `planarfriction.solvers.RODAS4` (default) or `RODAS3`, and `progress` is called with the simulated time [s] from
+    time to time. At most `max_steps` steps are tried, accepted or rejected: whatever the scene asks for, a run ends.
 
-    Raises
-    ------
-    InvalidValueError
-        A parameter breaks its rule.
-    SolverError
-        The solver failed, or tried `max_steps` steps; carries the solution so far and suggests a remedy.
-    SimulationInterrupted
-        Ctrl-C; carries the solution so far. Before anything is recorded, for example during compilation, it is a plain
-        `KeyboardInterrupt`.
+    Raises InvalidValueError for a parameter that breaks its rule; SolverError, with the solution so far and a remedy,
+    where the solver fails or has tried `max_steps` steps; SimulationInterrupted, with the solution so far, after Ctrl-C
+    (before anything is recorded, for example during compilation, a plain `KeyboardInterrupt`).
     """
     if not isinstance(scene, Scene):
         raise InvalidValueError("scene", "be a Scene", type(scene).__name__)

@@ -69,9 +69,8 @@ class Spring(ByValue):
         """
         pose, time = validation.finite_numbers("pose", pose), validation.finite_numbers("time", time)
         if pose.shape[-1:] != (3,) or time.shape not in ((), pose.shape[:-1]):
-            raise InvalidValueError(
-                "pose", f"have the shape (..., 3) with one for each of {time.shape} times", pose.shape
-            )
+            rule = f"have the shape (..., 3) with one for each of {time.shape} times"
+            raise InvalidValueError("pose", rule, pose.shape)
         arm = rotate(self.at, pose[..., 2])
         stretch = self.anchor(time) - pose - np.concatenate([arm, np.zeros_like(arm[..., :1])], -1)
         wrench = stretch * [self.stiffness, self.stiffness, self.torsion]
