@@ -8,7 +8,7 @@ import pytest
 
 from tests.support import subjects
 
-ELSEWHERE = "figures", "commands", "fits", "joints", "surfaces"
+ELSEWHERE = "figures", "commands", "fits", "joints", "surfaces", "mjx"
 """Results of which a folder has a test of its own."""
 
 
