@@ -39,9 +39,8 @@ def grip_of(controller: Any, name: str) -> dict[str, Any]:
     observer, writer = controller.observer, Writer()
     own, state = observer._filter, observer.state
     if own.kind == CELLS:
-        raise InvalidValueError(
-            "controller", "know an ellipsoid or a table as its surface", type(observer.surface).__name__
-        )
+        rule = "know an ellipsoid or a table as its surface"
+        raise InvalidValueError("controller", rule, type(observer.surface).__name__)
     arrays = {each: value for each, value in own._asdict().items() if isinstance(value, np.ndarray)}
     known = [Array(f"own_{n}", v.shape, fixed=True) if n in arrays else Fixed(v) for n, v in own._asdict().items()]
     estimate, control = friction_filter.ESTIMATE, grips.STATE
@@ -153,10 +152,8 @@ def export_c(
     if (casadi or controller is not None) and precision != "double":
         raise InvalidValueError("precision", "be double for CasADi and controllers", precision)
     given = {"patches": patches} | ({} if controller is None else {"grip": grip_of(controller, name)})
-    folder, ends = (
-        validation.path("folder", folder),
-        FILES | (CASADI if casadi else {}) | (GRIP if "grip" in given else {}),
-    )
+    folder = validation.path("folder", folder)
+    ends = FILES | (CASADI if casadi else {}) | (GRIP if "grip" in given else {})
     texts = _texts(model, pieces_of(model, precision, fixed=False), name, precision, given, tuple(ends))
     writing.make_folder(folder)
     files = tuple(folder / f"{name}{end}" for end in ends.values())

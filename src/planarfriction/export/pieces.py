@@ -14,15 +14,7 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.errors import InvalidValueError
 from planarfriction.export.twins import twin
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import (
-    cells,
-    cells_rollout,
-    disc_cells,
-    discs,
-    moment_steps,
-    points,
-    published_step,
-)
+from planarfriction.kernels import cells, cells_rollout, disc_cells, discs, moment_steps, points, published_step
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.law import grip
 from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, Root

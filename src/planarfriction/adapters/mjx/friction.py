@@ -242,10 +242,8 @@ class Friction:
         shift = shift + own.displaced
         kept |= {"wrench": wrench_from(xp, wrench.reshape(-1, 3), -shift), "twist": twist_at(xp, twist, shift)}
         kept |= {"time": given.time, "next": d.time, "iterations": found.iterations, "passes": found.passes}
-        kept |= {
-            "residual": found.residual,
-            "converged": found.converged & (found.slack <= SLACK[found.slack.dtype.name]),
-        }
+        holds = found.slack <= SLACK[found.slack.dtype.name]
+        kept |= {"residual": found.residual, "converged": found.converged & holds}
         d = d.replace(userdata=self._written(d.userdata, kept))
         # in double precision MJX makes long integers of some that came in short, at which `lax.scan` would stop
         return jax.tree.map(lambda after, before: after.astype(before.dtype), d, given)
@@ -257,10 +255,9 @@ class Friction:
         if d.qpos.dtype != jnp.result_type(float):
             rule = f"be {jnp.result_type(float)}, that of JAX (see jax_enable_x64)"
             raise InvalidValueError("precision", rule, f"data of {d.qpos.dtype}")
-        if d.userdata.shape != (self._fixed.nuserdata,):
-            rule = (
-                f"have shape [{self._fixed.nuserdata}]: of one environment, of the model of the patches (see jax.vmap)"
-            )
+        count = self._fixed.nuserdata
+        if d.userdata.shape != (count,):
+            rule = f"have shape [{count}]: of one environment, of the model of the patches (see jax.vmap)"
             raise InvalidValueError("userdata", rule, f"shape {list(d.userdata.shape)}")
 
     def _own(self) -> _Own:
