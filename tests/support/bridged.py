@@ -309,11 +309,12 @@ def _texts(files: list[Path]) -> dict[str, Any]:
 
 def _text(words: str) -> dict[str, Any]:
     """Tell a source by checksums of the words of its blocks of lines, and by its numbers."""
-    words = re.sub(r"[0-9a-f]{16}\b", "", words.replace(pf.__version__, ""))
+    words = re.sub(r"Digest of the model: \w+", "", words.replace(pf.__version__, ""))
     lines = NUMBER.sub("#", words).splitlines()
     blocks = [zlib.crc32("\n".join(lines[i : i + BLOCK]).encode()) for i in range(0, len(lines), BLOCK)]
     numbers = np.array([float(each) for each in NUMBER.findall(words)])
-    return {"blocks": " ".join(f"x{each:x}" for each in blocks), "numbers": array(np.arcsinh(1e4 * numbers))}
+    numbers = array(np.arcsinh(1e4 * np.clip(numbers, -1e300, 1e300)))
+    return {"blocks": " ".join(f"x{each:x}" for each in blocks), "numbers": numbers}
 
 
 NEEDED = {torch: "torch", jax: "jax", warp: "warp", mujoco: "mujoco", mjx: "mujoco.mjx", drake: "pydrake"}
