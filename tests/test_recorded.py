@@ -8,7 +8,7 @@ import pytest
 
 from tests.support import subjects
 
-ELSEWHERE = "figures", "commands", "fits", "joints", "surfaces", "mjx"
+ELSEWHERE = "figures", "commands", "fits", "joints", "surfaces"
 """Results of which a folder has a test of its own."""
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
 import os
 import re
 import shutil
 import tempfile
 import zlib
 from collections.abc import Callable
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -237,24 +237,6 @@ def _of_mujoco(scene: Any, integrator: str) -> list[Any]:
     return told
 
 
-def mjx() -> dict[str, Any]:
-    """Slide discs to rest in MJX, as its tests do."""
-    import jax
-
-    from tests.adapters import test_mjx
-
-    with jax.enable_x64(True):
-        return of_discs(test_mjx.slid_discs())
-
-
-def of_discs(discs: Any) -> dict[str, Any]:
-    """Tell the paths of discs, and their bristles and loads in the end."""
-    return _told(
-        {"path": [*discs.path[::60]], "end": [*discs.friction.states(discs.end), discs.friction.loads(discs.end)]},
-        np.asarray,
-    )
-
-
 def drake() -> dict[str, Any]:
     """Take steps of two plants in Drake."""
     from tests.support.drake_scenes import gripped, sliding
@@ -273,11 +255,10 @@ def drake() -> dict[str, Any]:
         told = []
         for i in range(1, 5):
             run.to(0.02 * i)
-            ports = (getattr(run.friction, f"get_{port}_output_port")() for port in ("wrenches", "twists", "loads"))
-            told.append([
-                run.plant.GetPositionsAndVelocities(run.context), run.friction.GetBristles(run.own),
-                [each.Eval(run.own) for each in ports], run.friction.GetReport(run.own).converged,
-            ])  # fmt: skip
+            ports = run.friction.get_wrenches_output_port(), run.friction.get_loads_output_port()
+            motion, report = run.plant.GetPositionsAndVelocities(run.context), run.friction.GetReport(run.own)
+            numbers = np.concatenate([motion, *(each.Eval(run.own) for each in ports)])  # twists at rest are rounding
+            told.append([numbers, run.friction.GetBristles(run.own), report.converged])
         found[name] = told
     return found
 
@@ -317,13 +298,15 @@ def _text(words: str) -> dict[str, Any]:
     return {"blocks": " ".join(f"x{each:x}" for each in blocks), "numbers": numbers}
 
 
-NEEDED = {torch: "torch", jax: "jax", warp: "warp", mujoco: "mujoco", mjx: "mujoco.mjx", drake: "pydrake"}
+NEEDED = {torch: "torch", jax: "jax", warp: "warp-lang", mujoco: "mujoco", drake: "drake"}
+ENGINES = {"mujoco": "4.0.", "drake": "1.51."}
+"""Versions of engines whose steps are recorded: others find other contact forces."""
 
 
 def _found(package: str) -> bool:
     try:
-        return importlib.util.find_spec(package) is not None
-    except ModuleNotFoundError:  # of a part of a package that is not there
+        return metadata.version(package).startswith(ENGINES.get(package, ""))
+    except metadata.PackageNotFoundError:
         return False
 
 
