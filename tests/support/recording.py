@@ -19,7 +19,7 @@ from tests.support import recorded, studied, subjects
 NO_AVX2 = "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"
 NO_FMA = "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F"
 PROCESSORS = {
-    "compiled for any": ("generic", "", "", "", "", "", ""),
+    "compiled for any": ("generic", "", "", "", "", "avx2", ""),
     "any": ("generic", "", NO_AVX2, "Nehalem", "--xla_cpu_max_isa=SSE4_2", "default", NO_FMA),
     "SSE": ("nehalem", "+sse4.2", NO_AVX2, "Prescott", "--xla_cpu_max_isa=SSE4_2", "default", NO_FMA),
     "AVX": ("sandybridge", "+avx,+sse4.2", NO_AVX2, "Sandybridge", "--xla_cpu_max_isa=AVX", "default", NO_FMA),
