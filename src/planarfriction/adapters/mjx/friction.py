@@ -305,10 +305,7 @@ class Friction:
             yield *kind, [p for p, each in enumerate(kinds) if each == kind]
 
     def _pressed(self, own: _Own, where: responses.Geometry, centre: jax.Array) -> tuple[jax.Array, list[Any]]:
-        """Return displacements of origins towards the centres `[k, 2]`, and the models of each group that press there.
-
-        Models are None if their pressure is fixed.
-        """
+        """Return displacements towards centres `[k, 2]`, and each group's model that presses there, None if fixed."""
         shift = where.share[:, None] * centre
         rest = (centre - shift - own.displaced) / own.scale[:, None]
         groups = zip(self._groups(), own.models, strict=True)

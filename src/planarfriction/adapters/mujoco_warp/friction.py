@@ -267,10 +267,7 @@ class Friction:
 
 
 def _parameters(m: Any, placed: Sequence[Placed], worlds: int) -> dict[str, np.ndarray]:
-    """Return the parameters of patches that stand in a prepared model, for all worlds.
-
-    Raises InvalidValueError for patches that are displaced.
-    """
+    """Return the parameters of patches that stand in a prepared model, for all worlds; refuse displaced patches."""
     if any(each.pair < 0 for each in placed):
         return {}
     found = parameters_in(m, place_of_parameters(m), len(placed))
