@@ -68,7 +68,7 @@ def torch() -> dict[str, Any]:
     made |= {name: pt.ReducedModelPublished(*each, trainable=TRAINED, **double) for name, each in SURFACES.items()}
     made |= {
         "weights": pt.DistributedModel(PATCH, LAW, trainable=weighed, **double),
-        "reduced": pt.ReducedModel(PATCH, LAW, cells=4, **single),
+        "reduced": pt.ReducedModel(PATCH, LAW, cells=4),
         "planar": pt.ReducedPlanarLuGre(**double),
         "planar table": pt.ReducedPlanarLuGre(radius=0.004, surface=SURFACES["table"][2], **single),
     }
@@ -88,6 +88,7 @@ def _of_torch(model: Any) -> dict[str, Any]:
         wrenches.append(wrench)
     given = [*leaves, twist, load, *[moments] * moves]
     found = {
+        "kind": str(model.lever.dtype),
         "state": state,
         "wrenches": torch.stack(wrenches),
         "rate": model(state, twist[:, 1], load[:, 1]),
@@ -161,7 +162,7 @@ def _told(value: Any, numbers: Callable[[Any], np.ndarray]) -> Any:
         return {name: _told(each, numbers) for name, each in value.items()}
     if isinstance(value, (list, tuple)):
         return [_told(each, numbers) for each in value]
-    return value if isinstance(value, float) else numbers(value)
+    return value if isinstance(value, (float, str)) else numbers(value)
 
 
 # ---------------------------------------------------------------------- Warp
@@ -179,20 +180,24 @@ def warp() -> dict[str, Any]:
         "fixed": pf.ReducedModel(shapes[0], dataclasses.replace(c_libraries.LAW, reference_load=2.0)),
         "published": pf.ReducedModelPublished(shapes[0], c_libraries.LAW),
     }
-    found: dict[str, Any] = {}
-    for kind, dtype in ((np.float64, wp.float64), (np.float32, wp.float32)):
-        for name, model in made.items():
-            scales = {"scale": np.linspace(0.8, 1.3, 40), "mu_c": 0.9}
-            kernel = pw.Model(model, contacts=40, parameters=scales, device="cpu", dtype=dtype)
-            runs = [np.array(each) for each in zip(*((v, n) for _, v, n, *_ in walk(model, 40, 3, kind)), strict=True)]
-            twist, load = (wp.array(each, dtype=dtype, device="cpu") for each in runs)
-            new, wrench = kernel.rest(), wp.zeros((3, 40, 3), dtype=dtype, device="cpu")
-            bent = 2e-3 * runs[1][..., None] * np.array([1.0, -0.6])
-            moments = None if name == "fixed" else wp.array(bent, dtype=dtype, device="cpu")
-            kernel.rollout(kernel.rest(), twist, load, 1e-3, new, wrench, moments=moments)
-            kernel.check()
-            found[f"{name}, {kind.__name__}"] = [kernel.names, new.numpy(), wrench.numpy()]
-    return found | {"coupled": _coupled(pw, wp)}
+    found: dict[str, Any] = {"coupled": _coupled(pw, wp)}
+    for name, model in made.items():
+        runs = zip(*((v, n) for _, v, n, *_ in walk(model, 40, 3, np.float32)), strict=True)
+        twist, load = map(np.array, runs)
+        moments = None if name == "fixed" else 2e-3 * load[..., None] * np.array([1.0, -0.6])
+        state, wrench = _rolled(pw, wp, wp.float64, model, twist, load, moments)
+        single = _rolled(pw, wp, wp.float32, model, twist, load, moments)[1]
+        found[name] = [state, wrench, bool(abs(single - wrench).max() < 1e-3 * abs(wrench).max())]
+    return found
+
+
+def _rolled(pw: Any, wp: Any, dtype: Any, model: Any, twist: Any, load: Any, moments: Any) -> list[Any]:
+    kernel = pw.Model(model, contacts=40, parameters={"scale": np.linspace(0.8, 1.3, 40)}, device="cpu", dtype=dtype)
+    given = [None if each is None else wp.array(each, dtype=dtype, device="cpu") for each in (twist, load, moments)]
+    new, wrench = kernel.rest(), wp.zeros((3, 40, 3), dtype=dtype, device="cpu")
+    kernel.rollout(kernel.rest(), *given[:2], 1e-3, new, wrench, moments=given[2])
+    kernel.check()
+    return [new.numpy(), wrench.numpy()]
 
 
 def _coupled(pw: Any, wp: Any) -> Any:
