@@ -251,6 +251,16 @@ def test_forward_changes_nothing():
         assert np.array_equal(friction.state(d), state)
 
 
+def test_friction_counts_once_where_velocities_are_not_updated():
+    m, d, friction = _held(mujoco_scenes.grip("box"))
+    with friction.install():
+        mujoco.mj_forward(m, d)
+        passive = d.qfrc_passive.copy()
+        mujoco.mj_forwardSkip(m, d, mujoco.mjtStage.mjSTAGE_VEL, 1)
+    assert abs(passive).max() > 0.1
+    np.testing.assert_allclose(d.qfrc_passive, passive, rtol=1e-6, atol=1e-9)
+
+
 def test_derivatives_by_finite_differences_see_friction():
     """A held block falls with its pads, not through them: its velocity follows that of the gripper."""
     m, d, friction = _held(mujoco_scenes.shaken(), 300)

@@ -17,14 +17,26 @@ from typing import Any
 from tests.support import recorded, studied, subjects
 
 NO_AVX2 = "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"
+NO_FMA = "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F"
 PROCESSORS = {
-    "compiled for any": ("generic", "", "", ""),
-    "any": ("generic", "", NO_AVX2, "Nehalem"),
-    "SSE": ("nehalem", "+sse4.2", NO_AVX2, "Prescott"),
-    "AVX": ("sandybridge", "+avx,+sse4.2", NO_AVX2, "Sandybridge"),
-    "AVX2": ("haswell", "+avx2,+fma,+avx,+sse4.2", "X86_V4 AVX512_ICL AVX512_SPR", "Haswell"),
+    "compiled for any": ("generic", "", "", "", "", "avx2", ""),
+    "any": ("generic", "", NO_AVX2, "Nehalem", "--xla_cpu_max_isa=SSE4_2", "default", NO_FMA),
+    "SSE": ("nehalem", "+sse4.2", NO_AVX2, "Prescott", "--xla_cpu_max_isa=SSE4_2", "default", NO_FMA),
+    "AVX": ("sandybridge", "+avx,+sse4.2", NO_AVX2, "Sandybridge", "--xla_cpu_max_isa=AVX", "default", NO_FMA),
+    "AVX2": (
+        "haswell",
+        "+avx2,+fma,+avx,+sse4.2",
+        "X86_V4 AVX512_ICL AVX512_SPR",
+        "Haswell",
+        "--xla_cpu_max_isa=AVX2",
+        "avx2",
+        "glibc.cpu.hwcaps=-AVX512F",
+    ),
 }
-NAMES = "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE"
+NAMES = (
+    *("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE"),
+    *("XLA_FLAGS", "ATEN_CPU_CAPABILITY", "GLIBC_TUNABLES"),
+)
 """Values of environment variables of other runs, without some of the instructions that processors differ by."""
 
 

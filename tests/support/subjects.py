@@ -10,7 +10,7 @@ from typing import Any
 from tests.identify import golden as fits
 from tests.joints import golden as joints
 from tests.limit_surface import golden as surfaces
-from tests.support import computed, recorded, refused, replies, shown
+from tests.support import bridged, computed, recorded, refused, replies, shown
 
 FOLDER = Path(__file__).parents[1] / "recorded"
 
@@ -35,6 +35,7 @@ SUBJECTS: dict[str, Callable[[], Any]] = {
         computed.patches, computed.pushes, computed.grips, computed.online, computed.scenes, computed.films,
         replies.replies, replies.swept, replies.explored, refused.refused,
     )},
+    **bridged.SUBJECTS,
 }  # fmt: skip
 """Name of a file -> function that computes what it holds."""
 

@@ -106,17 +106,6 @@ def test_reduced_equals_the_numpy_model(law, surface):
         assert_equal(model.step(tensor(state), tensor(twist), tensor(load), dt), reference.step(state, twist, load, dt))
 
 
-@every_law
-def test_distributed_equals_the_numpy_model(law):
-    model, reference = distributed(law), pf.DistributedModel(PATCH, law)
-    rng = np.random.default_rng(2)
-    _, twist, load = samples(20, rng)
-    state = rng.normal(size=(20, 2, PATCH.cells)) * 1e-6
-    rate_and_wrench = model(tensor(state), tensor(twist), tensor(load))
-    assert_equal(rate_and_wrench, (reference.rate(state, twist, load), reference.wrench(state, twist, load)))
-    assert_equal(model.step(tensor(state), tensor(twist), tensor(load), 1e-4), reference.step(state, twist, load, 1e-4))
-
-
 def test_one_contact_and_batches_that_broadcast():
     model, reference = reduced(), pf.ReducedModelPublished(PATCH, ELASTIC)
     state, twist = STATE_SIZE, TWIST_SIZE
@@ -287,23 +276,6 @@ def test_gradients_of_rates_are_finite_at_kinks():
         rate, wrench = model(z, v, tensor([0.0, 1.0, 1.0]))
         gradients = torch.autograd.grad(rate.sum() * 1e3 + wrench.sum(), [z, v, *model.parameters()])
         assert all(gradient.isfinite().all() for gradient in gradients)
-
-
-def test_gradients_of_the_distributed_step_agree_with_central_differences():
-    model = distributed(trainable=("weights", "mu_c", "mu_s", "sigma_0", "v_s", "breakaway_ratio"))
-    rng = np.random.default_rng(8)
-    z, v = tensor(rng.normal(size=(2, PATCH.cells)) * 5e-7), tensor(rng.normal(size=3) * TWIST_SIZE)
-    value = lambda: (model.step(z, v, 2.0, 3e-4)[1] * tensor([1.0, 1.0, 200.0])).sum()  # noqa: E731
-    gradients = torch.autograd.grad(value(), list(model.parameters()))
-    for parameter, gradient in zip(model.parameters(), gradients, strict=True):
-        flat = parameter.detach().reshape(-1)
-        for i in range(0, flat.numel(), 7):
-            ends = []
-            for nudge in (1e-6, -2e-6):
-                flat[i] += nudge
-                ends.append(value().item())
-            flat[i] += 1e-6
-            assert gradient.reshape(-1)[i].item() == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-5, abs=1e-8)
 
 
 def test_second_derivatives():

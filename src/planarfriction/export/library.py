@@ -18,11 +18,10 @@ from planarfriction.export.c_source import SQRT, Writer, comment, of_compiled, p
 from planarfriction.export.c_values import Array, Fixed, Scalar
 from planarfriction.export.loops import Loops
 from planarfriction.export.pieces import Pieces, pieces_of
-from planarfriction.export.slip import Slip, samples_of, slip_of
+from planarfriction.export.slip import samples_of, slip_of
 from planarfriction.formulas import LARGEST
 from planarfriction.kernels import tilt
 from planarfriction.kernels.surfaces import CELLS
-from planarfriction.limit_surface.loops.twists import MOST_TRIALS
 from planarfriction.online.loops import friction_filter, grips
 
 CONTROLLERS = (grips.hold,)
@@ -39,9 +38,8 @@ def grip_of(controller: Any, name: str) -> dict[str, Any]:
     observer, writer = controller.observer, Writer()
     own, state = observer._filter, observer.state
     if own.kind == CELLS:
-        raise InvalidValueError(
-            "controller", "know an ellipsoid or a table as its surface", type(observer.surface).__name__
-        )
+        rule = "know an ellipsoid or a table as its surface"
+        raise InvalidValueError("controller", rule, type(observer.surface).__name__)
     arrays = {each: value for each, value in own._asdict().items() if isinstance(value, np.ndarray)}
     known = [Array(f"own_{n}", v.shape, fixed=True) if n in arrays else Fixed(v) for n, v in own._asdict().items()]
     estimate, control = friction_filter.ESTIMATE, grips.STATE
@@ -153,10 +151,8 @@ def export_c(
     if (casadi or controller is not None) and precision != "double":
         raise InvalidValueError("precision", "be double for CasADi and controllers", precision)
     given = {"patches": patches} | ({} if controller is None else {"grip": grip_of(controller, name)})
-    folder, ends = (
-        validation.path("folder", folder),
-        FILES | (CASADI if casadi else {}) | (GRIP if "grip" in given else {}),
-    )
+    folder = validation.path("folder", folder)
+    ends = FILES | (CASADI if casadi else {}) | (GRIP if "grip" in given else {})
     texts = _texts(model, pieces_of(model, precision, fixed=False), name, precision, given, tuple(ends))
     writing.make_folder(folder)
     files = tuple(folder / f"{name}{end}" for end in ends.values())
@@ -172,7 +168,8 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, given: dict, k
 
     import planarfriction
 
-    writer, slip = Writer(precision), slip_of(model.patch, precision)
+    writer = Writer(precision)
+    slip = slip_of(model.patch, writer)
     functions = _functions(writer, pieces)
     places, words = model.compiled.points()
     moves, places = not words, dict(zip(("place_x", "place_y"), places.T, strict=True))
@@ -207,7 +204,7 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, given: dict, k
             "largest": writer.constant(PRECISIONS[precision]),
             "zero": writer.constant(0.0),
             "one": writer.constant(1.0),
-            "slip": None if slip is None else _search(writer, slip),
+            "slip": slip and slip.words,
             "passes": passes,
             "moves": moves,
             "body": body_of(model, precision, given["patches"]),
@@ -280,19 +277,6 @@ def _tables(
         or (table in ("share", "rungs", "place_x", "place_y") and len(numbers) > 0)
         or any(f"{table}[" in each for each in functions.values())
     }
-
-
-def _search(writer: Writer, slip: Slip) -> dict[str, Any]:
-    """Return the lines of the functions of a search, and the numbers that end it."""
-    axes, state = [f"c[{i}]" for i in range(9)], [f"s[{i}]" for i in range(14)]
-    outputs = {
-        "target": ["t[0]", "t[1]", "t[2]"],
-        "begin": [*axes, *state],
-        "attempt": state,
-        "end": ["twist[0]", "twist[1]", "twist[2]", "*angle"],
-    }
-    lines = {part: "\n".join(writer.lines(getattr(slip, part), names)) for part, names in outputs.items()}
-    return lines | {"trials": MOST_TRIALS, "duals": len(slip.tables["duals"]), "angle": writer.constant(slip.angle)}
 
 
 _SLOW = "sqrt", "exp", "sin", "cos", "pow", "atan2"

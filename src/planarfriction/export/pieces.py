@@ -14,14 +14,7 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.errors import InvalidValueError
 from planarfriction.export.twins import twin
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import (
-    cells,
-    cells_rollout,
-    disc_cells,
-    discs,
-    points,
-    published_step,
-)
+from planarfriction.kernels import cells, cells_rollout, disc_cells, discs, points, published_step
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.law import grip
 from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, Root
@@ -200,11 +193,10 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     moved, by = (_settled(cell, reference, LIGHTEST[precision] * reference), (*by, "load")) if fixed else (cell, by)
     given = ("dt", "normal_force") if fixed else ("dt",)
     lever = twin(kind.LEVERS if model.patch.anisotropic else kind.POSITIONS)
-    names = (
-        ["lever_xx", "lever_xy", "lever_yy", "lever_x", "lever_y"]
-        if model.patch.anisotropic
-        else ["place_x", "place_y"]
-    ) + ["gyration"] * (size == 3)
+    names = ["place_x", "place_y"]
+    if model.patch.anisotropic:
+        names = ["lever_xx", "lever_xy", "lever_yy", "lever_x", "lever_y"]
+    names += ["gyration"] * (size == 3)
 
     def step(trace: Trace) -> Any:
         own = _vector(trace, *(f"{name}[k]" for name in names))

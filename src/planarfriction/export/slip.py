@@ -8,17 +8,17 @@ import numpy as np
 
 from planarfriction.export.c_source import Writer
 from planarfriction.export.twins import twin
-from planarfriction.kernels.trace import Block, Mathematics, Number, Table, Trace, traced
+from planarfriction.kernels.trace import Mathematics, Number, Table, Trace, traced
 from planarfriction.limit_surface import LimitSurfaceTable
 from planarfriction.limit_surface.base import CERTIFIED
 from planarfriction.limit_surface.loops import twists
 from planarfriction.limit_surface.loops.twists import Limits, Search, StoredPotential
 from planarfriction.patch import ContactPatch
 
-LIMITS = {"double": twists.FINE, "float": Limits(1e-6, 1e-4, 1e-5, 1e-6)}
-"""Limits of searches by precision: in single precision dissipation is rounded to 1e-7."""
+LIMITS = {"": twists.FINE, "f": Limits(1e-6, 1e-4, 1e-5, 1e-6)}
+"""Limits of searches by suffixes of precisions: in single precision dissipation is rounded to 1e-7."""
 
-LARGEST_ANGLE = {"double": CERTIFIED, "float": 1e-3}
+LARGEST_ANGLE = {"": CERTIFIED, "f": 1e-3}
 """Largest angle [rad] by which the wrench of a twist may miss the given one."""
 
 
@@ -28,19 +28,11 @@ class Slip(NamedTuple):
     surface: LimitSurfaceTable
     tables: dict[str, np.ndarray]
     """Numbers of the surface, and directions over their dissipation [M, 3] to start from."""
-    target: Block
-    """Unit vector [3] that the search is for, from a wrench `w` [3]."""
-    begin: Block
-    """Axes and search from the unit vector `t` and a first guess `g` [3]."""
-    attempt: Block
-    """Search after another attempt."""
-    end: Block
-    """Twist [3] of unit dissipation, and the angle [rad] by which its wrench misses the given one."""
-    angle: float
-    """Largest angle that is taken."""
+    words: dict[str, Any]
+    """Lines of the functions by name, and the numbers that end a search."""
 
 
-def slip_of(patch: ContactPatch, precision: str) -> Slip | None:
+def slip_of(patch: ContactPatch, writer: Writer) -> Slip | None:
     """Trace the search in the `LimitSurfaceTable` of a patch; None for patches of one point or of many shapes."""
     if patch.depends_on_load or not patch.contact_radius() > 0.0:
         return None
@@ -48,14 +40,16 @@ def slip_of(patch: ContactPatch, precision: str) -> Slip | None:
     _, size, data = surface.numbers
     frame = surface._scaling.tolist()
 
+    axes, search = [f"c[{i}]" for i in range(9)], [f"s[{i}]" for i in range(len(Search._fields))]
+
     def place(trace: Trace) -> tuple[Any, Search]:
-        c: list[Any] = [Number(trace, f"c[{i}]") for i in range(9)]
-        s: list[Any] = [Number(trace, f"s[{i}]") for i in range(len(Search._fields))]
-        return (tuple(c[:3]), tuple(c[3:6]), tuple(c[6:])), Search(*s)
+        c, s = ([Number(trace, each) for each in names] for names in (axes, search))
+        return (tuple(c[:3]), tuple(c[3:6]), tuple(c[6:])), Search(*s)  # pyright: ignore[reportArgumentType]
 
     def three(trace: Trace, name: str) -> tuple[Number, ...]:
         return tuple(Number(trace, f"{name}[{i}]") for i in range(3))
 
+    # the unit vector that the search is for, from a wrench `w`; axes and search from that, `t`, and a first guess `g`
     def target(trace: Trace) -> Any:
         return twin(twists.target_of)(frame, three(trace, "w"))
 
@@ -67,9 +61,10 @@ def slip_of(patch: ContactPatch, precision: str) -> Slip | None:
         table = StoredPotential(numbers, size, data, 0.0)
         lean, (axes, s) = twin(twists.lean_of)(frame), place(trace)
         evaluate = twin(twists.table_at)
-        found = twin(twists.try_place)(evaluate, table, lean, axes, LIMITS[precision], s, [0.0] * 9)
+        found = twin(twists.try_place)(evaluate, table, lean, axes, LIMITS[writer.suffix], s, [0.0] * 9)
         return found._replace(going=Mathematics.where(found.going, 1.0, 0.0))
 
+    # the twist of unit dissipation, and the angle [rad] by which its wrench misses the given one
     def end(trace: Trace) -> Any:
         (axes, s), twist = place(trace), [0.0] * 3
         twin(twists.put_twist)(frame, twin(twists.place_of)(axes, s.a, s.b), s.power, twist)
@@ -77,7 +72,11 @@ def slip_of(patch: ContactPatch, precision: str) -> Slip | None:
 
     duals = surface._table.duals.reshape(3, -1).T.astype(np.float32)  # rough: Newton's method goes on from there
     tables = {"normals": data, "duals": np.unique(duals, axis=0)}
-    return Slip(surface, tables, traced(target), traced(begin), traced(attempt), traced(end), LARGEST_ANGLE[precision])
+    twist = ["twist[0]", "twist[1]", "twist[2]", "*angle"]
+    outputs = {target: ["t[0]", "t[1]", "t[2]"], begin: [*axes, *search], attempt: search, end: twist}
+    words = {each.__name__: "\n".join(writer.lines(traced(each), names)) for each, names in outputs.items()}
+    angle = writer.constant(LARGEST_ANGLE[writer.suffix])
+    return Slip(surface, tables, words | {"trials": twists.MOST_TRIALS, "duals": len(tables["duals"]), "angle": angle})
 
 
 KINDS = {"": np.float64, "f": np.float32}
@@ -88,23 +87,11 @@ TOLERANCES = {"": 1e-9, "f": 1e-3}
 MU = 0.5
 
 
-class Samples(NamedTuple):
-    """Numbers as source."""
+def samples_of(model: Any, slip: Slip | None, writer: Writer, rungs: Any, count: int = 32) -> dict[str, Any]:
+    """Step a model from rest through random twists, normal forces and periods, from sticking to sliding; return source.
 
-    steps: list[list[str]]
-    """Twist, normal force and period of each step."""
-    wrenches: list[list[str]]
-    loads: list[list[str]]
-    """Loads, and the least normal forces that hold them."""
-    mu: str
-    lever: str
-    tolerance: str
-
-
-def samples_of(model: Any, slip: Slip | None, writer: Writer, rungs: Any = None, count: int = 32) -> Samples:
-    """Step a model from rest through random twists, loads and periods, from sticking to sliding.
-
-    Loads are the `rungs` between which shapes are interpolated, if there are any.
+    `loads` are followed by the least normal forces that hold them. Normal forces are the `rungs` between which shapes
+    are interpolated, if there are any.
     """
     rng, kind = np.random.default_rng(0), KINDS[writer.suffix]
     lever = 1.0 if slip is None else slip.surface.contact_radius
@@ -123,8 +110,7 @@ def samples_of(model: Any, slip: Slip | None, writer: Writer, rungs: Any = None,
     if slip is not None:
         needed = np.einsum("ni,ni->n", slip.surface.twist(-loads), loads) / MU
         loads = np.column_stack([loads, needed])
-    steps, after, held = (
-        [[writer.constant(float(x)) for x in row] for row in table] for table in (rows, wrenches, loads)
-    )
-    mu, arm, tolerance = map(writer.constant, (MU, float(lever), TOLERANCES[writer.suffix]))
-    return Samples(steps, after, held, mu, arm, tolerance)
+    tables = {"steps": rows, "wrenches": wrenches, "loads": loads}
+    found = {name: [[writer.constant(float(x)) for x in row] for row in table] for name, table in tables.items()}
+    numbers = {"mu": MU, "lever": float(lever), "tolerance": TOLERANCES[writer.suffix]}
+    return found | {name: writer.constant(each) for name, each in numbers.items()}

@@ -189,9 +189,7 @@ class TensorModel:
         law = LawNumbers(**{name: wide[name] for name in LAW}, elasto_plastic=float(self.elasto_plastic))
         return Contact(law, self._shape(wide), self.reference_load)
 
-    def _evaluated(
-        self, state: Any, twist: Any, normal_force: Any, parameters: Any, moments: Any = None
-    ) -> tuple[Any, Any]:
+    def _evaluated(self, state: Any, twist: Any, normal_force: Any, parameters: Any, moments: Any) -> tuple[Any, Any]:
         (z, v, load), pressed = self._inputs_pressed(state, twist, normal_force, parameters, moments)
         rate, wrench = evaluate(self.xp, self.equations, pressed.contact, z, pressed.seen(self.xp, v), load)
         return rate, pressed.pull(self.xp, wrench)

@@ -47,10 +47,7 @@ def _cells(xp, size: int, data, scaled):
 
 
 def _table(xp, kind: int, size: int, data, scaled):
-    """Return `u` of a table: near the spin axis its value at one place with the derivative at another.
-
-    Both places are looked up at once.
-    """
+    """Return `u` of a table: near the spin axis its value at one place with the derivative at another."""
     here = xp.stop_gradient(scaled)
     near, moved = _off_axis(xp, size, here)
     length, *heading = _upper(xp, xp.stack([scaled + xp.where(near, moved - here, 0.0), here], 0))

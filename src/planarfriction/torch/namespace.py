@@ -14,16 +14,11 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.tensors.namespace import Namespace
 
 
-def pressing(u: Tensor, v: Tensor, share: Tensor, x: Tensor, y: Tensor, narrow: Tensor) -> Tensor:
-    """Return the cells that press, bool `[..., N]` (see `Namespace.pressing`)."""
-    return _Pressing.apply(u, v, share, x, y)  # pyright: ignore[reportReturnType]
-
-
 class _Pressing(torch.autograd.Function):
-    """Cells that press, as if they were constants."""
+    """Cells that press (see `Namespace.pressing`), as if they were constants."""
 
     @staticmethod
-    def forward(u, v, share, x, y):
+    def forward(u, v, share, x, y, narrow):
         from planarfriction.kernels.tilt import tilt_many
 
         rows = [np.array(each.detach().cpu().double().reshape(-1, each.shape[-1]).numpy()) for each in (u, v, share)]
@@ -38,7 +33,7 @@ class _Pressing(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx, *bars):
-        return (None,) * 5
+        return (None,) * 6
 
     @staticmethod
     def jvp(ctx, *tangents):
@@ -98,7 +93,7 @@ xp = Namespace(
     integers=lambda x: x.long(),
     real=_real,
     extremes=_extremes,
-    pressing=pressing,
+    pressing=_Pressing.apply,
     to_numpy=lambda value: value.detach().cpu().numpy() if isinstance(value, Tensor) else value,
     from_numpy=lambda array, like: torch.tensor(array, dtype=like.dtype, device=like.device),
     widened=_widened,

@@ -47,11 +47,8 @@ def described(model: FrictionModel, precision: str, count: int = 0) -> Described
     """
     points, words = model.compiled.points()
     pieces = pieces_of(model, precision, count=count)
-    return Described(
-        pieces,
-        np.pad(points, [(0, pieces.count - len(points)), (0, 0)], mode="edge" if len(points) else "constant"),
-        not words,
-    )
+    more, mode = [(0, pieces.count - len(points)), (0, 0)], "edge" if len(points) else "constant"
+    return Described(pieces, np.pad(points, more, mode=mode), not words)
 
 
 def source_of(model: Described, precision: str) -> Source:
@@ -146,10 +143,8 @@ def _slopes_by_twist(pieces: Pieces) -> Block:
 def _rendered(name: str, **values: Any) -> str:
     import jinja2
 
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("planarfriction.warp", "."), undefined=jinja2.StrictUndefined
-    )
-    return environment.get_template(name).render(values)
+    loader = jinja2.PackageLoader("planarfriction.warp", ".")
+    return jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined).get_template(name).render(values)
 
 
 def _placed(tables: dict[str, np.ndarray], joined: list[np.ndarray]) -> dict[str, int]:

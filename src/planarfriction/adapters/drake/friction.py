@@ -168,14 +168,6 @@ class Friction(LeafSystem):
             elif port.size():
                 self._inputs[name] = self.DeclareVectorInputPort(name, port.size())
 
-    def _driven(self, context: Any) -> dict[str, AbstractValue]:
-        """Return the inputs that drive the plant besides generalized forces."""
-        return {
-            name: self.EvalAbstractInput(context, port.get_index())
-            for name, port in self._inputs.items()
-            if name != _FORCE and port.HasValue(context)
-        }
-
     def _read(self, context: Any, name: str) -> np.ndarray:
         return context.get_discrete_state_vector().value()[self._parts[name]]
 
@@ -185,7 +177,9 @@ class Friction(LeafSystem):
             raise InvalidValueError("state", "be finite", f"{state[~np.isfinite(state)][0]} in that of the plant")
         port = self._inputs[_FORCE]
         applied = port.Eval(context) if port.HasValue(context) else np.zeros(self._size)
-        self._shadow.begin(state, self._driven(context))
+        ports = {name: each for name, each in self._inputs.items() if name != _FORCE and each.HasValue(context)}
+        driven = {name: self.EvalAbstractInput(context, each.get_index()) for name, each in ports.items()}
+        self._shadow.begin(state, driven)
         own = context.get_discrete_state_vector().value()
         before = (own[parts[name]] for name in ("bristles", "wrenches", "force", "owed", "axes", "answers"))
         asked = self._asking.step(applied, *before)

@@ -174,10 +174,7 @@ def _across(vector: Sequence[float], normal: Sequence[float]) -> list[float]:
 
 
 def _axis(x: list[float], y: list[float], last: list[float], normal: list[float]) -> tuple[list[float], list[float]]:
-    """Return the x axis of a patch from the axes of its frame and its last one, carried along, and this one.
-
-    As in `planarfriction.adapters.mujoco.loops.geometry`.
-    """
+    """Return the x axis of a patch, and its last one carried along (see `adapters.mujoco.loops.geometry`)."""
     x = _across(x, normal)
     flat = _dot(x, x)
     if _dot(last, last) >= ALONG:

@@ -242,10 +242,8 @@ class Friction:
         shift = shift + own.displaced
         kept |= {"wrench": wrench_from(xp, wrench.reshape(-1, 3), -shift), "twist": twist_at(xp, twist, shift)}
         kept |= {"time": given.time, "next": d.time, "iterations": found.iterations, "passes": found.passes}
-        kept |= {
-            "residual": found.residual,
-            "converged": found.converged & (found.slack <= SLACK[found.slack.dtype.name]),
-        }
+        holds = found.slack <= SLACK[found.slack.dtype.name]
+        kept |= {"residual": found.residual, "converged": found.converged & holds}
         d = d.replace(userdata=self._written(d.userdata, kept))
         # in double precision MJX makes long integers of some that came in short, at which `lax.scan` would stop
         return jax.tree.map(lambda after, before: after.astype(before.dtype), d, given)
@@ -257,10 +255,9 @@ class Friction:
         if d.qpos.dtype != jnp.result_type(float):
             rule = f"be {jnp.result_type(float)}, that of JAX (see jax_enable_x64)"
             raise InvalidValueError("precision", rule, f"data of {d.qpos.dtype}")
-        if d.userdata.shape != (self._fixed.nuserdata,):
-            rule = (
-                f"have shape [{self._fixed.nuserdata}]: of one environment, of the model of the patches (see jax.vmap)"
-            )
+        count = self._fixed.nuserdata
+        if d.userdata.shape != (count,):
+            rule = f"have shape [{count}]: of one environment, of the model of the patches (see jax.vmap)"
             raise InvalidValueError("userdata", rule, f"shape {list(d.userdata.shape)}")
 
     def _own(self) -> _Own:
@@ -308,10 +305,7 @@ class Friction:
             yield *kind, [p for p, each in enumerate(kinds) if each == kind]
 
     def _pressed(self, own: _Own, where: responses.Geometry, centre: jax.Array) -> tuple[jax.Array, list[Any]]:
-        """Return displacements of origins towards the centres `[k, 2]`, and the models of each group that press there.
-
-        Models are None if their pressure is fixed.
-        """
+        """Return displacements towards centres `[k, 2]`, and each group's model that presses there, None if fixed."""
         shift = where.share[:, None] * centre
         rest = (centre - shift - own.displaced) / own.scale[:, None]
         groups = zip(self._groups(), own.models, strict=True)

@@ -229,7 +229,8 @@ def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Ar
         jacobian, away = jnp.stack([moves @ x, moves @ y, turns @ normal]), contact.pos - centre
         own = jnp.where(chosen, jnp.stack([jnp.ones(len(away)), away @ y, -away @ x]), 0.0)
         tilt, slip = (turns @ jnp.stack([x, y]).T).T @ d.qvel, jacobian[:2] @ d.qvel + drift[:2]
-        rolled = _norm(tilt) + jnp.where(place.radius > 0.0, _norm(slip) / place.radius, 0.0)
+        rolled, slid = xp.norm(tilt, -1)[0], xp.norm(slip, -1)[0]
+        rolled += jnp.where(place.radius > 0.0, slid / place.radius, 0.0)
         share = jnp.where(new, 1.0, jnp.minimum(1.0, m.opt.timestep * rolled / FOLLOWS))
         share = jnp.where(touching & place.at_contact, share, 0.0)
         axes = jnp.where(touching, jnp.stack([x, y, normal]) @ turned, before)
@@ -239,12 +240,6 @@ def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Ar
     jacobian, own, *others = jax.vmap(one)(jax.tree.map(jnp.asarray, where), held, before)
     rows = jnp.zeros((len(where.site), 3, d._impl.efc_J.shape[0])).at[:, :, contact.efc_address].set(own)
     return Geometry(jacobian.reshape(-1, m.nv), rows[:, 0], rows[:, 1:], *others)
-
-
-def _norm(vector: jax.Array) -> jax.Array:
-    """Return the length of a vector, which has derivatives at zero too."""
-    square = vector @ vector
-    return jnp.where(square > 0.0, jnp.sqrt(jnp.where(square > 0.0, square, 1.0)), 0.0)
 
 
 def _unit(vector: jax.Array, given: jax.Array) -> jax.Array:

@@ -201,7 +201,9 @@ class Friction:
             return wp.zeros((worlds, *shape), dtype=dtype, device=device)
 
         self._dt = float(m.opt.timestep)
-        self._patches, self._places = self._numbers(), self._places_of()
+        places = self._at._asdict()
+        self._places = _filled(geometry.Places(), {geometry.AFTER: places.pop("new"), **places})
+        self._patches = self._numbers()
         self._frames = _filled(
             geometry.Frames(),
             {
@@ -228,10 +230,6 @@ class Friction:
         self._metric = zeros(self.model.nC)
         damped = bool(m.dof_damping.any()) and not m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
         self._implicit = int(damped) if m.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER else 2
-
-    def _places_of(self) -> Any:
-        places = self._at._asdict()
-        return _filled(geometry.Places(), {geometry.AFTER: places.pop("new"), **places})
 
     def _numbers(self) -> Any:
         """Return the numbers of the patches for kernels."""
@@ -269,10 +267,7 @@ class Friction:
 
 
 def _parameters(m: Any, placed: Sequence[Placed], worlds: int) -> dict[str, np.ndarray]:
-    """Return the parameters of patches that stand in a prepared model, for all worlds.
-
-    Raises InvalidValueError for patches that are displaced.
-    """
+    """Return the parameters of patches that stand in a prepared model, for all worlds; refuse displaced patches."""
     if any(each.pair < 0 for each in placed):
         return {}
     found = parameters_in(m, place_of_parameters(m), len(placed))
@@ -296,9 +291,8 @@ def _check(m: Any, placed: Sequence[Placed]) -> None:
     """Refuse options of a model that do not fit."""
     check_options(m, "Euler", "implicitfast", cone=", where constraints are linear in their ranges")
     if m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_ACTUATION):
-        raise InvalidValueError(
-            "actuation", "be enabled: MuJoCo Warp calls control callbacks with it alone", "disabled"
-        )
+        rule = "be enabled: MuJoCo Warp calls control callbacks with it alone"
+        raise InvalidValueError("actuation", rule, "disabled")
     for each in placed:
         if each.pair >= 0:
             each.check(m)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from planarfriction.adapters.mujoco.loops.geometry import axes, owners_of, places_of
+from planarfriction.adapters.mujoco.loops.geometry import axes, column, owners_of, places_of
 from planarfriction.adapters.mujoco.loops.parameters import displacement_of, scale_of
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
@@ -88,8 +88,7 @@ def _fault(own, m, d, s, p, x, y):
             return BEHIND
         if abs(s.depths[2 * p]) > size + slack:
             return BEYOND
-    turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
-    along = (turned[0], turned[3], turned[6])
+    along = column(at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site), 0)
     return ALONG if faces and square(plus(along, -dot(normal, along), normal)) < MARGIN**2 else 0
 
 
@@ -106,13 +105,12 @@ def _support(own, m, d, s, p, support):
     x, y, normal = axes(s, p)
     turned = at(doubles(integers(d + own.data.geom_xmat)[0]), 9 * other)
     half = at(doubles(integers(m + own.model.geom_size)[0]), 3 * other)
-    away = plus(
-        three(at(doubles(integers(d + own.data.geom_xpos)[0]), 3 * other)), -1.0, three(at(s.frames, 6 * p + 3))
-    )
+    place = three(at(doubles(integers(d + own.data.geom_xpos)[0]), 3 * other))
+    away = plus(place, -1.0, three(at(s.frames, 6 * p + 3)))
     for k in range(3):
-        if dot(normal, (turned[k], turned[3 + k], turned[6 + k])) ** 2 > 1.0 - MARGIN**2:
+        if dot(normal, column(turned, k)) ** 2 > 1.0 - MARGIN**2:
             i, j = (k + 1) % 3, (k + 2) % 3
-            first = turned[i], turned[3 + i], turned[6 + i]
+            first = column(turned, i)
             support[0], support[1] = shrunk * dot(x, away), shrunk * dot(y, away)
             support[2], support[3], support[6] = dot(x, first), dot(y, first), doubles(own.extents)[6 * p + 5]
             support[4], support[5] = shrunk * half[i], shrunk * half[j]
@@ -159,6 +157,6 @@ def follow_centres(own, m, d, s, nefc, radius, problem, kept):
             place = three(at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site))
             away = plus(three(at(s.frames, 6 * p + 3)), -1.0, place)
             for i in range(3):
-                centre[i] = dot((turned[i], turned[3 + i], turned[6 + i]), away)
+                centre[i] = dot(column(turned, i), away)
         _resize(own, m, s, nefc, p, guess)
         _support(own, m, d, s, p, at(problem.support, 7 * p))

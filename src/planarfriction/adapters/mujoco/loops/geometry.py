@@ -13,12 +13,6 @@ from planarfriction.kernels.vectors import clear, dot, norm, plus, square, three
 
 
 @kernel
-def take(host, d, nefc):
-    """Take scratch from the data's own stack, until it is freed; return its address."""
-    return call_c(host.functions.mj_stackAllocNum, (d, host.scratch_words + 4 * nefc))
-
-
-@kernel
 def owners_of(s, nefc):
     """Return the patches of the constraints, behind the numbers of these in the scratch."""
     return integers(at(s.misses, nefc))
@@ -39,8 +33,7 @@ def _collect(own, d, s, nefc):
         owners[r] = -1
     for p in range(own.count):
         counts[p], s.depths[2 * p + 1] = 0, 0.0
-        for i in range(6):
-            frames[6 * p + i] = 0.0
+    clear(frames, 6 * own.count)
     for c in range(ncon):
         contact = contacts + own.contact.size * c
         row = integers32(contact + own.contact.efc_address)[0]
@@ -67,6 +60,18 @@ def cross(a, b):
 
 
 @kernel
+def turned_by(matrix, vector):
+    """Return a vector in the world, from a frame with a matrix of nine numbers."""
+    return dot(three(matrix), vector), dot(three(at(matrix, 3)), vector), dot(three(at(matrix, 6)), vector)
+
+
+@kernel
+def column(matrix, i):
+    """Return axis i of a frame in the world."""
+    return matrix[i], matrix[3 + i], matrix[6 + i]
+
+
+@kernel
 def axes(s, p):
     """Return the axes of patch p: x, y, normal."""
     frame, x = three(at(s.frames, 6 * p)), three(at(s.axes, 3 * p))
@@ -78,11 +83,13 @@ def axes(s, p):
 def _put_axis(own, d, s, p, before, axis):
     """Write the x axis of patch p: that of its site, across the normal, on the side of the last one; see `FLAT`."""
     turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * integers(own.sites)[p])
-    frame, last = three(at(s.frames, 6 * p)), three(before)
-    n, one, two = times(1.0 / norm(frame), frame), three(turned), three(at(turned, 3))
-    end = three(at(turned, 6))
-    x, y = (one[0], two[0], end[0]), (one[1], two[1], end[1])
-    last = dot(one, last), dot(two, last), dot(end, last)
+    frame, x, y, last = (
+        three(at(s.frames, 6 * p)),
+        column(turned, 0),
+        column(turned, 1),
+        turned_by(turned, three(before)),
+    )
+    n = times(1.0 / norm(frame), frame)
     x, last = plus(x, -dot(x, n), n), plus(last, -dot(last, n), n)
     flat, carried = square(x), square(last) >= ALONG
     if carried:
@@ -96,7 +103,7 @@ def _put_axis(own, d, s, p, before, axis):
         s.carried[2 * p], s.carried[2 * p + 1] = dot(last, x), dot(n, cross(last, x))
     for i in range(3):
         s.axes[3 * p + i] = x[i]
-        axis[i] = x[0] * turned[i] + x[1] * turned[3 + i] + x[2] * turned[6 + i]
+        axis[i] = dot(x, column(turned, i))
 
 
 @kernel
@@ -105,10 +112,8 @@ def _add_drift(own, m, d, s, p, geom, sign):
     surface = at(doubles(integers(m + own.model.geom_surfacevel)[0]), 6 * geom)
     turned = at(doubles(integers(d + own.data.geom_xmat)[0]), 9 * geom)
     away = plus(three(at(s.frames, 6 * p + 3)), -1.0, three(at(doubles(integers(d + own.data.geom_xpos)[0]), 3 * geom)))
-    rows = three(turned), three(at(turned, 3)), three(at(turned, 6))
-    move, turn = three(surface), three(at(surface, 3))
-    turn = dot(rows[0], turn), dot(rows[1], turn), dot(rows[2], turn)
-    move = plus((dot(rows[0], move), dot(rows[1], move), dot(rows[2], move)), 1.0, cross(turn, away))
+    turn = turned_by(turned, three(at(surface, 3)))
+    move = plus(turned_by(turned, three(surface)), 1.0, cross(turn, away))
     x, y, normal = axes(s, p)
     s.drift[3 * p] += sign * dot(x, move)
     s.drift[3 * p + 1] += sign * dot(y, move)
@@ -128,15 +133,6 @@ def _put_places(own, d, s, nefc, p, centre, x, y):
 
 
 @kernel
-def in_world(own, d, site, local):
-    """Return the place in the world of a point in the frame of a site."""
-    turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
-    place = at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site)
-    x, y, z = three(turned), three(at(turned, 3)), three(at(turned, 6))
-    return plus(three(place), 1.0, (dot(x, local), dot(y, local), dot(z, local)))
-
-
-@kernel
 def _put_origin(own, d, s, p, normal, held):
     """Write the origin of patch p in place of the sum of its contacts: at the site, or at the last centre, if any.
 
@@ -144,9 +140,10 @@ def _put_origin(own, d, s, p, normal, held):
     """
     frame, local = at(s.frames, 6 * p), three(held)
     middle = times(1.0 / s.counts[p], three(at(frame, 3)))
-    origin, free = in_world(own, d, integers(own.sites)[p], local), integers(own.at_contact)[p] != 0
-    if free:
-        new = square(local) == 0.0
+    site, new = integers(own.sites)[p], square(local) == 0.0
+    turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
+    origin = plus(three(at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site)), 1.0, turned_by(turned, local))
+    if integers(own.at_contact)[p] != 0:
         origin = middle if new else plus(origin, dot(normal, plus(middle, -1.0, origin)), normal)
     s.depths[2 * p] = dot(normal, plus(middle, -1.0, origin))
     frame[3], frame[4], frame[5] = origin
@@ -198,6 +195,5 @@ def place(own, m, d, s, nefc, kept):
             _rows(own, m, d, s, nefc, p, kept)
             touching += 1
         else:
-            for i in range(3 * own.nv):
-                s.jacobian[3 * own.nv * p + i] = 0.0
+            clear(at(s.jacobian, 3 * own.nv * p), 3 * own.nv)
     return touching

@@ -14,10 +14,7 @@ from planarfriction.kernels.vectors import copy
 
 COUNT = len(PARAMETERS)
 
-PLACES = {name: LawNumbers._fields.index(name) for name in PARAMETERS if name in LawNumbers._fields}
-"""Places of parameters in the numbers of a law."""
-
-_PLACES = tuple(PLACES.values())
+_PLACES = tuple(LawNumbers._fields.index(name) for name in PARAMETERS if name in LawNumbers._fields)
 _SIGMA_0, _SIGMA_1, _SIGMA_2, _MU_C, _MU_S, _V_S, _RATIO, _SCALE, _X, _Y = range(COUNT)
 
 

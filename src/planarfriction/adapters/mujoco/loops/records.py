@@ -164,21 +164,11 @@ def scratch_layout(words: int, records: int, k: int, nv: int) -> Layout:
     `words` are those of a problem, `records` those of the records of all patches.
     """
     n = 3 * k
-    shapes = {
-        "problem": words,
-        "records": records,
-        "jacobian": n * nv,
-        "more": nv,
-        "block": 36,
-        "counts": k,
-        "frames": 6 * k,
-        "misses": 0,
-    }
-    shapes |= {"tilts": k, "depths": 2 * k, "carried": 2 * k, "axes": 3 * k, "drift": 3 * k}
+    shapes = {"problem": words, "records": records, "jacobian": n * nv, "more": nv, "block": 36, "frames": 2 * n}
+    shapes |= {"counts": k, "tilts": k, "depths": 2 * k, "carried": 2 * k, "misses": 0}
     shapes |= dict.fromkeys(("inertia", "stiff"), nv * nv) | dict.fromkeys(("answers", "held"), nv * (n + 1))
-    return Layout(
-        Scratch, **shapes | dict.fromkeys(("moves", "turns"), 3 * nv) | dict.fromkeys(("start", "goal", "move"), n)
-    )
+    shapes |= dict.fromkeys(("moves", "turns"), 3 * nv) | dict.fromkeys(("start", "goal", "move", "axes", "drift"), n)
+    return Layout(Scratch, **shapes)
 
 
 class Host(NamedTuple):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from numba import types
 
 from planarfriction.adapters.mujoco.loops.centres import follow_centres
-from planarfriction.adapters.mujoco.loops.geometry import place, take
+from planarfriction.adapters.mujoco.loops.geometry import place
 from planarfriction.adapters.mujoco.loops.models import fits, serves
 from planarfriction.adapters.mujoco.loops.parameters import displacement_of, scale_of, write_laws
 from planarfriction.adapters.mujoco.loops.records import Host, Remembered, Scratch, read
@@ -242,7 +242,7 @@ def plan(place_of_host: Place, m: Place, d: Place) -> None:
     _take_off(host, kept, d, _recall(host, kept, d))
     kept.next[0] = doubles(d + host.data.time)[0] + dt
     call_c(host.functions.mj_markStack, (d,))
-    taken = take(host, d, nefc)
+    taken = call_c(host.functions.mj_stackAllocNum, (d, host.scratch_words + 4 * nefc))
     s = arrays_at(host.scratch, taken)
     if not fits(host, m):
         _forget(host, kept, d)

@@ -284,10 +284,7 @@ def write_rows(
 
 @wp.kernel(enable_backward=False)
 def place(patches: Patches, host: Host, frames: Frames, problem: Problem):
-    """Write the frames of the patches, the Jacobian of their twists, and add the guesses to the passive forces.
-
-    Bristles and guesses are carried into the axes of the step.
-    """
+    """Write the frames of the patches, the Jacobian of their twists, and add the guesses to the passive forces."""
     w = wp.tid()
     nv = frames.jacobian.shape[2]
     nefc = wp.min(host.nefc[w], frames.owner.shape[1])
