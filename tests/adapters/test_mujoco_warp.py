@@ -97,6 +97,13 @@ class Both:
 # ---------------------------------------------------------------------- scenes
 
 
+@pytest.mark.parametrize("scene", [disc(1.0, 10.0), shaken(), plate(2)], ids=["disc", "shaken", "plate"])
+def test_scenes_begin_to_move_as_in_mujoco(scene):
+    ours, theirs = Both(scene).run(0.06)
+    assert np.array_equal(ours[:, 0], ours[:, 1])
+    np.testing.assert_allclose(ours[:, 0], theirs, atol=1e-6)
+
+
 @SLOW
 @pytest.mark.parametrize(
     "scene",

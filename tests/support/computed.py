@@ -167,7 +167,9 @@ def grips() -> dict[str, Any]:
     for knots in ([0.0, 0.1, 0.2], [0.1, 0.2, 0.3, 0.4], [0.0, 0.2, 0.2, 0.4], [0.0, 0.1, 0.2, 0.6], 3):
         with contextlib.suppress(pf.FrictionError):
             wrong.append([knots, plan_grip(plate, {"angle": -0.4}, knots=knots)])
-    return {"holding": holding, "fast": fast, "turn": told_plan(turn), "figure": turn.plot(), "wrong": wrong}
+    slide = plan_grip(plate, {"slide": (0.0, -0.01)}, knots=6)
+    told = {"turn": told_plan(turn), "figure": turn.plot(), "slide": told_plan(slide), "its figure": slide.plot()}
+    return {"holding": holding, "fast": fast, "wrong": wrong} | told
 
 
 def told_plan(plan: Any) -> dict[str, Any]:

@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import planarfriction as pf
-from planarfriction import sweeps
+from planarfriction import export, plots, sweeps
 from planarfriction.errors import FrictionError
 from planarfriction.identify import (
     FitOptions,
@@ -40,6 +41,7 @@ from planarfriction.planning import (
 )
 from planarfriction.sweeps.settings import Settable
 from tests.joints.test_joint_fit import PENDULUM, SERVO, servo_logs, torque_log
+from tests.support.rate_laws import BoucWen
 
 PATCH, LAW = pf.ContactPatch.disc(0.01, cells=7), pf.LuGre(mu_c=0.5, mu_s=0.6, elasto_plastic=0.9)
 SOFT = pf.ContactPatch.disc(0.012, cells=7, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
@@ -48,6 +50,9 @@ TIME, HALF = np.arange(300) / 100.0, np.radians(30.0)
 ANGLE = 3.0 * TIME
 LOG = Log(TIME, TIME[:, None] * [0.01, 0.0, 1.0], np.full((300, 3), -0.1), 2.0)
 FREE = Slide(TIME[:50], np.stack([TIME[:50] - TIME[:50] ** 2, 0.0 * TIME[:50], 0.0 * TIME[:50]], -1))
+FIXED, BOUC = pf.LuGre(mu_c=0.5, reference_load=2.0), BoucWen()
+TILTED = pf.ContactPatch.disc(0.01, cells=7)
+LEANING = pf.ReducedModel(PATCH.with_friction_metric(None, (0.1, 0.0)), LAW)
 BODY = MassProperties(0.4, 8e-4)
 DOWN, POINT = (0.0, 1.0, 0.0), pf.ContactPatch.points([(0.0, 0.0)])
 SQUARE = [(-0.05, -0.05), (0.05, -0.05), (0.05, 0.05), (-0.05, 0.05)]
@@ -116,7 +121,8 @@ def estimate() -> Any:
 
 CALLS: dict[str, list[Callable[[], Any]]] = {
     "logs": [
-        lambda: changed(time=TIME[::-1]), lambda: changed(wrench=LOG.wrench[:, :2]), lambda: changed(normal_force=-1.0),
+        lambda: changed(time=TIME[::-1]), lambda: Log.from_motion(TIME[:4], np.zeros((4, 3)), np.zeros((4, 3)), 1.0),
+        lambda: JointLog(TIME, TIME), lambda: changed(wrench=LOG.wrench[:, :2]), lambda: changed(normal_force=-1.0),
         *(lambda name=name, value=value: changed(**{name: value}) for name, value in (
             ("held", "yes"), ("held", 2), ("held", np.nan), ("held", np.ones(3)), ("turns", -1), ("turns", 0.5),
             ("name", 3),
@@ -150,6 +156,8 @@ CALLS: dict[str, list[Callable[[], Any]]] = {
         )),
         lambda: identify_lugre(LOG, PATCH, options={"starts": 1}),
         lambda: identify_lugre(LOG, MODEL), lambda: identify_lugre([], PATCH),
+        lambda: identify_lugre(changed(normal_force=0.0), PATCH),
+        lambda: identify_motion(FREE, PATCH, BODY, start=3),
         lambda: identify_lugre(LOG, SOFT, model="distributed"), lambda: identify_lugre(LOG, POINT),
         lambda: identify_lugre(changed(wrench=0.0 * LOG.wrench, name="dead"), PATCH),
         lambda: identify_lugre(changed(normal_force=1.0 + TIME), SOFT),
@@ -163,6 +171,9 @@ CALLS: dict[str, list[Callable[[], Any]]] = {
             {"motions": changed(twist=0 * LOG.twist)}, {"noise": (1.0, 0.0, 1.0)}, {"nuisance": ["lag"]},
             {"motions": []}, {"motions": 3}, {"parameters": 3},
         )),
+        *(lambda given=given: design_experiment(PATCH, pf.LuGre(mu_c=0.5), **given) for given in (
+            {"parameters": ["mu_c", "breakaway_ratio"]}, {"parameters": ["c"]},
+        )),
         *(lambda given=given: candidate_motions(PATCH, LAW, **given) for given in (
             {"speed": 0.0}, {"spin": -1.0}, {"duration": 0.01}, {"rate": 1e9}, {"normal_force": 0},
             {"normal_force": []},
@@ -174,6 +185,7 @@ CALLS: dict[str, list[Callable[[], Any]]] = {
         lambda: identify_joint(servo(), Plant()), lambda: identify_joint(servo(), PENDULUM, terms=("directional",)),
         lambda: Plant(mass=1.0), lambda: Drive(1.0, 5.0, sag=5.0), lambda: JointFriction(1.0, mu_s=0.5),
         lambda: identify_joint([*servo(), torque_log()], PENDULUM), lambda: identify_joint([], PENDULUM),
+        lambda: identify_joint(servo(), PENDULUM, progress=3),
     ],
     "grips": [
         lambda: gripped({"angle": HALF}, knots=4), lambda: gripped({"angle": 1.0, "slide": (0, 1)}),
@@ -188,7 +200,8 @@ CALLS: dict[str, list[Callable[[], Any]]] = {
         )),
         lambda: gripped(scene=plate(body=dataclasses.replace(plate().body, gravity=(0.0, 0.0)))),
         lambda: holding_load(DOWN, PATCH, 0.0), lambda: holding_load(DOWN, PATCH, 1.0, margin=-0.1),
-        lambda: holding_load((0.0, 1.0), PATCH, 1.0), lambda: holding_load(DOWN, None, 1.0),
+        lambda: holding_load((0.0, 1.0), PATCH, 1.0), lambda: holding_load((0.0, 1.0, 0.1), POINT, 1.0),
+        lambda: holding_load(DOWN, None, 1.0),
         lambda: dynamic_holding_load(DOWN, PATCH), lambda: dynamic_holding_load((0.0, 1.0), MODEL),
         lambda: dynamic_holding_load(DOWN, pf.DistributedModel(PATCH, pf.CoulombStribeck(mu_c=1.0))),
         lambda: dynamic_holding_load((0.0, 1.0, 0.1), pf.DistributedModel(POINT, LAW)),
@@ -198,6 +211,7 @@ CALLS: dict[str, list[Callable[[], Any]]] = {
     ],
     "pushes": [
         lambda: Slider(SURFACE, [[0, 0], [1, 0], [0.2, 0.2], [0, 1]]), lambda: Slider(PATCH, SQUARE),
+        lambda: Slider(SURFACE, SQUARE[:2]),
         lambda: Pusher(-0.1), lambda: pushed(path=pf.Signal.sampled([0.0, 1.0], [[0.0, 0.0], [0.1, 0.0]], "linear")),
         lambda: pushed(path=pf.Signal.constant([0.0, 0.0])), lambda: pushed(pusher=Pusher(0.1, 0.02)),
         lambda: pushed(rtol=0.0), lambda: motion_cone(SURFACE, (0.0, 0.0), (0.0, 0.0), 0.1),
@@ -207,7 +221,8 @@ CALLS: dict[str, list[Callable[[], Any]]] = {
         )),
     ],
     "online": [
-        lambda: FrictionObserver(PATCH), lambda: observer(tolerance=0.0), lambda: observer(sensors=Sensors),
+        lambda: FrictionObserver(PATCH), lambda: FrictionObserver(LEANING), lambda: observer(tolerance=0.0),
+        lambda: observer(sensors=Sensors),
         lambda: observer(batch=2).update(Measurement(0.0, np.zeros((3, 3)), 1.0)), lambda: Sensors(quantum=0.0),
         lambda: estimate().interval(1.0), lambda: Hold(None), lambda: Hold(observer(), probability=0.7),
         lambda: SlideBy(observer(), 0.0), lambda: TurnBy(observer(), []),
@@ -224,7 +239,10 @@ CALLS: dict[str, list[Callable[[], Any]]] = {
         )),
         lambda: swept(lambda status: plate(t_end=0.01), {"status": [1.0]}),
         lambda: swept(lambda time: plate(t_end=0.01), {"time": [1.0]}), lambda: swept(lambda grip: 1.0),
-        lambda: swept(3), lambda: swept(measure=3), lambda: swept(measure=lambda run: object()),
+        lambda: swept(3), lambda: swept(measure=3), lambda: swept(measure=lambda run: {"status": 1.0}),
+        lambda: swept(measure=lambda run: {3: 1.0}),
+        lambda: swept(values={"grip": range(1, 10**4), "time": range(10**5)}),
+        lambda: swept(measure=lambda run: object()),
         lambda: swept(progress=float), lambda: swept(executor=3), lambda: swept(lambda grip: 1 / 0),
         lambda: swept(out="runs.zarr"), lambda: swept(out="a\nb"),
         *(lambda path=path, value=value: Settable(plate())(**{path: value}) for path, value in (
@@ -234,6 +252,14 @@ CALLS: dict[str, list[Callable[[], Any]]] = {
             ("", 1.0),
         )),
         lambda: swept(plate(), {"body.mas": [1.0]}), lambda: swept(plate(), {"body.mass": [-1.0]}),
+    ],
+    "patches and models": [
+        lambda: dataclasses.replace(PATCH, cell_size=(-1e-3, 1e-3)), lambda: pf.DistributedModel(SOFT, FIXED),
+        lambda: pf.ContactPatch.rectangle(0.02, cells=3, pressure=np.ones(4)),
+        lambda: BOUC.rate(np.ones((2, 3)), 0.1, 1.0, axis=-1),
+        lambda: plots.plot_limit_surface(SURFACE, ax=Figure().add_subplot()),
+        lambda: TILTED.weights(2.0, moments=np.zeros((10**7, 2))),
+        lambda: export.export_c(LEANING, "pad"),
     ],
 }  # fmt: skip
 """Bad calls by their subject."""

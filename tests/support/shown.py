@@ -115,6 +115,7 @@ def figures() -> dict[str, Any]:
     return {
         **{f"patch {name}": plots.plot_patch(patch, normal_force=2.0) for name, patch in patches.items()},
         "points": plots.plot_patch(legs, normal_force=3.0, size=(3.5, 3.0)),
+        "discs": plots.plot_patch(patches["LineGradX"].discs(5), normal_force=2.0),
         "surface": plots.plot_limit_surface(cells),
         "exact surface": plots.plot_limit_surface(pf.LimitSurfaceExact(PATCH), beside=cells),
         "histories": plots.plot_histories({"one": run, "other": other}),
@@ -127,6 +128,7 @@ def figures() -> dict[str, Any]:
         "identification of two": identified(2).plot(),
         "identification of a line": identified(line=True).plot(),
         "push": pushed().plot(),
+        "wide push": pushed(Pusher(0.3, 0.02)).plot(),
         **{f"joint {name}": fit.plot() for name, fit in joints().items()},
     }
 
@@ -159,14 +161,14 @@ def joints() -> dict[str, Any]:
     }
 
 
-def pushed() -> Push:
+def pushed(pusher: Pusher = Pusher(0.3)) -> Push:  # noqa: B008
     """Push a square off its centre."""
     half = 0.045
     slider = Slider(
         pf.LimitSurfaceEllipsoid(pf.ContactPatch.rectangle(2 * half, cells=5)),
         [(-half, -half), (half, -half), (half, half), (-half, half)],
     )
-    return push(slider, Pusher(0.3), pf.Signal.sampled([0.0, 1.0], [(-0.06, 0.01), (0.0, 0.03)], "linear"))
+    return push(slider, pusher, pf.Signal.sampled([0.0, 1.0], [(-0.06, 0.01), (0.0, 0.03)], "linear"))
 
 
 def printed() -> dict[str, Any]:

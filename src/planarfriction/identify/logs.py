@@ -266,16 +266,21 @@ def one_coordinate(logs: Sequence[Log]) -> bool:
 
 def load_ratio(logs: Sequence[Log]) -> float:
     """Return the largest load over the least, of which no log has 5 % of its samples beyond."""
-    spans = np.array([np.quantile(log.normal_force[log.normal_force > 0.0], (0.05, 0.95)) for log in logs])
+    spans = np.array([np.quantile(loads(log), (0.05, 0.95)) for log in logs])
     return float(spans[:, 1].max() / spans[:, 0].min())
 
 
 def mean_load(log: Log) -> float:
     """Return the mean of the loads > 0 of a log [N], or raise InvalidValueError."""
-    loaded = log.normal_force[log.normal_force > 0.0]
-    if not len(loaded):
+    return float(loads(log).mean())
+
+
+def loads(log: Log) -> np.ndarray:
+    """Return the loads > 0 of a log [N], or raise InvalidValueError if there is none."""
+    found = log.normal_force[log.normal_force > 0.0]
+    if not len(found):
         raise InvalidValueError(f"normal_force of {log.name}", "be > 0 somewhere", "0 everywhere")
-    return float(loaded.mean())
+    return found
 
 
 def differentiated(time: ArrayLike, motion: ArrayLike, *, window: int = 7) -> np.ndarray:
