@@ -232,7 +232,8 @@ def check(path: Path, found: Any, part: str | None = None) -> None:
     """Assert that plain values are those that a file has recorded, or a part of it."""
     kept = json.loads(path.read_text(encoding="utf-8"))
     kept = kept if part is None else kept[part]
-    assert [*differences(json.loads(json.dumps(found)), kept)][:20] == []
+    wrong = [*differences(json.loads(json.dumps(found)), kept)]
+    assert not wrong, "\n".join(wrong[:20])
 
 
 def differences(found: Any, kept: Any, place: str = "") -> Iterator[str]:

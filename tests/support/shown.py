@@ -27,7 +27,7 @@ from tests.joints.test_joint_fit import PENDULUM, SERVO, servo_logs, torque_log
 from tests.support import recorded, synthetic
 from tests.support.identification_logs import PATCH, clean_log, excitation, noisy
 
-UNSURE = "compil|left out|wall time|faster than real time|steps|^delay|^bias|^zero_drift|^load_|^noise_"
+UNSURE = "compil|^left out:|wall time|faster than real time|steps|^delay|^bias|^zero_drift|^load_|^noise_"
 LEFT_OUT = re.compile(f"^.*(?:{UNSURE}).*\n", re.MULTILINE)
 """Lines that differ from run to run, or from processor to processor."""
 SPACED = re.compile(r"([ ─━])\1+")
@@ -168,7 +168,8 @@ def pushed(pusher: Pusher = Pusher(0.3)) -> Push:  # noqa: B008
         pf.LimitSurfaceEllipsoid(pf.ContactPatch.rectangle(2 * half, cells=5)),
         [(-half, -half), (half, -half), (half, half), (-half, half)],
     )
-    return push(slider, pusher, pf.Signal.sampled([0.0, 1.0], [(-0.06, 0.01), (0.0, 0.03)], "linear"))
+    ends = np.array([(-0.06, 0.01, 0.0), (0.0, 0.03, 0.1)])[:, : 3 if pusher.width else 2]
+    return push(slider, pusher, pf.Signal.sampled([0.0, 1.0], ends, "linear"))
 
 
 def printed() -> dict[str, Any]:
