@@ -9,6 +9,7 @@ import base64
 import dataclasses
 import json
 import re
+import threading
 
 import numpy as np
 import pytest
@@ -154,6 +155,24 @@ def test_pieces_by_key_have_labels(tmp_path):
         {("a", 1): lambda: {"x": 1.0}, ("b", 2): lambda: {"x": 2.0}}, "{0[0]}".format
     )
     assert found == {("a", 1): {"x": 1.0}, ("b", 2): {"x": 2.0}} and sorted(told) == ["a", "b"]
+
+
+def test_pieces_that_have_not_begun_are_left_out_after_an_interrupt():
+    begun, goes_on = [], threading.Event()
+
+    def waits(number):
+        begun.append(number)
+        if number == 0:
+            raise KeyboardInterrupt
+        goes_on.wait(5.0)
+        return {"x": float(number)}
+
+    timer = threading.Timer(0.5, goes_on.set)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        Work().pieces({number: lambda number=number: waits(number) for number in range(20)})
+    timer.join()
+    assert len(begun) <= 4  # two at a time
 
 
 def test_curves_by_their_labels():

@@ -41,7 +41,6 @@ class Shadow:
         self._results = self.plant.get_contact_results_output_port()
         force = self.plant.get_applied_generalized_force_input_port()
         self._force = force.FixValue(self._begin, np.zeros(plant.num_velocities()))
-        self._driven: dict[str, Any] = {}
         self._damping = self.dt * _damping(self.plant)
         self._frames = [self.plant.get_frame(each.frame.index()) for each in placed]
         self._others = [self.plant.get_frame(each.other.index()) for each in placed]
@@ -60,10 +59,7 @@ class Shadow:
         """Go to the beginning of a step, with what drives the plant besides generalized forces."""
         self.plant.SetPositionsAndVelocities(self._begin, state)
         for name, value in driven.items():
-            if name in self._driven:
-                self._driven[name].GetMutableData().SetFrom(value)
-            else:
-                self._driven[name] = self.plant.GetInputPort(name).FixValue(self._begin, value)
+            self.plant.GetInputPort(name).FixValue(self._begin, value)
 
     def step(self, force: np.ndarray) -> np.ndarray:
         """Return the velocities at the end of a step with generalized forces `[nv]`."""
