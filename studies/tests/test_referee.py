@@ -634,7 +634,12 @@ class StubbedNewton:
         self.collided = []
 
     def state(self):
-        return SimpleNamespace(body_f=Column((3, 6)), body_q=Column((3, 7)), body_qd=Column((3, 6)))
+        names = {"body_f": 6, "body_q": 7, "body_qd": 6, "joint_q": 7, "joint_qd": 6}
+        return SimpleNamespace(**{name: Column((3, count)) for name, count in names.items()})
+
+    def eval_ik(self, model, state, q, qd):
+        assert (q, qd) == (state.joint_q, state.joint_qd)
+        qd.assign(state.body_qd.numpy())
 
     def control(self):
         return "control"
@@ -655,7 +660,7 @@ class Column:
         self.values = np.array(values)
 
     def numpy(self):
-        return self.values
+        return self.values.copy()
 
 
 def test_a_step_of_newton_goes_on_from_the_last_one(monkeypatch):
@@ -676,6 +681,14 @@ def test_a_step_of_newton_goes_on_from_the_last_one(monkeypatch):
     about_x = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
     about_z = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
     np.testing.assert_allclose(turns, [about_x, about_z], atol=1e-12)
+
+
+def test_newton_throws_a_body_and_the_joint_that_leaves_it_free(monkeypatch):
+    stub, velocity = StubbedNewton(monkeypatch), np.arange(1.0, 7.0)
+    world = NewtonWorld(CASES["stop"], stub, [2, 0], stub, 2e-3)
+    world.throw(1, velocity)
+    for speeds in (world._now.body_qd, world._now.joint_qd):
+        np.testing.assert_array_equal(speeds.numpy(), [velocity, np.zeros(6), np.zeros(6)])
 
 
 SOURCES = {
