@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from planarfriction.compiled.distributed import CompiledDistributed
@@ -30,7 +32,7 @@ def following(
     blanks = {"pressed": count, "trial": count, "scratch": size, "zero": size, "rows": 12}
     scratch = {name: np.zeros(length) for name, length in blanks.items()}
     by_load = {"weights": weights, "middle": middle, "slope_x": slopes[0], "slope_y": slopes[1]}
-    arrays = {"x": x, "y": y, "calls": calls_of(packed.functions, change=True)} | scratch | by_load
+    arrays: dict[str, Any] = {"x": x, "y": y, "calls": calls_of(packed.functions, change=True)} | scratch | by_load
     cells, trial_cells = (row_of(compiled.record(numbers, scratch[name])[0]) for name in ("pressed", "trial"))
     record = FollowingContact(
         **arrays, count=count, states=packed.states, cells=place_of(cells), trial_cells=place_of(trial_cells),

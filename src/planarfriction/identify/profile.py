@@ -57,7 +57,7 @@ def _stretch(fit: Fit, i: int, way: np.ndarray, sign: float) -> float:
             return np.append(rows, STIFF * off), np.concatenate([slopes, STIFF * slope[None]])
 
         start = fit.values + way * (target - fit.values[i]) / way[i]
-        search = Descent(held, coordinates.of(start), SETTLED / max(fit.cost, 1.0))
+        search: Descent = Descent(held, coordinates.of(start), SETTLED / max(fit.cost, 1.0))
         search.run(coordinates.bounds())
         rise: float = search.cost - fit.cost
         factor *= min(max(np.sqrt(wanted / max(rise, 1e-9)), 1.0), 2.0)
