@@ -6,6 +6,7 @@ import copy
 import pickle
 import random
 
+import numpy as np
 import some
 from attack import attack, folder
 from judge import Broken, judge
@@ -42,8 +43,20 @@ def test_scenes_run_and_come_back(draw: random.Random) -> None:
     for again in (read, pickle.loads(pickle.dumps(scene)), copy.deepcopy(scene)):
         if again is None or again != scene or again.digest() != scene.digest():
             raise Broken("the scene is not what was written")
-    if not same(pf.simulate(read, bristles="all"), solution):
-        raise Broken("the scene that was read runs otherwise")
+    again = pf.simulate(read, bristles="all")
+    if not same(again, solution):
+        raise Broken(f"the scene that was read runs otherwise: {told(scene, solution, again)}")
+
+
+def told(scene: pf.Scene, first: pf.Solution, second: pf.Solution) -> str:
+    """What differs and by how much, and which of the two a third run is like."""
+    third = pf.simulate(scene, bristles="all")
+    like = " and ".join(word for word, each in (("first", first), ("second", second)) if same(third, each)) or "neither"
+    if len(first.data.time) != len(second.data.time):
+        return f"{len(first.data.time)} samples, then {len(second.data.time)}; a third run is like {like}"
+    pairs = ((name, first.data[name].values, second.data[name].values) for name in sorted(first.data.variables))
+    apart = [f"{name} {np.abs(a - b).max():.1e}" for name, a, b in pairs if a.dtype.kind == "f" and (a != b).any()]
+    return f"{first.status}, {second.status}, {', '.join(apart)}; a third run is like {like}"
 
 
 @attack("round trips", 150)
