@@ -254,7 +254,7 @@ def test_every_other_control_changes_what_is_said(visitor):
     visitor.after(lambda: visitor.fill("sigma_2", "3"))
     assert visitor.says("sigma_2=3")
     visitor.after(lambda: visitor.choose("law", "dahl"))
-    assert visitor.says("pf.Dahl(") and visitor.page.locator(".parameter").count() == 2
+    assert visitor.says("pf.Dahl(") and visitor.page.locator(".parameter").count() == 3
     for name in ("vx", "vy", "omega"):
         visitor.after(lambda name=name: visitor.page.locator(f".{name} .noUi-handle").press("ArrowRight"))
 
