@@ -12,7 +12,7 @@ from planarfriction.compiled import packed
 from planarfriction.compiled.base import CompiledModel
 from planarfriction.compiled.packed import PackedModel, cells_by_load, driven, linearised
 from planarfriction.compiler.memory import places_of, rows_of, size_of
-from planarfriction.kernels.cell_steps import functions_of_cells
+from planarfriction.kernels.cell_steps import fixed_rates_of, functions_of_cells
 from planarfriction.kernels.cells import CellsContact
 from planarfriction.kernels.contacts import ModelFunctions
 from planarfriction.kernels.discs import KAPPA
@@ -36,9 +36,7 @@ class CompiledDistributed(CompiledModel):
         """Load [N] of `reference_load`, or 0."""
         self._contact, functions = self._functions()
         if self.reference > 0.0:
-            from planarfriction.kernels import fixed_stiffness
-
-            self._contact = fixed_stiffness.fixed_rates_of(self.size, patch.anisotropic, patch.asymmetric)
+            self._contact = fixed_rates_of(self.size, patch.anisotropic, patch.asymmetric)
         cells = len(patch.positions)
         super().__init__(functions, (self.size, cells), (self.size, self.size, cells))
 

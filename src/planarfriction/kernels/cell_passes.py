@@ -65,7 +65,7 @@ class CellKind(NamedTuple):
     linear: bool = True
     """See `general_cells.Bristle`."""
     fixed: bool = False
-    """True for a fixed stiffness, whose factor comes in place of dt (see `fixed_stiffness`)."""
+    """True for a fixed stiffness, whose factor comes in place of dt (see `cell_steps`)."""
 
 
 @kernel

@@ -2,6 +2,10 @@
 
 A cell sees the velocity `u = B V` of its lever B (see `cells.Lever`) and adds `w B' t` to the wrench, t being its
 traction (docs/physics.md, "Distributed model").
+
+A bristle whose stiffness does not grow with the load (docs/physics.md, "Stiffness and load") moves as one of the
+published law at `l z` with `l = f_ref/f` (see `settle`), and besides returns to its limit where a falling load has left
+it beyond. The factor l comes behind the twist.
 """
 
 from __future__ import annotations
@@ -11,13 +15,25 @@ from typing import Any
 
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, Place, at
-from planarfriction.kernels import cells, general_cells
+from planarfriction.formulas import LawNumbers
+from planarfriction.kernels import cells, general_cells, leaning_cells
 from planarfriction.kernels.cell_blocks import LANES, divided, scratch
-from planarfriction.kernels.cell_passes import DISC, KINDS, CellKind, Rows, rate_passes, slope_passes, step_passes
+from planarfriction.kernels.cell_passes import (
+    DISC,
+    KINDS,
+    CellKind,
+    Element,
+    Rows,
+    rate_passes,
+    slope_passes,
+    step_passes,
+)
 from planarfriction.kernels.cells import CellsContact
 from planarfriction.kernels.contacts import ModelFunctions, functions_of
+from planarfriction.kernels.leaning_cells import Leaning
+from planarfriction.kernels.settle import recovery
 from planarfriction.kernels.steps import StepFunctions, step_functions
-from planarfriction.kernels.vectors import Vector, clear, copy, plus, put, three
+from planarfriction.kernels.vectors import Vector, clear, copy, norm, plus, put, three, times
 
 RESULTS = LANES * 4 * DISC.size**2
 """Numbers of the results of a block of cells: derivatives of rates and tractions, or rates or bristles, row by row."""
@@ -129,3 +145,46 @@ def steps_of(kind: CellKind, read: Any) -> StepFunctions:
     slopes = general_cells.slopes_of(kind.element.step, kind.element.size)
     loops = {"advance": step_passes(kind).run, "linearise": slopes}
     return step_functions(kind.name, (step, general_cells.slopes), **_model_of(kind, read), **loops)
+
+
+# ---------------------------------------------------------------------- of a fixed stiffness
+
+
+@kernel
+def _itself(law: LawNumbers) -> LawNumbers:
+    return law
+
+
+@kernel
+def _law_of(lean: Leaning) -> LawNumbers:
+    return lean.law
+
+
+@kernel
+def _bent(law: LawNumbers, z: Vector) -> Vector:
+    return z
+
+
+def _recovering(kind: CellKind) -> Element:
+    """Return the bristle that recovers from beyond its limit, from the rate and the traction of the published one."""
+    published, numbers, out = kind.element.evaluate, _itself, _bent  # seen from the middle of its limit
+    if kind.leans:
+        numbers, out = _law_of, leaning_cells.out if kind.element.size == 2 else leaning_cells.out_of_disc
+
+    @kernel
+    def evaluate(law: LawNumbers | Leaning, z: Vector, u: Vector, factor: float) -> tuple[Vector, Vector]:
+        bent = times(factor, z)
+        rate, traction = published(law, bent, u)
+        plain, beyond = numbers(law), out(law, bent)
+        k = recovery(plain, beyond, norm(u))
+        return plus(rate, -k, beyond), plus(traction, plain.sigma_1 * k, beyond)
+
+    return Element(f"recovering {kind.element.name}", kind.element.size, evaluate, None)
+
+
+@functools.cache
+def fixed_rates_of(size: int, turned: bool, leans: bool) -> ModelFunctions:
+    """Return the functions of the solver for contacts of a kind of cells (see `KINDS`) with a fixed stiffness."""
+    kind = KINDS[size, turned, leans]
+    fixed = kind._replace(name=f"fixed_{kind.name}", element=_recovering(kind), linear=False, fixed=True)
+    return rates_of(fixed, cells.read)

@@ -1,4 +1,4 @@
-"""States of bristles whose stiffness does not grow with the load, and their steps (see `fixed_stiffness`).
+"""States of bristles whose stiffness does not grow with the load, and their steps (see `cell_steps`).
 
 With the stiffness `K = sigma_0 f_ref` [N/m] a patch under the load f is the published one with `sigma_0 l`, `l =
 f_ref/f`, in place of `sigma_0`. Rates and tractions per unit load then follow the published law at l times the
