@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from planarfriction import validation
 from planarfriction.compiled.packed import PackedModel
 from planarfriction.compiler.calls import address_of
-from planarfriction.compiler.memory import places_of, row_of
+from planarfriction.compiler.memory import Layout, Packed, places_of
 from planarfriction.compiler.threads import share
 from planarfriction.equality import ByValue, by_parts
 from planarfriction.errors import InvalidValueError
@@ -196,7 +196,7 @@ class CoupledPatches(ByValue):
         batch = axes["state"]
         if any(each != batch for each in axes.values()):
             batch = validation.common_shape("batch axes", axes.values())
-        count, words = math.prod(batch), self._packed.words
+        count, words = math.prod(batch), self._packed.layout.size
         if count * words > validation.MOST_NUMBERS:
             rule = f"hold at most {validation.MOST_NUMBERS // words} environments of these patches"
             raise InvalidValueError("batch axes", rule, list(batch))
@@ -210,7 +210,7 @@ class CoupledPatches(ByValue):
     def _check_follows(self, patches: Sequence[int] | None = None) -> None:
         """Raise InvalidValueError for `patches`, all if None, whose pressure cannot follow moments."""
         for p in range(len(self.models)) if patches is None else patches:
-            if self._packed.counts[p] == 0:
+            if not follows(self.models[p]):
                 rule = "be None: a patch without cells cannot follow them while its shape follows the load"
                 if self.models[p].law.reference_load is not None:
                     rule = "be None for a law with a reference_load"
@@ -242,7 +242,7 @@ class CoupledPatches(ByValue):
 
     def _once(self, problems: np.ndarray) -> np.ndarray:
         """Solve all problems with the shapes that they hold."""
-        row, most = self._packed.row, len(problems) * len(self.models) // _WORTH_A_THREAD
+        row, most = self._packed.patches.words, len(problems) * len(self.models) // _WORTH_A_THREAD
         share(len(problems), most, lambda first, last: kernels.solve_batch(row, problems, first, last))
         return problems[:, self._parts["iterations"].start].astype(int)
 
@@ -273,7 +273,7 @@ class CoupledPatches(ByValue):
         The host gives the moments of those whose pressure `follows` them.
         """
         self._check_follows([p for p, follow in enumerate(follows) if follow])
-        row, parts = np.zeros((1, self._packed.words)), self._parts
+        row, parts = np.zeros((1, self._packed.layout.size)), self._parts
         row.view(np.int64)[:, parts["records"]] = self._packed.records
         row[:, parts["tolerance"]], row[:, parts["most"]], row[:, parts["follows"]] = TOLERANCE, ITERATIONS, follows
         row[:, parts["again"]] = 1.0
@@ -295,66 +295,51 @@ class CoupledPatches(ByValue):
 
     @property
     def _parts(self) -> dict[str, slice]:
-        return self._packed.parts
+        return self._packed.layout.slices
 
 
 class _PackedPatches(NamedTuple):
     """Patches as compiled code sees them."""
 
-    row: np.ndarray
-    """Words of the `Patches` of compiled code."""
-    parts: dict[str, slice]
-    """Slices of the row of a problem, by the names of its parts."""
-    words: int
-    """Length of that."""
+    patches: Packed
+    """`Patches` of compiled code."""
+    layout: Layout
+    """Layout of the row of a problem."""
     records: np.ndarray
     """Addresses of the patches' records, int `[k]`; 0 of those that follow their loads."""
-    following: list[int]
-    """Patches whose shapes follow their loads."""
-    counts: np.ndarray
-    """Points of each patch that share its load; 0 of one that cannot follow moments, `[k]`."""
     sizes: np.ndarray
     """Words of the patches' records, int `[k]`; 0 of those that follow their loads."""
-    kept: list[Any]
+    following: list[int]
+    """Patches whose shapes follow their loads."""
+    kept: list[PackedModel | None]
     """Objects behind the addresses, which have to be kept alive."""
 
 
 def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatches:
-    functions = [model.compiled.functions for model in models]
-    steps = np.array([address_of(each.step) for each in functions], np.int64)
-    slopes = np.array([address_of(each.slopes) for each in functions], np.int64)
-    (records, sizes), known = np.zeros((2, len(models)), np.int64), {}
-    following = [p for p, model in enumerate(models) if model.depends_on_load]
-    for p, model in enumerate(models):
-        if p not in following:
-            packed = known.setdefault(id(model), None) or model.compiled.with_all_states([None])
-            known[id(model)] = packed
-            (records[p],), sizes[p] = places_of(packed.records), packed.records.shape[1]
-    # all cells, whatever load they carry: a lever arm that does not follow the load
-    radius = np.array([lever_of(model) for model in models])
-    references = np.array([model.law.reference_load or 0.0 for model in models], float)
-    bristles = np.array([model.state_shape[0] for model in models], np.int64)
-    places, words = zip(*(model.compiled.points() for model in models), strict=True)
+    compiled = [model.compiled for model in models]
+    fixed = [each.fixed for each in compiled]
+    records = np.array([0 if each is None else places_of(each.records)[0] for each in fixed], np.int64)
+    sizes = np.array([0 if each is None else each.records.shape[1] for each in fixed], np.int64)
+    places, words = zip(*(each.points() for each in compiled), strict=True)
     x, y = (np.ascontiguousarray(each) for each in np.concatenate(places).T)
     followers = Followers(x, y, np.cumsum([0, *map(len, places)]), np.array(words, np.int64))
-    firsts = bounds.astype(np.int64)
     rows = layout(len(models), int(bounds[-1]), len(followers.x), int(followers.words.sum()))
     patches = Patches(
         count=len(models),
         states=int(bounds[-1]),
         solve=address_of(kernels.solve),
-        steps=steps,
-        slopes=slopes,
-        firsts=firsts,
-        radius=radius,
-        reference=references,
-        bristle=bristles,
+        steps=np.array([address_of(each.functions.step) for each in compiled], np.int64),
+        slopes=np.array([address_of(each.functions.slopes) for each in compiled], np.int64),
+        firsts=bounds.astype(np.int64),
+        # all cells, whatever load they carry: a lever arm that does not follow the load
+        radius=np.array([lever_of(model) for model in models]),
+        reference=np.array([model.law.reference_load or 0.0 for model in models], float),
+        bristle=np.array([model.state_shape[0] for model in models], np.int64),
         followers=followers,
         row=rows.offsets,
     )
-    kept = [steps, slopes, firsts, radius, references, bristles, *followers, *known.values()]
-    counts = np.diff(followers.firsts)
-    return _PackedPatches(row_of(patches), rows.slices, rows.size, records, following, counts, sizes, kept)
+    following = [p for p, each in enumerate(fixed) if each is None]
+    return _PackedPatches(Packed(patches), rows, records, sizes, following, fixed)
 
 
 def follows(model: FrictionModel) -> bool:

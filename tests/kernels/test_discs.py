@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planarfriction import ContactPatch, DistributedModel, LuGre, formulas
-from planarfriction.kernels import cell_passes, disc_cells, discs, points
+from planarfriction.kernels import cell_passes, cells, discs, points
 from planarfriction.kernels.cell_blocks import LANES
 from planarfriction.kernels.twins import twin
 
@@ -125,9 +125,9 @@ def test_passes_step_as_the_function_they_come_from(count):
     total = np.zeros(3)
     for i, (x, y) in enumerate(places):
         cell = x, y, KAPPA * radii[i]
-        expected, traction = step(LAW, tuple(z[:, i]), twin(disc_cells._seen)(cell, twist), 1e-4)
+        expected, traction = step(LAW, tuple(z[:, i]), twin(cells.DISC_POSITIONS.seen)(cell, twist), 1e-4)
         assert new[:, i] == pytest.approx(expected, rel=1e-11, abs=1e-18)
-        total += 2.0 * patch.weights()[i] * np.array(twin(disc_cells._wrench)(cell, traction))
+        total += 2.0 * patch.weights()[i] * np.array(twin(cells.DISC_POSITIONS.wrench)(cell, traction))
     assert wrench == pytest.approx(total, rel=1e-11, abs=1e-13)
 
 

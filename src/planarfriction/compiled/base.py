@@ -89,27 +89,14 @@ class CompiledModel:
         """The model at any load; None if that changes its shape."""
         return None if self.depends_on_load else self.with_all_states([None])
 
-    def at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, PackedModel]]:
-        """Yield rows of the flat batch, and the model at the load of each row or at the one load of all.
-
-        Rows without load may be left out; their results are zero.
-        """
-        raise NotImplementedError
-
     def pressed(
-        self, load: np.ndarray, centre: np.ndarray | None
+        self, load: np.ndarray, centre: np.ndarray | None = None
     ) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
-        """Yield as `at_each_load`, with pressures about the centres `[..., 2]` [m], and the offsets of patches.
+        """Yield rows of the flat batch, the model at the load of each row or at the one load of all, and offsets.
 
-        Patches move `[rows, 2]` [m] whose pressure keeps its shape; None if none does.
+        Pressures are about the centres `[..., 2]` [m], if given: patches whose pressure keeps its shape move by offsets
+        `[rows, 2]` [m], None else. Rows without load may be left out; their results are zero.
         """
-        if centre is None:
-            for rows, contact in self.at_each_load(load):
-                yield rows, contact, None
-            return
-        yield from self._following(load, centre.reshape(-1, 2))
-
-    def _following(self, load: np.ndarray, centre: np.ndarray) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
         raise NotImplementedError
 
     def points(self) -> tuple[np.ndarray, int]:

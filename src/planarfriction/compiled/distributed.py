@@ -10,14 +10,14 @@ import numpy as np
 
 from planarfriction.compiled import packed
 from planarfriction.compiled.base import CompiledModel
-from planarfriction.compiled.packed import PackedModel, driven, linearised
-from planarfriction.compiled.shapes_by_load import ShapesByLoad, cells_by_load
+from planarfriction.compiled.packed import PackedModel, cells_by_load, driven, linearised
 from planarfriction.compiler.memory import places_of, rows_of, size_of
-from planarfriction.kernels.cell_steps import functions_of_cells
+from planarfriction.kernels.cell_steps import fixed_rates_of, functions_of_cells
 from planarfriction.kernels.cells import CellsContact
 from planarfriction.kernels.contacts import ModelFunctions
 from planarfriction.kernels.discs import KAPPA
 from planarfriction.kernels.general_cells import LINEAR, MATRICES, A, C, E, F
+from planarfriction.kernels.rollouts import ShapesByLoad
 from planarfriction.kernels.steps import StepFunctions
 from planarfriction.patch.tilt import tilted
 
@@ -36,9 +36,7 @@ class CompiledDistributed(CompiledModel):
         """Load [N] of `reference_load`, or 0."""
         self._contact, functions = self._functions()
         if self.reference > 0.0:
-            from planarfriction.kernels import fixed_stiffness
-
-            self._contact = fixed_stiffness.fixed_rates_of(self.size, patch.anisotropic, patch.asymmetric)
+            self._contact = fixed_rates_of(self.size, patch.anisotropic, patch.asymmetric)
         cells = len(patch.positions)
         super().__init__(functions, (self.size, cells), (self.size, self.size, cells))
 
@@ -53,22 +51,25 @@ class CompiledDistributed(CompiledModel):
 
     # ------------------------------------------------------------------ at given loads
 
-    def at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, PackedModel]]:
+    def pressed(
+        self, load: np.ndarray, centre: np.ndarray | None = None
+    ) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
         """See `CompiledModel`; all rows at once, each with its own weights."""
-        yield slice(None), self.fixed or self._packed(self.patch.weights(load.reshape(-1)))
+        contact = self.fixed if centre is None else None
+        if contact is None:
+            weights = self.patch.weights(load.reshape(-1))
+            moved = weights if centre is None else tilted(self.patch.positions, weights, centre.reshape(-1, 2))
+            contact = self._packed(moved)
+        yield slice(None), contact, None
 
     def points(self) -> tuple[np.ndarray, int]:
         """See `CompiledModel`."""
         size = size_of(type(self.record(np.zeros((2, 1)), np.zeros(1))[0]))
         return self.patch.positions[: 0 if self.reference > 0.0 else None], size
 
-    def _following(self, load: np.ndarray, centre: np.ndarray) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
-        weights = tilted(self.patch.positions, self.patch.weights(load.reshape(-1)), centre)
-        yield slice(None), self._packed(weights), None
-
     def linearisation(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
         """Return linearisations `[..., L, N]` of `kernels.general_cells`."""
-        ((_, contact),) = self.at_each_load(load)
+        ((_, contact, _),) = self.pressed(load)
         cells = state.shape[-1]
         seen = driven(contact, twist.reshape(-1, 3), load.reshape(-1))
         lin = linearised(contact, state.reshape(load.size, self.size * cells), seen)
@@ -137,10 +138,7 @@ class CompiledDistributed(CompiledModel):
         )  # fmt: skip
 
     def numbers(self, chosen: Any = slice(None)) -> np.ndarray:
-        """Return the numbers of the chosen cells, or of all, as their levers read them, `[numbers, n]`.
-
-        Points: `kernels.cells`; discs: `kernels.disc_cells`.
-        """
+        """Return the numbers `[numbers, n]` of cells, chosen or all, as levers (see `kernels.cells`) read them."""
         levers = self.patch.levers()[chosen]
         spin = levers[:, 2:, 2].T
         if not self.patch.anisotropic:

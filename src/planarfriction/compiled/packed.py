@@ -10,8 +10,9 @@ from planarfriction.compiler.calls import address_of
 from planarfriction.compiler.memory import place_of, row_of
 from planarfriction.equality import by_parts
 from planarfriction.formulas import LIGHTEST
-from planarfriction.kernels import batched_rates
-from planarfriction.kernels.steps import Stepped
+from planarfriction.kernels.cell_blocks import LANES, divided
+from planarfriction.kernels.rollouts import ShapesByLoad
+from planarfriction.kernels.steps import Stepped, linearise_many, rates_many
 
 MAX_PACK_BYTES = 64e6
 """Bytes of shapes that a model packs at a time, if that is more than one shape."""
@@ -79,7 +80,7 @@ def rates(packed: PackedModel, state: np.ndarray, twist: np.ndarray) -> tuple[np
     """
     rate, wrench = np.empty((len(twist), packed.states)), np.empty((len(twist), 3))
     function = address_of(packed.functions.evaluate)
-    batched_rates.evaluate(function, packed.records, state.reshape(rate.shape), twist, rate, wrench)
+    rates_many(function, packed.records, state.reshape(rate.shape), twist, rate, wrench)
     return rate.reshape(state.shape), wrench
 
 
@@ -87,5 +88,20 @@ def linearised(packed: PackedModel, state: np.ndarray, twist: np.ndarray) -> np.
     """Return linearisations `[B, workspace]`; the kernels of each kind of model describe the numbers."""
     lin = np.empty((len(twist), packed.workspace))
     function = address_of(packed.functions.linearise)
-    batched_rates.linearise(function, packed.records, state.reshape(len(twist), packed.states), twist, lin)
+    linearise_many(function, packed.records, state.reshape(len(twist), packed.states), twist, lin)
     return lin
+
+
+def cells_by_load(levers: np.ndarray, weights: np.ndarray, by_load: np.ndarray | None) -> ShapesByLoad:
+    """Pack cells by the numbers of their levers `[K, N]` and weights `[L, N]` at L loads, with slopes or zeros."""
+    numbers, cells = levers.shape
+    blocks, lanes = divided.py_func(cells)
+    padded = np.zeros((numbers, blocks * lanes))
+    padded[:, :cells] = levers
+    data = np.zeros((blocks, numbers, LANES))
+    data[:, :, :lanes] = padded.reshape(numbers, blocks, lanes).swapaxes(0, 1)
+    shapes, slopes = np.zeros((2, len(weights), blocks * lanes))
+    shapes[:, :cells] = weights
+    if by_load is not None:
+        slopes[:, :cells] = by_load
+    return ShapesByLoad(np.zeros(3, dtype=int), shapes, slopes, data.ravel())

@@ -45,19 +45,16 @@ class CompiledPublished(CompiledModel):
         for value in np.unique(flat[flat > 0.0]):
             yield flat == value, self.shapes.shape_at(value)
 
-    def at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, PackedModel]]:
-        """See `CompiledModel`."""
+    def pressed(
+        self, load: np.ndarray, centre: np.ndarray | None = None
+    ) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
+        """See `CompiledModel`; the patch moves as a whole to the centre of pressure."""
         for rows, shape in self.shape_at_each_load(load):
-            yield rows, self._at(shape)
+            yield rows, self._at(shape), None if centre is None else centre.reshape(-1, 2)[rows] - shape.place
 
     def points(self) -> tuple[np.ndarray, int]:
         """See `CompiledModel`."""
         return np.empty((0, 2)) if self.depends_on_load else self.shapes.shape_at(None).place[None], 0
-
-    def _following(self, load: np.ndarray, centre: np.ndarray) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
-        """Move the patch as a whole to the centre of pressure."""
-        for rows, shape in self.shape_at_each_load(load):
-            yield rows, self._at(shape), centre[rows] - shape.place
 
     def linearisation(self, shape: Any, state: np.ndarray, twist: np.ndarray) -> np.ndarray:
         """Return linearisations `[B, L]` at flat states and twists (see `published_contact.LinearPublished`)."""

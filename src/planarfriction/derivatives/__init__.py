@@ -20,9 +20,8 @@ from planarfriction.derivatives.rollouts import (
     rollout_states,
     rollout_vjp,
 )
-from planarfriction.derivatives.scene_gradient import SceneGradient, scene_gradient
 from planarfriction.derivatives.scene_inputs import SCENE_PARAMETERS
-from planarfriction.derivatives.scene_sensitivities import SceneSensitivities, scene_sensitivities
+from planarfriction.derivatives.scenes import SceneGradient, SceneSensitivities, scene_gradient, scene_sensitivities
 
 __all__ = [
     "PARAMETERS",

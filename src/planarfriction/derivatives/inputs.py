@@ -9,11 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.compiled.shapes_by_load import ShapesByLoad
 from planarfriction.compiler import threads
 from planarfriction.derivatives.parameters import Packed, pack
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.rollouts import Inputs
+from planarfriction.kernels.rollouts import Inputs, ShapesByLoad
 
 _WORTH_A_THREAD = 20_000
 """Steps [-] below which starting a thread costs more than it saves."""
@@ -48,20 +47,17 @@ class RolloutInputs(NamedTuple):
 
     def compiled(self, slopes: bool = False) -> Inputs:
         """Return the inputs as compiled loops take them, with the `slopes` of the weights of cells by the load."""
-        shapes, which = self.model.shapes, np.zeros((1, len(self.dt)), dtype=int)
+        shape, which = self.model.shapes, np.zeros((1, len(self.dt)), dtype=int)
         if own := self.model.batch:
             each = np.broadcast_to(np.arange(math.prod(own)).reshape(own), self.batch).reshape(-1, 1)
             which = np.repeat(each, len(self.dt), axis=1)
-        if not isinstance(shapes, ShapesByLoad):
+        if not isinstance(shape, ShapesByLoad):
             loads, which = np.unique(self.normal_force, return_inverse=True)
             which = which.reshape(self.normal_force.shape)
             if (loads[:1] == 0.0).any():  # any shape does for a step without load, but for its slope
                 loads[0] = loads[1] if len(loads) > 1 and not slopes else LIGHTEST
-            shapes = shapes(loads if len(loads) else np.array([LIGHTEST]), slopes)
-        return Inputs(
-            self.rows, shapes.data, self.twist, self.normal_force, self.dt, which,
-            shapes.surface, shapes.shapes, shapes.by_load, self.model.reference,
-        )  # fmt: skip
+            shape = shape(loads if len(loads) else np.array([LIGHTEST]), slopes)
+        return Inputs(self.rows, shape, self.twist, self.normal_force, self.dt, which, self.model.reference)
 
 
 def sequences(twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

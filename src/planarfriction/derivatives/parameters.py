@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.compiled.shapes_by_load import ShapesByLoad, cells_by_load
+from planarfriction.compiled.packed import cells_by_load
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
@@ -17,6 +17,7 @@ from planarfriction.kernels import cells_rollout, published_step
 from planarfriction.kernels.cell_kinds import rollouts_of_cells
 from planarfriction.kernels.law import LAW
 from planarfriction.kernels.published_rollouts import gradient, rollout, sensitivities, tangent
+from planarfriction.kernels.rollouts import ShapesByLoad
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModelPublished
 from planarfriction.models.reduced_published import axes_of

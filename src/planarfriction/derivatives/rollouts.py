@@ -15,7 +15,7 @@ from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.kernels.cell_blocks import divided
-from planarfriction.kernels.rollouts import Bars, Derivatives, Inputs
+from planarfriction.kernels.rollouts import Bars, Derivatives, Inputs, ShapesByLoad
 from planarfriction.models import FrictionModel
 
 ArrayT = TypeVar("ArrayT")
@@ -286,17 +286,18 @@ def _on_the_way(inputs: RolloutInputs, states: Any) -> np.ndarray:
 
 def _differentiate(model: Packed, inputs: Inputs, z: np.ndarray, out: Derivatives) -> None:
     """Run rollouts with their derivatives by numbers of the model: contacts, or the blocks of one, on threads."""
-    run, (blocks, lanes) = model.family.sensitivities, divided.py_func(max(inputs.shapes.shape[1], 1))
+    run, whole = model.family.sensitivities, inputs.shape
+    blocks, lanes = divided.py_func(max(whole.weights.shape[1], 1))
     if blocks == 1 or len(z) > 1:
         share(inputs, len(z), lambda *span: run(inputs, span, z, out))
         return
-    state, data = z.reshape(1, model.inner[0], -1), inputs.data.reshape(blocks, -1)
+    state, data = z.reshape(1, model.inner[0], -1), whole.data.reshape(blocks, -1)
 
     def one(k: int) -> Derivatives:
         cells = slice(k * lanes, (k + 1) * lanes)
         part, sums = state[..., cells].reshape(1, -1), Derivatives(out.columns, *map(np.zeros_like, out[1:]))
-        shapes, by_load = (np.ascontiguousarray(each[..., cells]) for each in (inputs.shapes, inputs.by_load))
-        run(inputs._replace(data=data[k], shapes=shapes, by_load=by_load), (0, 1), part, sums)
+        weights, by_load = (np.ascontiguousarray(each[..., cells]) for each in (whole.weights, whole.by_load))
+        run(inputs._replace(shape=ShapesByLoad(whole.surface, weights, by_load, data[k])), (0, 1), part, sums)
         state[..., cells] = part.reshape(1, model.inner[0], -1)
         return sums
 

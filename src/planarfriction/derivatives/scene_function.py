@@ -12,7 +12,7 @@ from planarfriction import validation
 from planarfriction.compiler import threads
 from planarfriction.derivatives.path import RTOL, KeptMotion
 from planarfriction.derivatives.scene_inputs import SCENE_PARAMETERS, STATES, SceneInputs
-from planarfriction.derivatives.scene_sensitivities import scene_sensitivities
+from planarfriction.derivatives.scenes import scene_sensitivities
 from planarfriction.errors import InvalidValueError
 from planarfriction.scenes.contact import Contact, with_friction
 from planarfriction.scenes.options import SolverOptions

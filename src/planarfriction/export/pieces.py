@@ -14,7 +14,7 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.errors import InvalidValueError
 from planarfriction.export.twins import twin
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, cells_rollout, disc_cells, discs, points, published_step
+from planarfriction.kernels import cells, cells_rollout, discs, points, published_step
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.law import grip
 from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, Root
@@ -184,15 +184,15 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     numbers, law, size = model.compiled.numbers(), model.law.numbers, model.compiled.size
     more = max(count - model.patch.cells, 0)
     n = model.patch.cells + more
-    kind, cell, sliding = cells, points.step, _sliding
+    levers, cell, sliding = (cells.POSITIONS, cells.LEVERS), points.step, _sliding
     if size == 3:
-        kind, sliding = disc_cells, discs.sliding if precision == "double" else _sliding_of_disc
-        cell = _with(discs.step, sliding=sliding)
+        sliding = discs.sliding if precision == "double" else _sliding_of_disc
+        levers, cell = (cells.DISC_POSITIONS, cells.DISC_LEVERS), _with(discs.step, sliding=sliding)
     reference, by = model.compiled.reference, cells_rollout.by_of("law")
     fixed = reference > 0.0
     moved, by = (_settled(cell, reference, LIGHTEST[precision] * reference), (*by, "load")) if fixed else (cell, by)
     given = ("dt", "normal_force") if fixed else ("dt",)
-    lever = twin(kind.LEVERS if model.patch.anisotropic else kind.POSITIONS)
+    lever = twin(levers[model.patch.anisotropic])
     names = ["place_x", "place_y"]
     if model.patch.anisotropic:
         names = ["lever_xx", "lever_xy", "lever_yy", "lever_x", "lever_y"]

@@ -14,7 +14,6 @@ from numba.extending import intrinsic
 
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, at
-from planarfriction.kernels.cells import Lever
 from planarfriction.kernels.vectors import Vector, plus
 
 VECTOR = 8
@@ -40,22 +39,6 @@ def divided(count: int) -> tuple[int, int]:
     return blocks, -(-count // (blocks * VECTOR)) * VECTOR
 
 
-class Block(NamedTuple):
-    """A block as `cells.Lever` reads it."""
-
-    cells: Any
-    count: int
-
-
-class StepBars(NamedTuple):
-    """Cotangents of a step that add up over the cells."""
-
-    twist: tuple
-    load: float
-    law: tuple
-    """In the order of `cells_rollout.PARAMETERS`."""
-
-
 class Limit(NamedTuple):
     """Compiled functions of the limit of a bristle with a fixed stiffness (see `settle`)."""
 
@@ -75,13 +58,12 @@ class Kind(NamedTuple):
     size: int
     """Components of a bristle."""
     advance: Any
-    """`(lever, law, w, blocks, lanes, twist, dt)`: step the cells, and return their wrench."""
+    """`(law, twist, (dt,), block, lanes)`: step the cells of a block, and return their wrench."""
     retreat: Any
-    """`(lever, law, block, lanes, interval, pull, load)`: carry the cotangent of the state over the step of
-    an interval, its twist and dt; return `StepBars`."""
+    """`(law, twist, (dt, load, 1 or 0 without load, pull[3]), block, lanes)`: carry the cotangent of the state over a
+    step; return the sums of `cell_passes.backward_passes`."""
     shares: Any
-    """`(law, block, lanes, interval, pull, load)`: add the derivatives of `load pull . wrench` of a step by the weights
-    of cells to the field `OUT`."""
+    """Arguments as of `retreat`: add the derivatives of `load pull . wrench` of a step by the weights to `OUT`."""
     pushed: Any
     """`(law, z, u, dt, dz, du, changes of the law)`: step a cell and its change."""
     law: Any
@@ -89,12 +71,6 @@ class Kind(NamedTuple):
     limit: Limit
     vector: Any
     """`(row, first, stride)`: return the components of a bristle."""
-
-
-@kernel
-def lever_at(lever: Lever, block: Doubles, i: int) -> Vector:
-    """Return the numbers of the lever of cell i."""
-    return lever.of(Block(block, LANES), i)
 
 
 @kernel

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, disc_cells, discs, leaning_cells, points, settle
+from planarfriction.kernels import cells, discs, leaning_cells, points, settle
 from planarfriction.kernels.cell_blocks import BAR, BY_LOAD, LANES, OUT, WEIGHT, Z
 from planarfriction.kernels.cells import CellsContact, Lever
 from planarfriction.kernels.cells_rollout import by_of
@@ -65,7 +65,7 @@ class CellKind(NamedTuple):
     linear: bool = True
     """See `general_cells.Bristle`."""
     fixed: bool = False
-    """True for a fixed stiffness, whose factor comes in place of dt (see `fixed_stiffness`)."""
+    """True for a fixed stiffness, whose factor comes in place of dt (see `cell_steps`)."""
 
 
 @kernel
@@ -76,10 +76,10 @@ def _leaning(contact: CellsContact, i: int) -> Leaning:
 KINDS = {
     (2, False, False): CellKind("isotropic", POINT, cells.POSITIONS, 2),
     (2, True, False): CellKind("turned", POINT, cells.LEVERS, 5),
-    (3, False, False): CellKind("discs", DISC, disc_cells.POSITIONS, 3),
-    (3, True, False): CellKind("turned_discs", DISC, disc_cells.LEVERS, 6),
+    (3, False, False): CellKind("discs", DISC, cells.DISC_POSITIONS, 3),
+    (3, True, False): CellKind("turned_discs", DISC, cells.DISC_LEVERS, 6),
     (2, True, True): CellKind("leaning", LEANING_POINT, cells.LEVERS._replace(law=_leaning), 5, True),
-    (3, True, True): CellKind("leaning_discs", LEANING_DISC, disc_cells.LEVERS._replace(law=_leaning), 6, True),
+    (3, True, True): CellKind("leaning_discs", LEANING_DISC, cells.DISC_LEVERS._replace(law=_leaning), 6, True),
 }
 """Kinds of cells by the components of a bristle, and whether there are a metric and an asymmetry."""
 

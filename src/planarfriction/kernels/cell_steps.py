@@ -2,6 +2,10 @@
 
 A cell sees the velocity `u = B V` of its lever B (see `cells.Lever`) and adds `w B' t` to the wrench, t being its
 traction (docs/physics.md, "Distributed model").
+
+A bristle whose stiffness does not grow with the load (docs/physics.md, "Stiffness and load") moves as one of the
+published law at `l z` with `l = f_ref/f` (see `settle`), and besides returns to its limit where a falling load has left
+it beyond. The factor l comes behind the twist.
 """
 
 from __future__ import annotations
@@ -12,14 +16,24 @@ from typing import Any
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, Place, at
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, general_cells
+from planarfriction.kernels import cells, general_cells, leaning_cells
 from planarfriction.kernels.cell_blocks import LANES, divided, scratch
-from planarfriction.kernels.cell_passes import DISC, KINDS, CellKind, Rows, rate_passes, slope_passes, step_passes
+from planarfriction.kernels.cell_passes import (
+    DISC,
+    KINDS,
+    CellKind,
+    Element,
+    Rows,
+    rate_passes,
+    slope_passes,
+    step_passes,
+)
 from planarfriction.kernels.cells import CellsContact
 from planarfriction.kernels.contacts import ModelFunctions, functions_of
-from planarfriction.kernels.passes import Passes
+from planarfriction.kernels.leaning_cells import Leaning
+from planarfriction.kernels.settle import recovery
 from planarfriction.kernels.steps import StepFunctions, step_functions
-from planarfriction.kernels.vectors import Vector, clear, copy, plus, put, three
+from planarfriction.kernels.vectors import Vector, clear, copy, norm, plus, put, three, times
 
 RESULTS = LANES * 4 * DISC.size**2
 """Numbers of the results of a block of cells: derivatives of rates and tractions, or rates or bristles, row by row."""
@@ -57,15 +71,18 @@ def _filled(numbers: int, size: int) -> Any:
     return filled
 
 
-def _run(written: Passes) -> Any:
-    """Return `(law, v, dt, rows, lanes)`, which runs passes in memory of their own."""
-    run, numbers = written.run, LANES * written.rows
-
-    @kernel
-    def passed(law: LawNumbers, v: Vector, dt: float, rows: Rows, lanes: int) -> Any:
-        return run(law, v, (dt,), rows, scratch(numbers), lanes)
-
-    return passed
+@kernel
+def _through(
+    record: CellsContact, z: Doubles, v: Vector, shared: Vector, out: Doubles, cell_rows: Any, run: Any, copied: int
+) -> Vector:
+    """Run passes over all cells, which write `copied` rows to `out`, or any number if it is 0; return their sums."""
+    total, block, n, (_, lanes) = (0.0, 0.0, 0.0), scratch(BLOCK), record.count, divided(record.count)
+    for first in range(0, n, lanes):
+        rows, count = cell_rows(record, z, first, lanes, block if copied > 0 else at(out, first), block)
+        total = plus(total, 1.0, run(record.law, v, shared, rows, count))
+        for m in range(copied):
+            copy(at(block, m * LANES), at(out, m * n + first), min(lanes, n - first))
+    return total
 
 
 def evaluate(
@@ -73,15 +90,8 @@ def evaluate(
     fixed: bool, read: Any,
 ) -> None:  # fmt: skip
     """Write `z'`, and `W`; behind V is the factor of a `fixed` stiffness."""
-    record, twist, total, block = read(contact), three(v), (0.0, 0.0, 0.0), scratch(BLOCK)
     factor = v[3] if fixed else 0.0
-    n, (_, lanes) = record.count, divided(record.count)
-    for first in range(0, n, lanes):
-        rows, count = cell_rows(record, z, first, lanes, block if copied > 0 else at(zdot, first), block)
-        total = plus(total, 1.0, rate(record.law, twist, factor, rows, count))
-        for m in range(copied):
-            copy(at(block, m * LANES), at(zdot, m * n + first), min(lanes, n - first))
-    put(w, total)
+    put(w, _through(read(contact), z, three(v), (factor,), zdot, cell_rows, rate, copied))
 
 
 def linearise(
@@ -93,7 +103,7 @@ def linearise(
     n, (_, lanes) = record.count, divided(record.count)
     for first in range(0, n, lanes):
         rows, count = cell_rows(record, z, first, lanes, block, block)
-        slope(record.law, twist, factor, rows, count)
+        slope(record.law, twist, (factor,), rows, count)
         square = bristle.size * bristle.size
         for m in range(2 * square if bristle.linear else 4 * square):
             row = m if m < 2 * square else m + square  # behind the inverse
@@ -105,14 +115,7 @@ def step(
     copied: int, read: Any,
 ) -> None:  # fmt: skip
     """Advance the bristles by `dt` at a held twist, and write the wrench at the end."""
-    record, twist, total, block = read(contact), three(v), (0.0, 0.0, 0.0), scratch(BLOCK)
-    n, (_, lanes) = record.count, divided(record.count)
-    for first in range(0, n, lanes):
-        rows, count = cell_rows(record, z, first, lanes, block if copied > 0 else at(new, first), block)
-        total = plus(total, 1.0, advance(record.law, twist, dt, rows, count))
-        for m in range(copied):
-            copy(at(block, m * LANES), at(new, m * n + first), min(lanes, n - first))
-    put(out, total)
+    put(out, _through(read(contact), z, three(v), (dt,), new, cell_rows, advance, copied))
 
 
 @functools.cache
@@ -133,12 +136,55 @@ def _model_of(kind: CellKind, read: Any) -> dict[str, Any]:
 
 def rates_of(kind: CellKind, read: Any) -> ModelFunctions:
     """Return the functions of the solver for contacts of a kind of cells whose records `read` reads."""
-    loops = {"rate": _run(rate_passes(kind)), "slope": _run(slope_passes(kind)), "fixed": kind.fixed}
+    loops = {"rate": rate_passes(kind).run, "slope": slope_passes(kind).run, "fixed": kind.fixed}
     return functions_of(kind.name, (evaluate, linearise, *general_cells.FUNCTIONS), **_model_of(kind, read), **loops)
 
 
 def steps_of(kind: CellKind, read: Any) -> StepFunctions:
     """Return the steps of contacts of a kind of cells whose records `read` reads."""
     slopes = general_cells.slopes_of(kind.element.step, kind.element.size)
-    loops = {"advance": _run(step_passes(kind)), "linearise": slopes}
+    loops = {"advance": step_passes(kind).run, "linearise": slopes}
     return step_functions(kind.name, (step, general_cells.slopes), **_model_of(kind, read), **loops)
+
+
+# ---------------------------------------------------------------------- of a fixed stiffness
+
+
+@kernel
+def _itself(law: LawNumbers) -> LawNumbers:
+    return law
+
+
+@kernel
+def _law_of(lean: Leaning) -> LawNumbers:
+    return lean.law
+
+
+@kernel
+def _bent(law: LawNumbers, z: Vector) -> Vector:
+    return z
+
+
+def _recovering(kind: CellKind) -> Element:
+    """Return the bristle that recovers from beyond its limit, from the rate and the traction of the published one."""
+    published, numbers, out = kind.element.evaluate, _itself, _bent  # seen from the middle of its limit
+    if kind.leans:
+        numbers, out = _law_of, leaning_cells.out if kind.element.size == 2 else leaning_cells.out_of_disc
+
+    @kernel
+    def evaluate(law: LawNumbers | Leaning, z: Vector, u: Vector, factor: float) -> tuple[Vector, Vector]:
+        bent = times(factor, z)
+        rate, traction = published(law, bent, u)
+        plain, beyond = numbers(law), out(law, bent)
+        k = recovery(plain, beyond, norm(u))
+        return plus(rate, -k, beyond), plus(traction, plain.sigma_1 * k, beyond)
+
+    return Element(f"recovering {kind.element.name}", kind.element.size, evaluate, None)
+
+
+@functools.cache
+def fixed_rates_of(size: int, turned: bool, leans: bool) -> ModelFunctions:
+    """Return the functions of the solver for contacts of a kind of cells (see `KINDS`) with a fixed stiffness."""
+    kind = KINDS[size, turned, leans]
+    fixed = kind._replace(name=f"fixed_{kind.name}", element=_recovering(kind), linear=False, fixed=True)
+    return rates_of(fixed, cells.read)

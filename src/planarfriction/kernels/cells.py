@@ -1,7 +1,9 @@
-"""Record of a contact of n cells, and the levers of points, isotropic or not (discs: `disc_cells`).
+"""Record of a contact of n cells, and the levers of points and of small discs, isotropic or not.
 
 The state is `z = [z_x (n), z_y (n)]`, of discs with a third row. A cell sees `u = B V` of the twist and adds `w B' t`
-to the wrench, t being its traction; `B` is its lever.
+to the wrench, t being its traction; `B` is its lever. The lever of a disc at (x, y) gives `u = (v_x - omega y,
+v_y + omega x, kappa a omega)` (see `discs`); with a friction metric the map L of the cell turns the first two, and a is
+the radius in the space of the metric.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ from typing import Any, NamedTuple
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, reader
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels.vectors import Vector, dot, reader_of
+from planarfriction.kernels.vectors import Vector, reader_of
 
 
 class CellsContact(NamedTuple):
@@ -32,9 +34,10 @@ read = reader(CellsContact)
 
 
 class Lever(NamedTuple):
-    """Functions of the map B of a cell; `cell` are the numbers of the cell that `of(contact, i)` reads."""
+    """Functions of the map B of a cell; `cell` are its numbers."""
 
-    of: Any
+    read: Any
+    """`(row, first, stride)`: return the numbers of a cell."""
     seen: Any
     """`(cell, V)`: return `B V`."""
     wrench: Any
@@ -46,17 +49,6 @@ class Lever(NamedTuple):
 
 
 # ---------------------------------------------------------------------- the levers
-
-
-def numbers_of(count: int) -> Any:
-    """Return `Lever.of` of a lever of so many numbers."""
-    read = reader_of(count)
-
-    @kernel
-    def numbers(contact: CellsContact, i: int) -> Vector:
-        return read(contact.cells, i, contact.count)
-
-    return numbers
 
 
 @kernel
@@ -72,13 +64,6 @@ def _wrench(cell: Vector, t: Vector) -> Vector:
 
 
 @kernel
-def _around(cell: Vector, p: Vector) -> Vector:
-    (x, y), (xx, xy, yx, yy) = cell, p
-    xt, yt = xy * x - xx * y, yy * x - yx * y
-    return xx, xy, xt, yx, yy, yt, x * yx - y * xx, x * yy - y * xy, x * yt - y * xt
-
-
-@kernel
 def _seen_by_map(cell: Vector, v: Vector) -> Vector:
     xx, xy, yy, x, y = cell  # B = [(xx, xy, x), (xy, yy, y)]
     return xx * v[0] + xy * v[1] + x * v[2], xy * v[0] + yy * v[1] + y * v[2]
@@ -91,19 +76,43 @@ def _wrench_by_map(cell: Vector, t: Vector) -> Vector:
 
 
 @kernel
-def _around_by_map(cell: Vector, p: Vector) -> Vector:
-    (xx, xy, yy, x, y), (pxx, pxy, pyx, pyy) = cell, p
-    a, b, c = (xx, xy), (xy, yy), (x, y)
-    pa, pb = (pxx * xx + pxy * xy, pyx * xx + pyy * xy), (pxx * xy + pxy * yy, pyx * xy + pyy * yy)
-    pc = pxx * x + pxy * y, pyx * x + pyy * y
-    return dot(a, pa), dot(a, pb), dot(a, pc), dot(b, pa), dot(b, pb), dot(b, pc), dot(c, pa), dot(c, pb), dot(c, pc)
-
-
-@kernel
-def law_of_all(contact: CellsContact, i: int) -> LawNumbers:
-    """Return the law that all cells share."""
+def _law_of_all(contact: CellsContact, i: int) -> LawNumbers:
     return contact.law
 
 
-POSITIONS = Lever(numbers_of(2), _seen, _wrench, _around, law_of_all)
-LEVERS = Lever(numbers_of(5), _seen_by_map, _wrench_by_map, _around_by_map, law_of_all)
+def _of_points(count: int, seen: Any, wrench: Any) -> Lever:
+    """Return the lever of points with so many numbers."""
+
+    @kernel
+    def around(cell: Vector, p: Vector) -> Vector:  # of the columns of P, then of the rows of `B' P`
+        a, b = wrench(cell, (p[0], p[2])), wrench(cell, (p[1], p[3]))
+        return (*wrench(cell, (a[0], b[0])), *wrench(cell, (a[1], b[1])), *wrench(cell, (a[2], b[2])))
+
+    return Lever(reader_of(count), seen, wrench, around, _law_of_all)
+
+
+def _of_discs(count: int, points: Lever) -> Lever:
+    """Return the lever of discs with so many numbers, whose last is kappa times the radius, from that of points."""
+    seen_by_point, pull_of_point = points.seen, points.wrench
+
+    @kernel
+    def seen(cell: Vector, v: Vector) -> Vector:
+        return (*seen_by_point(cell[:-1], v), cell[-1] * v[2])
+
+    @kernel
+    def wrench(cell: Vector, t: Vector) -> Vector:
+        x, y, tau = pull_of_point(cell[:-1], t)
+        return x, y, tau + cell[-1] * t[2]
+
+    @kernel
+    def around(cell: Vector, p: Vector) -> Vector:
+        a, b = wrench(cell, (p[0], p[3], p[6])), wrench(cell, (p[1], p[4], p[7]))
+        c = wrench(cell, (p[2], p[5], p[8]))
+        rows = (a[0], b[0], c[0]), (a[1], b[1], c[1]), (a[2], b[2], c[2])
+        return (*wrench(cell, rows[0]), *wrench(cell, rows[1]), *wrench(cell, rows[2]))
+
+    return _of_points(count, seen, wrench)._replace(around=around)
+
+
+POSITIONS, LEVERS = _of_points(2, _seen, _wrench), _of_points(5, _seen_by_map, _wrench_by_map)
+DISC_POSITIONS, DISC_LEVERS = _of_discs(3, POSITIONS), _of_discs(6, LEVERS)

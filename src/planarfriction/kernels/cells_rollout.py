@@ -14,7 +14,6 @@ from planarfriction.compiler import jit, kernel
 from planarfriction.compiler.calls import pointer
 from planarfriction.compiler.memory import Doubles, at
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels.bind import bind
 from planarfriction.kernels.cell_blocks import (
     BAR,
     BLOCK,
@@ -25,9 +24,9 @@ from planarfriction.kernels.cell_blocks import (
     Kind,
     Z,
     divided,
-    lever_at,
     totals,
 )
+from planarfriction.kernels.definitions import bind
 from planarfriction.kernels.law import PARAMETERS, law_of
 from planarfriction.kernels.rollouts import Bars, Inputs, row_of
 from planarfriction.kernels.settle import factor_at, softening, stiffened
@@ -149,12 +148,12 @@ def _roll(
     kind: Kind, law: LawNumbers, inputs: Inputs, b: int, n: int, w: Doubles, wrench: np.ndarray, states: np.ndarray
 ) -> None:
     twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-    which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shapes, -1
+    which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shape.weights, -1
     (blocks, lanes), kept = divided(weights.shape[1]), states.shape[0] > 0
     for t in range(inputs.dt.shape[0]):
         if which[t] != last:
             last = which[t]
-            _weigh(w, blocks, lanes, weights[last], inputs.by_load[last])
+            _weigh(w, blocks, lanes, weights[last], inputs.shape.by_load[last])
         if kept:
             _read(w, Z, states[t], n, kind.size)
         load, twist, dt = loads[t], three(twists[t]), inputs.dt[t]
@@ -164,33 +163,29 @@ def _roll(
             stiff = stiffened(law, inputs.reference, load)
             if inputs.reference > 0.0:
                 _bring_back(kind, stiff, w, blocks, lanes)
-            add(wrench[t], times(load, kind.advance(kind.lever, stiff, w, blocks, lanes, twist, dt)))
+            total = (0.0, 0.0, 0.0)
+            for k in range(blocks):
+                total = plus(total, 1.0, kind.advance(stiff, twist, (dt,), at(w, k * BLOCK), lanes))
+            add(wrench[t], times(load, total))
 
 
 @kernel
-def _rollout(
+def rollout(
     kind: Kind, inputs: Inputs, span: tuple[int, ...], z: np.ndarray, wrench: np.ndarray, states: np.ndarray,
     scratch: np.ndarray,
 ) -> None:  # fmt: skip
-    w, n, rows = pointer(scratch), z.shape[1] // kind.size, inputs.rows
-    blocks, _ = divided(inputs.shapes.shape[1])
-    for b in range(span[0], span[1]):
-        law = law_of(rows[row_of(rows, b)])
-        _lay(w, blocks, inputs.data)
-        _write(w, Z, z[b], n, kind.size)
-        _roll(kind, law, inputs, b, n, w, wrench[b], states[b])
-        _read(w, Z, z[b], n, kind.size)
-
-
-def rollout(
-    inputs: Inputs, span: tuple[int, ...], z: np.ndarray, wrench: np.ndarray, states: np.ndarray, *, kind: Kind
-) -> None:
     """Step the contacts `span[0]` to `span[1]`: `z` [B, size n] in place, wrenches added to `wrench` [B, T, 3].
 
     The state before each step goes into `states` [B, T, size n], unless that is empty.
     """
-    scratch = np.empty(divided(inputs.shapes.shape[1])[0] * BLOCK)
-    _rollout(kind, inputs, span, z, wrench, states, scratch)
+    w, n, rows = pointer(scratch), z.shape[1] // kind.size, inputs.rows
+    blocks, _ = divided(inputs.shape.weights.shape[1])
+    for b in range(span[0], span[1]):
+        law = law_of(rows[row_of(rows, b)])
+        _lay(w, blocks, inputs.shape.data)
+        _write(w, Z, z[b], n, kind.size)
+        _roll(kind, law, inputs, b, n, w, wrench[b], states[b])
+        _read(w, Z, z[b], n, kind.size)
 
 
 # ---------------------------------------------------------------------- the adjoint
@@ -203,22 +198,23 @@ def _pull(
     """Carry the cotangents of the rollout of contact b back, and return the cotangent of the law."""
     n, twist_bar, load_bar = bars.state.shape[1] // kind.size, bars.twist[b], bars.load[b]
     twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-    which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shapes, -1
+    which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shape.weights, -1
     (blocks, lanes), by_law = divided(weights.shape[1]), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for t in range(inputs.dt.shape[0] - 1, -1, -1):
         if which[t] != last:
             last = which[t]
-            _weigh(w, blocks, lanes, weights[last], inputs.by_load[last])
+            _weigh(w, blocks, lanes, weights[last], inputs.shape.by_load[last])
         _write(w, Z, states[t], n, kind.size)
-        load, pull, interval = loads[t], three(pulls[t]), (three(twists[t]), inputs.dt[t])
+        load, twist = loads[t], three(twists[t])
+        shared = inputs.dt[t], load, 0.0 if load == 0.0 else 1.0, *three(pulls[t])
         stiff, by_stiff = stiffened(law, inputs.reference, load), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         if inputs.reference > 0.0:
             _bring_back(kind, stiff, w, blocks, lanes)
         for k in range(blocks):
-            bars = kind.retreat(kind.lever, stiff, at(w, k * BLOCK), lanes, interval, pull, load)
-            add(twist_bar[t], bars.twist)
-            load_bar[t] += bars.load
-            by_stiff = plus(by_stiff, 1.0, bars.law)
+            sums = kind.retreat(stiff, twist, shared, at(w, k * BLOCK), lanes)
+            add(twist_bar[t], sums[:3])
+            load_bar[t] += sums[3]
+            by_stiff = plus(by_stiff, 1.0, sums[4:])
         if inputs.reference > 0.0:
             _write(w, Z, states[t], n, kind.size)
             spring, limit = _bring_back_pull(kind, stiff, w, blocks, lanes)
@@ -229,16 +225,17 @@ def _pull(
 
 
 @kernel
-def _gradient(
+def gradient(
     kind: Kind, inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: tuple[int, ...], bars: Bars,
     scratch: np.ndarray,
 ) -> None:  # fmt: skip
+    """Add the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
     w, n, rows = pointer(scratch), bars.state.shape[1] // kind.size, inputs.rows
-    blocks, _ = divided(inputs.shapes.shape[1])
+    blocks, _ = divided(inputs.shape.weights.shape[1])
     for b in range(span[0], span[1]):
         law, before, pulls = law_of(rows[row_of(rows, b)]), states, wrench_bar[row_of(wrench_bar, b)]
         before, row_bar = before[row_of(before, b)], bars.rows[b]
-        _lay(w, blocks, inputs.data)
+        _lay(w, blocks, inputs.shape.data)
         _write(w, BAR, bars.state[b], n, kind.size)
         by_law = _pull(kind, law, inputs, b, w, before, pulls, bars)
         _read(w, BAR, bars.state[b], n, kind.size)
@@ -246,27 +243,23 @@ def _gradient(
             row_bar[COLUMNS[m]] += by_law[m]
 
 
-def gradient(
-    inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: tuple[int, ...], bars: Bars, *, kind: Kind
-) -> None:
-    """Add the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
-    scratch = np.empty(divided(inputs.shapes.shape[1])[0] * BLOCK)
-    _gradient(kind, inputs, states, wrench_bar, span, bars, scratch)
-
-
 @kernel
-def _shares(
+def shares(
     kind: Kind, inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: tuple[int, ...], out: np.ndarray,
     scratch: np.ndarray,
 ) -> None:  # fmt: skip
+    """Write the cotangents of the weights of cells, from those of the wrenches [B or 1, T, 3], to `out` [B, n].
+
+    Bristles do not see the weights: they are the `states` before each step [B or 1, T, size n], and stay.
+    """
     w, n, rows = pointer(scratch), states.shape[2] // kind.size, inputs.rows
-    blocks, lanes = divided(inputs.shapes.shape[1])
+    blocks, lanes = divided(inputs.shape.weights.shape[1])
     for b in range(span[0], span[1]):
         twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
         law, pulls, before = law_of(rows[row_of(rows, b)]), wrench_bar[row_of(wrench_bar, b)], states[row_of(states, b)]
-        _lay(w, blocks, inputs.data)
+        _lay(w, blocks, inputs.shape.data)
         for t in range(inputs.dt.shape[0]):
-            load, pull, interval = loads[t], three(pulls[t]), (three(twists[t]), inputs.dt[t])
+            load, twist, shared = loads[t], three(twists[t]), (inputs.dt[t], loads[t], 1.0, *three(pulls[t]))
             if load == 0.0:
                 continue
             stiff = stiffened(law, inputs.reference, load)
@@ -274,19 +267,8 @@ def _shares(
             if inputs.reference > 0.0:
                 _bring_back(kind, stiff, w, blocks, lanes)
             for k in range(blocks):
-                kind.shares(stiff, at(w, k * BLOCK), lanes, interval, pull, load)
+                kind.shares(stiff, twist, shared, at(w, k * BLOCK), lanes)
         _read(w, OUT, out[b], n, 1)
-
-
-def shares(
-    inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: tuple[int, ...], out: np.ndarray, *, kind: Kind
-) -> None:
-    """Write the cotangents of the weights of cells, from those of the wrenches [B or 1, T, 3], to `out` [B, n].
-
-    Bristles do not see the weights: they are the `states` before each step [B or 1, T, size n], and stay.
-    """
-    scratch = np.empty(divided(inputs.shapes.shape[1])[0] * BLOCK)
-    _shares(kind, inputs, states, wrench_bar, span, out, scratch)
 
 
 # ---------------------------------------------------------------------- forwards
@@ -296,7 +278,7 @@ def shares(
 def _push_one(kind: Kind, interval: Interval, block: Doubles, i: int) -> None:
     """Step a cell and its change."""
     lever, weight, load = kind.lever, block[WEIGHT + i], interval.load
-    one, z, change = lever_at(lever, block, i), kind.vector(block, Z + i, LANES), kind.vector(block, BAR + i, LANES)
+    one, z, change = lever.read(block, i, LANES), kind.vector(block, Z + i, LANES), kind.vector(block, BAR + i, LANES)
     u, d_u = lever.seen(one, interval.twist), lever.seen(one, interval.d_twist)
     law = kind.law(interval.law, block, i)
     new, traction, d_new, d_traction = kind.pushed(law, z, u, interval.dt, change, d_u, *interval.d_law)
@@ -314,19 +296,23 @@ def _push(kind: Kind, interval: Interval, block: Doubles, lanes: int) -> None:
 
 
 @kernel
-def _tangent(
+def tangent(
     kind: Kind, inputs: Inputs, span: tuple[int, ...], z: np.ndarray, changes: Bars, wrenches: np.ndarray,
     slopes: np.ndarray, scratch: np.ndarray,
 ) -> None:  # fmt: skip
+    """Run rollouts with their change along changes of the inputs, added to `wrenches` and `slopes` [B, T, 3].
+
+    `changes` of the inputs: as `Bars`, one row where all contacts share one; the change of the state is in place.
+    """
     w, n, rows = pointer(scratch), z.shape[1] // kind.size, inputs.rows
-    weights, all_by_load = inputs.shapes, inputs.by_load
+    weights, all_by_load = inputs.shape.weights, inputs.shape.by_load
     blocks, lanes = divided(weights.shape[1])
     for b in range(span[0], span[1]):
         twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
         turns, pushes = changes.twist[row_of(changes.twist, b)], changes.load[row_of(changes.load, b)]
         law, d_law, which = law_of(rows[row_of(rows, b)]), law_of(changes.rows[row_of(changes.rows, b)]), inputs.which
         which, last = which[row_of(which, b)], -1
-        _lay(w, blocks, inputs.data)
+        _lay(w, blocks, inputs.shape.data)
         _write(w, Z, z[b], n, kind.size)
         _write(w, BAR, changes.state[b], n, kind.size)
         for t in range(inputs.dt.shape[0]):
@@ -351,21 +337,15 @@ def _tangent(
         _read(w, BAR, changes.state[b], n, kind.size)
 
 
-def tangent(
-    inputs: Inputs, span: tuple[int, ...], z: np.ndarray, changes: Bars, wrenches: np.ndarray, slopes: np.ndarray, *,
-    kind: Kind,
-) -> None:  # fmt: skip
-    """Run rollouts with their change along changes of the inputs, added to `wrenches` and `slopes` [B, T, 3].
-
-    `changes` of the inputs: as `Bars`, one row where all contacts share one; the change of the state is in place.
-    """
-    scratch = np.empty(divided(inputs.shapes.shape[1])[0] * BLOCK)
-    _tangent(kind, inputs, span, z, changes, wrenches, slopes, scratch)
-
-
 # ---------------------------------------------------------------------- bound to kinds of cells
 
 
-def bound(kind: Kind, name: str) -> list:
-    """Return the entry points of a kind of cells."""
-    return [bind(each, f"{name}_{each.__name__}", jit, kind=kind) for each in (rollout, gradient, tangent, shares)]
+def _entry(inputs: Inputs, *arguments: Any, loop: Any, kind: Kind, numbers: int) -> None:
+    """Run a loop in new scratch memory."""
+    loop(kind, inputs, *arguments, np.empty(divided(inputs.shape.weights.shape[1])[0] * numbers))
+
+
+def entry_of(loop: Any, kind: Kind, name: str, numbers: int = BLOCK) -> Any:
+    """Return the entry point of a loop for a kind of cells, whose blocks have so many numbers; it takes the inputs and
+    the arguments between these and the scratch memory."""
+    return bind(_entry, f"{name}_{loop.__name__}", jit, loop=loop, kind=kind, numbers=numbers)

@@ -10,13 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.compiler import jit, kernel
+from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import pointer
 from planarfriction.compiler.memory import Doubles, at
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels.bind import bind
-from planarfriction.kernels.cell_blocks import BLOCK, LANES, WEIGHT, Kind, Z, divided, lever_at
-from planarfriction.kernels.cells_rollout import _lay, _read, _write
+from planarfriction.kernels.cell_blocks import BLOCK, LANES, WEIGHT, Kind, Z, divided
+from planarfriction.kernels.cells_rollout import _lay, _read, _write, entry_of
 from planarfriction.kernels.forward import forwards
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rollouts import Derivatives, row_of
@@ -72,7 +71,7 @@ def _bring_back(kind: Kind, interval: Interval, block: Doubles, lanes: int) -> N
 
 @kernel
 def _push_one(kind: Kind, interval: Interval, block: Doubles, i: int) -> None:
-    z, u = kind.vector(block, Z + i, LANES), kind.lever.seen(lever_at(kind.lever, block, i), interval.twist)
+    z, u = kind.vector(block, Z + i, LANES), kind.lever.seen(kind.lever.read(block, i, LANES), interval.twist)
     a, b, c, d, e, f = _changes(kind, block, i)
     changes = interval.stiffer, a, 1.0, b, 1.0, c, 1.0, d, 1.0, e, 1.0, f, 1.0, 1.0
     results = kind.pushed(kind.law(interval.law, block, i), z, u, interval.dt, *changes)
@@ -97,7 +96,7 @@ def _total(kind: Kind, block: Doubles, lanes: int, load: float, n: int) -> Vecto
     total = (0.0, 0.0, 0.0)
     for i in range(lanes):
         pull = kind.vector(block, _PULL + kind.size * n * LANES + i, LANES)
-        total = plus(total, load * block[WEIGHT + i], kind.lever.wrench(lever_at(kind.lever, block, i), pull))
+        total = plus(total, load * block[WEIGHT + i], kind.lever.wrench(kind.lever.read(block, i, LANES), pull))
     return total
 
 
@@ -118,7 +117,7 @@ def _follow(
         if which[t] != last:
             last = which[t]
             for i in range(lanes):
-                block[WEIGHT + i] = inputs.shapes[last, k * lanes + i]
+                block[WEIGHT + i] = inputs.shape.weights[last, k * lanes + i]
         load = loads[t]
         if load == 0.0:
             _forget(block)
@@ -136,22 +135,17 @@ def _follow(
 
 
 @kernel
-def _sensitivities(kind: Kind, inputs: Any, span: tuple, z: np.ndarray, out: Derivatives, scratch: np.ndarray) -> None:
+def sensitivities(kind: Kind, inputs: Any, span: tuple, z: np.ndarray, out: Derivatives, scratch: np.ndarray) -> None:
+    """Run rollouts with their derivatives by numbers of the law; `z` [B, size n] in place."""
     w, n, rows = pointer(scratch), z.shape[1] // kind.size, inputs.rows
-    blocks, lanes = divided(inputs.shapes.shape[1])
+    blocks, lanes = divided(inputs.shape.weights.shape[1])
     for b in range(span[0], span[1]):
-        _lay(w, blocks, inputs.data, _SIZE)
+        _lay(w, blocks, inputs.shape.data, _SIZE)
         _write(w, Z, z[b], n, kind.size, _SIZE)
         law = law_of(rows[row_of(rows, b)])
         for k in range(blocks):
             _follow(kind, inputs, b, law, k, lanes, at(w, k * _SIZE), out)
         _read(w, Z, z[b], n, kind.size, _SIZE)
-
-
-def sensitivities(inputs: Any, span: tuple, z: np.ndarray, out: Derivatives, *, kind: Kind) -> None:
-    """Run rollouts with their derivatives by numbers of the law; `z` [B, size n] in place."""
-    scratch = np.empty(divided(inputs.shapes.shape[1])[0] * _SIZE)
-    _sensitivities(kind, inputs, span, z, out, scratch)
 
 
 def bound(kind: Kind, step: Any, within: Any, path: str, name: str) -> Any:
@@ -160,4 +154,4 @@ def bound(kind: Kind, step: Any, within: Any, path: str, name: str) -> Any:
     limited = tuple((f"{path}.{each}", "z")[each not in ("sigma_0", "mu_s") :] for each in _MOVING)
     limit = kind.limit._replace(pushed=forwards(within, limited, ("z",)).pushed)
     kind = kind._replace(pushed=forwards(step, by, ("z", "u")).pushed, limit=limit)
-    return bind(sensitivities, f"{name}_sensitivities", jit, kind=kind)
+    return entry_of(sensitivities, kind, name, _SIZE)

@@ -14,8 +14,8 @@ import numpy as np
 
 from planarfriction.compiler import entry, kernel
 from planarfriction.compiler.calls import address_of
-from planarfriction.compiler.memory import Doubles, Integers, Layout, reader, row_of
-from planarfriction.kernels.bind import bind
+from planarfriction.compiler.memory import Doubles, Integers, Layout, offsets_of, reader, row_of
+from planarfriction.kernels.definitions import bind
 from planarfriction.kernels.vectors import Vector, clear, plus, times
 
 WORLD, BODY, BODY_AXES = 0, 1, 2
@@ -88,19 +88,8 @@ class ModelFunctions(NamedTuple):
     `rows.d_twist`."""
 
 
-class Addresses(NamedTuple):
-    """Addresses of `ModelFunctions`; 0 of those that are not wanted."""
-
-    evaluate: int
-    linearise: int
-    factor: int
-    eliminate: int
-    back_substitute: int
-    change: int = 0
-    """This and the following are for derivatives of scenes."""
-    solve_transposed: int = 0
-    pull_back: int = 0
-
+Addresses = offsets_of(ModelFunctions)
+"""Record of the addresses of `ModelFunctions`; 0 of those that are not wanted."""
 
 addresses_at = reader(Addresses)
 CALLS = len(Addresses._fields)
@@ -113,7 +102,8 @@ def functions_of(name: str, templates: tuple, **model: Any) -> ModelFunctions:
 
 def calls_of(functions: ModelFunctions, *, change: bool = False) -> np.ndarray:
     """Return the words of `Addresses` of compiled functions of a model, those from `change` on if asked for."""
-    return row_of(Addresses(*(address_of(each) if each else 0 for each in functions[: None if change else 5])))
+    wanted = functions[: None if change else ModelFunctions._fields.index("change")]
+    return row_of(Addresses(*(address_of(each) if each else 0 for each in wanted), *[0] * (CALLS - len(wanted))))
 
 
 @kernel

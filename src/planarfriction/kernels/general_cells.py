@@ -130,7 +130,7 @@ def factor(
             p = plus(times(-pull, driven), -record.law.sigma_2, bristle.identity)
         else:
             p = plus(matrix_product(_matrix(bristle, lin, C, i, n), driven), 1.0, _matrix(bristle, lin, E, i, n))
-        total = plus(total, record.weights[i], lever.around(lever.of(record, i), p))
+        total = plus(total, record.weights[i], lever.around(lever.read(record.cells, i, n), p))
     put_all(stiffness, total)
 
 
@@ -148,7 +148,7 @@ def eliminate(
             t = plus(times(record.law.sigma_1, residual), -record.law.sigma_0 - record.law.sigma_1 * shift, solved)
         else:
             t = matrix_applied(_matrix(bristle, lin, C, i, n), solved)
-        total = plus(total, record.weights[i], lever.wrench(lever.of(record, i), t))
+        total = plus(total, record.weights[i], lever.wrench(lever.read(record.cells, i, n), t))
     put(w, total)
 
 
@@ -160,7 +160,7 @@ def back_substitute(
     record, twist = read(contact), three(dv)
     n = record.count
     for i in range(n):
-        driven = matrix_applied(_matrix(bristle, lin, F, i, n), lever.seen(lever.of(record, i), twist))
+        driven = matrix_applied(_matrix(bristle, lin, F, i, n), lever.seen(lever.read(record.cells, i, n), twist))
         driven = plus(driven, 1.0, bristle.vector(r, i, n))
         scatter(out, i, n, matrix_applied(_matrix(bristle, lin, INVERSE, i, n), driven))
 
@@ -173,7 +173,8 @@ def change(
     record, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
     n, twist = record.count, (rows.d_twist[0], rows.d_twist[1], rows.d_twist[2] + size * rows.twist[2])
     for i in range(n):
-        cell, grown, dz_i = lever.of(record, i), times(friction, bristle.vector(z, i, n)), bristle.vector(dz, i, n)
+        cell, dz_i = lever.read(record.cells, i, n), bristle.vector(dz, i, n)
+        grown = times(friction, bristle.vector(z, i, n))
         u, a, by_z = lever.seen(cell, twist), plus(dz_i, -1.0, grown), _matrix(bristle, lin, A, i, n)
         rate = plus(matrix_applied(by_z, a), 1.0, matrix_applied(_matrix(bristle, lin, F, i, n), u))
         scatter(dzdot, i, n, rate)
@@ -205,7 +206,7 @@ def pull_back(
     record, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
     n, wrench = record.count, three(rows.d_wrench)
     for i in range(n):
-        cell, rate = lever.of(record, i), bristle.vector(dzdot, i, n)
+        cell, rate = lever.read(record.cells, i, n), bristle.vector(dzdot, i, n)
         t = times(record.weights[i], lever.seen(cell, wrench))
         if bristle.linear:
             rate = plus(rate, -record.law.sigma_1, t)
@@ -241,7 +242,7 @@ def slopes(
     record, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
     n, by_twist = record.count, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for i in range(n):
-        cell = lever.of(record, i)
+        cell = lever.read(record.cells, i, n)
         linear = linearise(lever.law(record, i), bristle.vector(z, i, n), lever.seen(cell, twist), dt)
         scatter(new, i, n, linear.new)
         total = plus(total, record.weights[i], lever.wrench(cell, linear.traction))

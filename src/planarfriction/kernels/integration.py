@@ -133,7 +133,7 @@ class RunRecord(NamedTuple):
     attempt: int
     """Address of `rosenbrock.attempt`."""
     at_rest: int
-    """Address of `rest.at_rest`."""
+    """Address of `ends.at_rest`."""
 
 
 read_run = reader(RunRecord)

@@ -21,10 +21,7 @@ law_of = reader(LawNumbers)
 @kernel
 def squared(law: LawNumbers) -> LawNumbers:
     """Return a law with the exponent 2 as a constant: the compiler then drops the general power from a loop."""
-    return LawNumbers(
-        law.sigma_0, law.sigma_1, law.sigma_2, law.mu_c, law.mu_s, law.v_s, 2.0,
-        law.elasto_plastic, law.breakaway_ratio, law.creep_speed,
-    )  # fmt: skip
+    return LawNumbers(*law[:6], 2.0, *law[7:])
 
 
 @kernel

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.kernels.cell_blocks import LANES
+from planarfriction.kernels.cell_blocks import LANES, scratch
 from planarfriction.kernels.derive import run_source, text_of
 from planarfriction.kernels.law import squared
 from planarfriction.kernels.trace import Block, Operation
@@ -36,9 +36,9 @@ class Passes(NamedTuple):
     """Loops over the cells of a block, as one function."""
 
     run: Any
-    """`(law, v, shared, block, work, lanes)`: run the passes, and return the sums over the cells."""
+    """`(law, v, shared, block, lanes)`: run the passes in memory of their own; return the sums over the cells."""
     rows: int
-    """Rows [LANES] of scratch `work`."""
+    """Rows [LANES] of that memory."""
     source: str
 
 
@@ -76,7 +76,8 @@ def passes(
         texts += _loop(k, [*lines, f"return ({total})" if total else "return"], len(summed))
         calls += _call(k, summed, any(SQUARE in each.arguments for each in part.operations))
     sums = "".join(f"sum_{each}, " for each in range(len(stores), len(block.results)))
-    texts.append(text_of(f"run({ARGUMENTS}, lanes)", [*calls, f"return ({sums})" if sums else "return"]))
+    lines = [f"work = scratch({rows * LANES})", *calls, f"return ({sums})" if sums else "return"]
+    texts.append(text_of("run(law, v, shared, block, lanes)", lines))
     source = "\n\n".join(texts)
     return Passes(_compiled(name, source, len(parts)), rows, source)
 
@@ -102,9 +103,8 @@ def _call(k: int, sums: list[int], power: bool) -> list[str]:
 
 
 def _compiled(name: str, source: str, count: int) -> Any:
-    space = run_source(
-        name, source, {"xp": xp, "math": math, "inf": math.inf, "nan": math.nan, "plus": plus, "squared": squared}
-    )
+    known = {"xp": xp, "math": math, "inf": math.inf, "nan": math.nan}
+    space = run_source(name, source, {**known, "plus": plus, "scratch": scratch, "squared": squared})
     for k in range(count):
         space[f"body_{k}"], space[f"pass_{k}"] = kernel(space[f"body_{k}"]), kernel(space[f"pass_{k}"])
     return kernel(space["run"])

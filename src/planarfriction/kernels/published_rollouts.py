@@ -80,19 +80,19 @@ def _see(w: np.ndarray, inputs: Inputs, first: int, lanes: int, t: int) -> None:
     """Write scaled twists, spins, sliding and loads of step t."""
     for c in range(lanes):
         twists, loads = inputs.twist[row_of(inputs.twist, first + c)], inputs.load[row_of(inputs.load, first + c)]
-        twist, surface = three(twists[t]), inputs.surface
+        twist, surface = three(twists[t]), inputs.shape.surface
         x, y, s = scaled = scaled_twist(PublishedPatch(*gathered(w, _ROW + LAW * ABREAST + c, ABREAST, 4)), twist)
-        u = sliding(surface[0], inputs.data, surface[1], surface[2], x, y, s, norm(scaled))
+        u = sliding(surface[0], inputs.shape.data, surface[1], surface[2], x, y, s, norm(scaled))
         scatter(w, _TWIST + c, ABREAST, (scaled, twist[2], u, loads[t]))
 
 
 @kernel
 def _see_slopes(w: np.ndarray, inputs: Inputs, lanes: int, work: np.ndarray) -> None:
     """Write the slopes of the sliding; `work` [9] is scratch."""
-    surface = inputs.surface
+    surface = inputs.shape.surface
     for c in range(lanes):
         x, y, s = twist = _vector(w, _TWIST, c)
-        sliding_jacobian(surface[0], inputs.data, surface[1], surface[2], x, y, s, norm(twist), work)
+        sliding_jacobian(surface[0], inputs.shape.data, surface[1], surface[2], x, y, s, norm(twist), work)
         for m in range(9):
             w[_SLOPES + m * ABREAST + c] = work[m]
 
@@ -205,8 +205,8 @@ def gradient(inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: t
 @kernel
 def _contact(inputs: Inputs, row: np.ndarray) -> Contact:
     """Return a contact from its row of numbers."""
-    surface = inputs.surface
-    return Contact(law_of(row), shape_of(row[LAW:]), (surface[0], surface[1], surface[2]), inputs.data)
+    surface = inputs.shape.surface
+    return Contact(law_of(row), shape_of(row[LAW:]), (surface[0], surface[1], surface[2]), inputs.shape.data)
 
 
 @kernel

@@ -13,13 +13,25 @@ import numpy as np
 from planarfriction.compiler import kernel
 
 
+class ShapesByLoad(NamedTuple):
+    """A contact at L different loads, where weights of cells follow the load."""
+
+    surface: np.ndarray
+    """Kind, offset and size of the limit surface, int `[3]`; zeros of cells."""
+    weights: np.ndarray
+    """Weights of the cells in their blocks, `[L, M]`; `[1, 0]` of a limit surface."""
+    by_load: np.ndarray
+    """Slopes of the weights by the load, `[L, M]` [1/N]."""
+    data: np.ndarray
+    """Numbers of the limit surface, or of the levers of the cells, flat."""
+
+
 class Inputs(NamedTuple):
-    """Rollouts of B contacts through T steps, of cells at L different loads where their weights follow the load."""
+    """Rollouts of B contacts through T steps."""
 
     rows: np.ndarray
     """Numbers of law and shape, [B or 1, N]."""
-    data: np.ndarray
-    """Numbers of the limit surface, or of the levers of cells, flat."""
+    shape: ShapesByLoad
     twist: np.ndarray
     """[B or 1, T, 3]"""
     load: np.ndarray
@@ -28,12 +40,6 @@ class Inputs(NamedTuple):
     """[T]"""
     which: np.ndarray
     """Index of the load of each step among the L loads, int [B or 1, T]; one for all where the shape is fixed."""
-    surface: np.ndarray
-    """Kind, offset and size of the limit surface, int [3]; of cells without meaning."""
-    shapes: np.ndarray
-    """Weights of cells, [L, M]."""
-    by_load: np.ndarray
-    """Slopes of the weights by the load, [L, M] [1/N]."""
     reference: float = 0.0
     """Reference load [N] of a law whose stiffness does not grow with the load; 0 of others."""
 

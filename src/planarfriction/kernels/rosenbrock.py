@@ -21,9 +21,8 @@ from planarfriction.kernels.body import (
     settle_all,
 )
 from planarfriction.kernels.contacts import contact_map
-from planarfriction.kernels.ends import INSTANT, note_ends, share_until_end
+from planarfriction.kernels.ends import INSTANT, at_rest, note_ends, share_until_end, speed_of
 from planarfriction.kernels.integration import Method, Output, Progress, RunRecord, Stages, combine, extend, read_run
-from planarfriction.kernels.rest import at_rest, speed_of
 from planarfriction.kernels.small_matrices import applied
 from planarfriction.kernels.springs import spring_drift
 from planarfriction.kernels.step_control import MOTION, fitted, growth

@@ -1,4 +1,4 @@
-"""States of bristles whose stiffness does not grow with the load, and their steps (see `fixed_stiffness`).
+"""States of bristles whose stiffness does not grow with the load, and their steps (see `cell_steps`).
 
 With the stiffness `K = sigma_0 f_ref` [N/m] a patch under the load f is the published one with `sigma_0 l`, `l =
 f_ref/f`, in place of `sigma_0`. Rates and tractions per unit load then follow the published law at l times the
@@ -19,7 +19,7 @@ from planarfriction.compiler.memory import Doubles, Place, at, exists
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.bristle_step import ROUNDING, cap
 from planarfriction.kernels.cells import CellsContact, read
-from planarfriction.kernels.vectors import Vector, norm, plus, square, times
+from planarfriction.kernels.vectors import Vector, copy, norm, plus, square, times
 
 RECOVERY = 1.0
 """Speed [m/s]: a bristle far beyond its limit returns to it as fast as it would forget while sliding at this speed."""
@@ -35,10 +35,7 @@ def factor_at(reference: float, load: float) -> float:
 @kernel
 def stiffened(law: LawNumbers, reference: float, load: float) -> LawNumbers:
     """Return a law with the stiffness that it has at a load, per unit load."""
-    return LawNumbers(
-        law.sigma_0 * factor_at(reference, load), law.sigma_1, law.sigma_2, law.mu_c, law.mu_s, law.v_s, law.gamma,
-        law.elasto_plastic, law.breakaway_ratio, law.creep_speed,
-    )  # fmt: skip
+    return LawNumbers(law.sigma_0 * factor_at(reference, load), *law[1:])
 
 
 @kernel
@@ -73,19 +70,8 @@ def _middle(contact: CellsContact, factor: float, i: int) -> Vector:
 
 
 @kernel
-def settle(contact: CellsContact, size: int, z: Doubles, factor: float, out: Doubles) -> None:
-    """Write `factor z` of bristles of so many components to `out`, brought back onto their limits."""
-    law, n = contact.law, contact.count
-    for i in range(n):
-        seen, middle = times(factor, _out(contact, size, z, factor, i)), _middle(contact, 1.0, i)
-        back = cap(norm(seen) * law.sigma_0 / law.mu_s, 1.0)
-        for m in range(size):
-            out[m * n + i] = middle[m] + back * seen[m] if back < 1.0 else factor * z[m * n + i]
-
-
-@kernel
 def bring_back(contact: CellsContact, size: int, z: Doubles, factor: float) -> None:
-    """Bring bristles back onto their limits at a load, and leave others as they are."""
+    """Bring bristles of so many components back onto their limits at a load, and leave others as they are."""
     n = contact.count
     for i in range(n):
         beyond, middle = _beyond(contact, size, z, factor, i), _middle(contact, factor, i)
@@ -116,7 +102,10 @@ def stepped(
 
     Slopes by the state and of the new state are to be multiplied: see `unscale`.
     """
-    settle(read(record), size, z, factor, new)
+    copy(z, new, states)
+    bring_back(read(record), size, new, factor)
+    for i in range(states):
+        new[i] = factor * new[i]
     call(function, (record, new, twist, factor * dt, new, out))
     for i in range(states):
         new[i] = new[i] / factor

@@ -1,4 +1,4 @@
-"""Steps of contacts as Python calls them: one contact, a batch, a sequence, and their derivatives.
+"""Steps and rates of contacts as Python calls them: one contact, a batch, a sequence, and their derivatives.
 
 All contacts step by the same function, one of the `StepFunctions` of a model. It is called by its address: compiled
 into the code of one contact and into the code of a batch, a step would round differently in each.
@@ -22,7 +22,7 @@ from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import call, pointer
 from planarfriction.compiler.memory import Doubles, Place, at, reader
 from planarfriction.formulas import LIGHTEST
-from planarfriction.kernels.bind import bind
+from planarfriction.kernels.definitions import bind
 from planarfriction.kernels.settle import factor_at, stepped, unscale
 from planarfriction.kernels.vectors import clear, copy, plus, put, three, times
 
@@ -229,6 +229,27 @@ def jacobians(stepped: np.ndarray, z: np.ndarray, inputs: np.ndarray, result: np
     for b in range(count):
         _jacobians(table, b, at(states, n * b), at(rows, 5 * b), at(out, size * b), at(out, size * count))
     return True
+
+
+@jit
+def rates_many(
+    function: Place, records: np.ndarray, state: np.ndarray, twist: np.ndarray, rate: np.ndarray, wrench: np.ndarray
+) -> None:
+    """Call `ModelFunctions.evaluate` of B contacts: `state`, `rate` [B, S], `twist`, `wrench` [B, 3] (per unit load).
+
+    `function` is its address; `records` [B or 1, words] has a row for each contact, or one for all.
+    """
+    for b in range(state.shape[0]):
+        record = at(pointer(records), b * records.shape[1] if records.shape[0] > 1 else 0)
+        call(function, (record, state[b], twist[b], rate[b], wrench[b]))
+
+
+@jit
+def linearise_many(function: Place, records: np.ndarray, state: np.ndarray, twist: np.ndarray, lin: np.ndarray) -> None:
+    """Call `ModelFunctions.linearise` of B contacts into `lin` [B, workspace]; the rest as in `rates_many`."""
+    for b in range(state.shape[0]):
+        record = at(pointer(records), b * records.shape[1] if records.shape[0] > 1 else 0)
+        call(function, (record, state[b], twist[b], lin[b]))
 
 
 UNFIT = (TypeError, ValueError, NumbaError)

@@ -15,7 +15,7 @@ from planarfriction.compiler.calls import address_of
 from planarfriction.compiler.memory import place_of, row_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import batched_rates, cells, rate_law, rules, steps, vectors
+from planarfriction.kernels import cells, rate_law, rules, steps, vectors
 from planarfriction.laws.base import FrictionLaw
 
 __all__ = ["RateLaw", "dot", "norm", "plus", "ratio", "times"]
@@ -133,7 +133,7 @@ class RateLaw(FrictionLaw):
         state[:, : z.shape[1]], twist[:, : v.shape[1]] = z, v
         rate, pull = np.empty_like(state), np.empty_like(twist)
         function = address_of(self.functions(cells.POSITIONS).rates.evaluate)
-        batched_rates.evaluate(function, self._single(), state, twist, rate, pull)
+        steps.rates_many(function, self._single(), state, twist, rate, pull)
         return rate, pull[:, :2]
 
     # ------------------------------------------------------------------ machine form

@@ -320,17 +320,14 @@ class LimitSurface(ByValue):
 class CompiledLimitSurface(LimitSurface):
     """A limit surface of one of the kinds of `kernels.surfaces`: it gives its `numbers`, the loops do the rest."""
 
-    kind: ClassVar[int]
-    """Kind of `kernels.surfaces`."""
-
     def direction(self, units: np.ndarray) -> np.ndarray:
-        h, (_, size, data) = np.empty_like(units), self.numbers
-        kernels.sliding_batch(self.kind, data, 0, size, units, h)
+        h, (kind, size, data) = np.empty_like(units), self.numbers
+        kernels.sliding_batch(kind, data, 0, size, units, h)
         return h
 
     def direction_slope(self, units: np.ndarray) -> np.ndarray:
-        slopes, (_, size, data) = np.empty((len(units), 9)), self.numbers
-        kernels.sliding_jacobian_batch(self.kind, data, 0, size, units, slopes)  # of h |V_S|
+        slopes, (kind, size, data) = np.empty((len(units), 9)), self.numbers
+        kernels.sliding_jacobian_batch(kind, data, 0, size, units, slopes)  # of h |V_S|
         return slopes.reshape(-1, 3, 3) - np.einsum("mi,mj->mij", self.direction(units), units)
 
 

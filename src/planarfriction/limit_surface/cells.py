@@ -22,7 +22,6 @@ class LimitSurfaceCells(CompiledLimitSurface):
     discs have a smooth friction of their own; models store their surface as a table.
     """
 
-    kind = kernels.CELLS
     anisotropy = "any"
 
     @functools.cached_property
@@ -33,7 +32,7 @@ class LimitSurfaceCells(CompiledLimitSurface):
             return SurfaceNumbers(kernels.POTENTIAL, self.segments, data)
         x, y, weights = self._loaded_cells()
         radius = self.contact_radius
-        return SurfaceNumbers(self.kind, len(weights), np.concatenate([x / radius, y / radius, weights]))
+        return SurfaceNumbers(kernels.CELLS, len(weights), np.concatenate([x / radius, y / radius, weights]))
 
     def direction(self, units: np.ndarray) -> np.ndarray:
         return super().direction(units) if self._compiled else cell_sums(self._cell_rows, units)[0]

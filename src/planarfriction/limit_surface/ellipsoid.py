@@ -22,13 +22,12 @@ class LimitSurfaceEllipsoid(CompiledLimitSurface):
     Source: Howe and Cutkosky 1996.
     """
 
-    kind = kernels.ELLIPSOID
     anisotropy = "uniform"
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
         """Empty: nothing is needed besides the contact radius."""
-        return SurfaceNumbers(self.kind, 0, np.zeros(0))
+        return SurfaceNumbers(kernels.ELLIPSOID, 0, np.zeros(0))
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
         return ellipsoid_twists(self._scaling, wrenches, found)

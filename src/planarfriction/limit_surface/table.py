@@ -28,7 +28,6 @@ class LimitSurfaceTable(CompiledLimitSurface):
     segments: int = 20
     """Segments per quadrant [-]."""
 
-    kind = kernels.POTENTIAL
     anisotropy = "any"
 
     @functools.cached_property
@@ -50,7 +49,7 @@ class LimitSurfaceTable(CompiledLimitSurface):
             data = stored_potential(lambda units: self._exact.sums(units, STORED_RULES), self.segments)
         else:
             data = stored_potential(lambda units: (cell_sums(self._cell_rows, units)[0], None), self.segments)
-        return SurfaceNumbers(self.kind, self.segments, data)
+        return SurfaceNumbers(kernels.POTENTIAL, self.segments, data)
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
         return table_twists(self._table, self._scaling, wrenches, found)

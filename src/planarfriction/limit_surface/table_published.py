@@ -30,8 +30,6 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
     segments: int = 20
     """Segments per quadrant [-]."""
 
-    kind = kernels.BILINEAR
-
     def _grid(self) -> tuple[tuple[float, float, float, float], np.ndarray]:
         """Return the patch's grid about the centre of pressure, and new memory for the sums at its corners.
 
@@ -65,10 +63,10 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
             sides = np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar) + 0.0 * azimuth
             units = np.stack(sides, -1).reshape(-1, 3)
             nodes[..., :3] = cell_sums(self._cell_rows, units)[0].reshape(*nodes.shape[:2], 3)
-            return SurfaceNumbers(self.kind, self.segments, nodes.reshape(-1))
-        place, corners = self._grid()
-        spin_sums.smoothed_nodes(corners, place, *self._loaded_cells(), self.contact_radius, self.segments, nodes)
-        return SurfaceNumbers(self.kind, self.segments, nodes.reshape(-1))
+        else:
+            place, corners = self._grid()
+            spin_sums.smoothed_nodes(corners, place, *self._loaded_cells(), self.contact_radius, self.segments, nodes)
+        return SurfaceNumbers(kernels.BILINEAR, self.segments, nodes.reshape(-1))
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
         """Find twists; of several directions that answer because the map folds, take that of least dissipation."""

@@ -9,9 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.compiled.edge import under_edge
-from planarfriction.compiled.following import STATES, following
 from planarfriction.compiled.packed import PackedModel
+from planarfriction.compiled.under_body import STATES, following, under_edge
 from planarfriction.compiler.memory import places_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.body import Motion, System

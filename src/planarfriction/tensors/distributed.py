@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, disc_cells, discs, leaning_cells, points, settle
+from planarfriction.kernels import cells, discs, leaning_cells, points, settle
 from planarfriction.kernels.leaning_cells import Leaning
 from planarfriction.models import DistributedModel
 from planarfriction.patch import ContactPatch
@@ -27,11 +27,11 @@ class Kind(NamedTuple):
 
 KINDS = {
     2: Kind(2, cells.POSITIONS, points.evaluate, points.step),
-    3: Kind(3, disc_cells.POSITIONS, discs.evaluate, discs.step),
+    3: Kind(3, cells.DISC_POSITIONS, discs.evaluate, discs.step),
     5: Kind(2, cells.LEVERS, points.evaluate, points.step),
-    6: Kind(3, disc_cells.LEVERS, discs.evaluate, discs.step),
+    6: Kind(3, cells.DISC_LEVERS, discs.evaluate, discs.step),
     7: Kind(2, cells.LEVERS, leaning_cells.evaluate, leaning_cells.step),
-    8: Kind(3, disc_cells.LEVERS, leaning_cells.evaluate_disc, leaning_cells.step_disc),
+    8: Kind(3, cells.DISC_LEVERS, leaning_cells.evaluate_disc, leaning_cells.step_disc),
 }
 """Kinds of cells by how many numbers each has: points, discs, both with a friction metric, and with asymmetry too.
 

@@ -209,7 +209,7 @@ class CouplingRow(SimpleNamespace):
 
     def __init__(self, coupled: CoupledPatches, shadow: Shadow) -> None:
         words, k = coupled._blank_problem(shadow.follows), len(coupled.models)
-        super().__init__(**{name: words[0, place] for name, place in coupled._packed.parts.items()})
+        super().__init__(**{name: words[0, place] for name, place in coupled._packed.layout.slices.items()})
         self.response, self.load_response = self.response.reshape(3 * k, 3 * k), self.load_response.reshape(k, 3 * k)
         self.dt[:] = shadow.dt
         self._coupled, self._words = coupled, words
@@ -221,7 +221,7 @@ class CouplingRow(SimpleNamespace):
         if packed.following:
             count = int(self._coupled._solve(self._words)[0])
         else:
-            solve_batch(packed.row, self._words, 0, 1)
+            solve_batch(packed.patches.words, self._words, 0, 1)
             count = int(self.iterations[0])
         if count < 0:
             self._refuse()

@@ -256,7 +256,7 @@ class Friction:
     def _host_row(self) -> np.ndarray:
         packed, k = self.coupled._packed, len(self.patches)
         problem = self.coupled._blank_problem([each.follows for each in self.placed])
-        scratch = scratch_layout(packed.words, int(packed.sizes.sum()), k, self.m.nv)
+        scratch = scratch_layout(packed.layout.size, int(packed.sizes.sum()), k, self.m.nv)
         columns = np.array([[getattr(each, name) for each in self.placed] for name in _COLUMNS], np.int64)
         joints = np.flatnonzero(self.m.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE))
         free = np.array([joints, self.m.jnt_dofadr[joints]], np.int64)
@@ -266,10 +266,10 @@ class Friction:
         places = {name: place_of(columns) + 8 * k * i for i, name in enumerate(_COLUMNS.values())}
         host = Host(
             m=self.m._address, same_count=len(same()), same=place_of(same()),
-            nv=self.m.nv, nuserdata=self.m.nuserdata, count=k, states=self.coupled.state_shape[0], words=packed.words,
-            scratch_words=scratch.size, problem=place_of(problem), patches=place_of(packed.row),
-            solve=address_of(kernels.solve), plan=address_of(loops.plan), free_count=len(joints),
-            parameters=self._place, laws=place_of(laws), record_words=place_of(packed.sizes),
+            nv=self.m.nv, nuserdata=self.m.nuserdata, count=k, states=self.coupled.state_shape[0],
+            words=packed.layout.size, scratch_words=scratch.size, problem=place_of(problem),
+            patches=packed.patches.address, solve=address_of(kernels.solve), plan=address_of(loops.plan),
+            free_count=len(joints), parameters=self._place, laws=place_of(laws), record_words=place_of(packed.sizes),
             free_joints=place_of(free), free_dofs=place_of(free) + 8 * len(joints),
             extents=place_of(extents), memory=self._memory, scratch=scratch.offsets, **places, **layout(),
         )  # fmt: skip
