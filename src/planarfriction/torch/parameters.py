@@ -90,7 +90,7 @@ class PhysicalParameters(nn.Module):
             if name.startswith("centre"):
                 now[name] = now[name] + scale * raw
                 continue
-            size = scale * torch.where(raw >= 0.0, raw, -raw)  # |w| with the slope 1 at 0
+            size = scale * nn.functional.leaky_relu(-raw, -1.0)  # |w|, with the slope 1 at 0
             if bounded:
                 now[name] = now["mu_s"] / (1.0 + size)
             elif name == "mu_s":
