@@ -91,6 +91,11 @@ class Pieces(NamedTuple):
     fixed: bool = False
     """True for a stiffness that does not grow with the load."""
 
+    @property
+    def columns(self) -> int:
+        """Number of derivatives of a number of a cell."""
+        return self.states + 3 + len(self.parameters) + self.fixed
+
 
 def pieces_of(model: Any, precision: str = "double", *, fixed: bool = True, count: int = 0) -> Pieces:
     """Take a model apart for a `precision` of `library.PRECISIONS`.

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.export.c_source import Writer
+from planarfriction.export.c_source import Writer, rendered
 from planarfriction.export.c_values import Array, Fixed
 from planarfriction.export.library import PARAMETERS, PRECISIONS, tilt_of
 from planarfriction.export.loops import Loops
@@ -54,7 +54,7 @@ def described(model: FrictionModel, precision: str, count: int = 0) -> Described
 def source_of(model: Described, precision: str) -> Source:
     """Return the source of a step in single or double precision ("float", "double")."""
     (own,), numbers = _described([model], precision, slopes=False)
-    return Source(_rendered("step.cpp.j2", own=own), numbers)
+    return Source(rendered("planarfriction.warp", "step.cpp", own=own), numbers)
 
 
 def coupled_source_of(
@@ -74,8 +74,9 @@ def coupled_source_of(
     starts = {name: np.cumsum([0, *each]).tolist() for name, each in counts.items()}
     writer = Writer(precision)
     names = "SHORTENINGS", "JOINT", "ROUND", "STAGES", "SHORTER"
-    text = _rendered(
-        "coupled.cpp.j2",
+    text = rendered(
+        "planarfriction.warp",
+        "coupled.cpp",
         kinds=kinds,
         which=which,
         precision=precision,
@@ -134,17 +135,9 @@ def _described(models: Sequence[Described], precision: str, slopes: bool) -> tup
 def _slopes_by_twist(pieces: Pieces) -> Block:
     """Return the step with the slopes of the wrench by the twist, row by row, and of a fixed stiffness by the load."""
     block, first = pieces.slopes(), pieces.states + 3
-    columns = pieces.states + 3 + len(pieces.parameters) + pieces.fixed
-    rows = [block.results[first + columns * row : first + columns * (row + 1)] for row in range(3)]
+    rows = [block.results[first + pieces.columns * row :][: pieces.columns] for row in range(3)]
     results = sum((row[pieces.states : pieces.states + 3] for row in rows), block.results[:first])
     return Block(block.operations, results + tuple(row[-1] for row in rows if pieces.fixed))
-
-
-def _rendered(name: str, **values: Any) -> str:
-    import jinja2
-
-    loader = jinja2.PackageLoader("planarfriction.warp", ".")
-    return jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined).get_template(name).render(values)
 
 
 def _placed(tables: dict[str, np.ndarray], joined: list[np.ndarray]) -> dict[str, int]:
