@@ -162,15 +162,9 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, given: dict, k
     writer = Writer(precision)
     slip = slip_of(model.patch, writer)
     functions = _functions(writer, pieces)
-    places, words = model.compiled.points()
-    moves, places = not words, dict(zip(("place_x", "place_y"), places.T, strict=True))
     functions |= {} if pieces.fixed else {"tilt": tilt_of(pieces.count)}
-    always, read, tables = (
-        ("share", "rungs", "place_x", "place_y"),
-        "\n".join(functions.values()),
-        places | pieces.tables,
-    )
-    tables = {table: each for table, each in tables.items() if (table in always and len(each)) or f"{table}[" in read}
+    read, always = "\n".join(functions.values()), ("share", "rungs", *(() if pieces.fixed else ("place_x", "place_y")))
+    tables = {table: each for table, each in pieces.tables.items() if table in always or f"{table}[" in read}
     tables |= {} if slip is None else slip.tables
     tables = {table: _table(writer, numbers) for table, numbers in tables.items()}
     step = functions["step"].splitlines()
@@ -203,7 +197,6 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, given: dict, k
             "one": writer.constant(1.0),
             "slip": slip and slip.words,
             "passes": passes,
-            "moves": moves,
             "body": body_of(model, precision, given["patches"]),
             "share": share,
             "own": own,
