@@ -170,7 +170,7 @@ class Friction:
     def states(self, d: Any) -> list[jax.Array]:
         """Return the state of each patch at the current time of the data."""
         at, sizes = self._fixed.memory, [math.prod(shape) for shape in self._fixed.shapes]
-        flat = self._now(d, at.new, at.state, sum(sizes))
+        flat = self._now(d, at.after, at.state, sum(sizes))
         parts = jnp.split(flat, np.cumsum(sizes)[:-1], axis=-1)
         return [z.reshape(*z.shape[:-1], *shape) for z, shape in zip(parts, self._fixed.shapes, strict=True)]
 
@@ -195,7 +195,7 @@ class Friction:
     def reset(self, d: Any) -> Any:
         """Return the data with all bristles relaxed."""
         at = self._fixed.memory
-        return d.replace(userdata=d.userdata.at[..., at.state : at.converged + 1].set(0.0))
+        return d.replace(userdata=d.userdata.at[..., at.before : at.converged + 1].set(0.0))
 
     def _each(self, d: Any, first: int, count: int) -> jax.Array:
         k = len(self._fixed.which)
@@ -237,7 +237,7 @@ class Friction:
         twist, load = answer.host.twists(wrench), answer.host.loads(wrench)
         new, _ = self._evaluate(own, pressed, shift, states, twist, load, dt)
         d = self._integrated(m, d, where.jacobian, wrench, answer)
-        kept = {"state": begun, "new": new, "guess": guess, "load": load, "held": held, "centre": where.moved(shift)}
+        kept = {"state": begun, "after": new, "guess": guess, "load": load, "held": held, "centre": where.moved(shift)}
         kept |= {"before": before, "axis": where.axes[:, 0]}
         shift = shift + own.displaced
         kept |= {"wrench": wrench_from(xp, wrench.reshape(-1, 3), -shift), "twist": twist_at(xp, twist, shift)}
