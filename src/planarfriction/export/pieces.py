@@ -285,7 +285,7 @@ def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
         ]
         return tuple(new), tuple(out[:3]), tuple(rows)
 
-    tables = dict(zip(("place_x", "place_y", "share"), (*found.place[:, None], np.ones(1)), strict=True))
+    tables: dict[str, Any] = {"place_x": found.place[:1], "place_y": found.place[1:], "share": np.ones(1)}
     tables |= {"surface": surface.data} if len(surface.data) else {}
     return Pieces(1, 3, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes), moves=True)
 
