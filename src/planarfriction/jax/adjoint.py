@@ -75,19 +75,6 @@ class HostRollout(NamedTuple):
         """Return the shapes of last state, wrenches and the states before each step."""
         return [state.shape, twist.shape, (*twist.shape[:-1], *state.shape[state.ndim - self.axes :])]
 
-    def refuse_if_strict(self, name: str, by_dt: bool) -> None:
-        """Raise FrictionError, if strict, for a derivative that the adjoint does not have."""
-        if self.strict and name == "run":
-            rule = (
-                "be held fixed with method='adjoint': differentiate with respect to the parameters, weights, state, "
-                "twist and normal_force, or leave method out"
-            )
-            raise InvalidValueError("dt" if by_dt else self.leaf, rule, "a derivative of it")
-        if self.strict:
-            raise FrictionError(
-                "the adjoint gives first derivatives only: leave method out, or use 'eager', to differentiate twice"
-            )
-
     def by_operations(self, dt: Any, *arrays: Any) -> Any:
         """Return last state and wrenches by operations of JAX."""
         first = len(arrays) - len(self.inner)
@@ -260,7 +247,17 @@ def _jvp_by_operations(primals, tangents, dots, *, operation, name: str, outer: 
     """Return values and changes by operations of JAX, for derivatives that the adjoint does not have."""
     if isinstance(operation, SceneOperation):
         raise FrictionError("the motion of a scene has first derivatives only")
-    operation.refuse_if_strict(name, by_dt=type(tangents[0]) is not ad.Zero)
+    if operation.strict and name == "run":
+        rule = (
+            "be held fixed with method='adjoint': differentiate with respect to the parameters, weights, state, "
+            "twist and normal_force, or leave method out"
+        )
+        by_dt = type(tangents[0]) is not ad.Zero
+        raise InvalidValueError("dt" if by_dt else operation.leaf, rule, "a derivative of it")
+    if operation.strict:
+        raise FrictionError(
+            "the adjoint gives first derivatives only: leave method out, or use 'eager', to differentiate twice"
+        )
     roll: Callable[..., Any] = operation.by_operations
     for _ in range(outer):
         roll = jax.vmap(roll)

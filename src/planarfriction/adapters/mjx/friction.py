@@ -24,6 +24,7 @@ from planarfriction.adapters.mujoco.patches import (
     memory,
     parameters_in,
     place_of_parameters,
+    surface_velocities,
 )
 from planarfriction.coupling import ITERATIONS, TOLERANCE
 from planarfriction.environments import SHAPE, check, defaults
@@ -81,7 +82,6 @@ class _Fixed:
     """True for patches whose pressure follows their contact forces."""
     shapes: tuple[tuple[int, ...], ...]
     """Shapes of the states."""
-    radius: np.ndarray
     memory: Any
     """Places of the memory of the patches in `userdata`."""
     nuserdata: int
@@ -121,8 +121,9 @@ class Friction:
         made = zip(numbers, np.array([defaults(patch.model.law) for patch in patches]).T, strict=True)
         changed = {name: jnp.asarray(numbers[name]) for name, own in made if (numbers[name] != own).any()}
         self.parameters: dict[str, jax.Array] = changed
-        fixed = responses.places(m, placed, radius), which, follows, shapes, radius, at, m.nuserdata
-        self._fixed = _Fixed(*fixed, numbers=check(numbers))
+        columns = (np.array([getattr(each, name) for each in placed]) for name in responses.PatchPlaces._fields[:6])
+        places = responses.PatchPlaces(*columns, radius=radius, surface=surface_velocities(m, placed))
+        self._fixed = _Fixed(places, which, follows, shapes, at, m.nuserdata, check(numbers))
 
     def replace(self, models: Sequence[FrictionPytree]) -> Self:
         """Return the same patches with other models, which must be of the same kinds in the same order.
@@ -273,7 +274,7 @@ class Friction:
 
     def _search(self, own: _Own, m, d, where: responses.Geometry, states, guess) -> _Search:
         """Find the constraints that are active in the end, and the wrenches, without derivatives."""
-        applied, dt, radius = d.qfrc_applied, m.opt.timestep, own.scale * self._fixed.radius
+        applied, dt, radius = d.qfrc_applied, m.opt.timestep, own.scale * self._fixed.places.radius
 
         def body(last: _Search) -> _Search:
             pushed = mjx.fwd_acceleration(m, d.replace(qfrc_applied=applied + last.wrench @ where.jacobian))
