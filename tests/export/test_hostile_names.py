@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import pytest
 
 import planarfriction as pf
+from planarfriction.export.pieces import pieces_of
 from planarfriction_studies.referee.case import all_cases
 from planarfriction_studies.referee.export import mjcf, sdf
 from planarfriction_studies.referee.report import page
@@ -58,8 +59,8 @@ def test_c(tmp_path):
 def test_warp():
     """No name stands in the source at all."""
     source = pytest.importorskip("planarfriction.warp.source", reason="needs the extra [warp]")
-    described = source.described(pf.ReducedModel(PATCH, LAW), "float")
-    texts = [source.source_of(described, "float"), source.coupled_source_of([described], [0], [True], [0.01], "float")]
+    pieces = pieces_of(pf.ReducedModel(PATCH, LAW), "float")
+    texts = [source.source_of(pieces, "float"), source.coupled_source_of([pieces], [0], [True], [0.01], "float")]
     assert not any("alert" in each.text for each in texts)
 
 

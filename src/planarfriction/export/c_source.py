@@ -28,6 +28,15 @@ def comment(text: str) -> str:
     return ascii(text)[1:-1].replace("*/", "* /").replace("/*", "/ *")
 
 
+def rendered(package: str, template: str, /, **values: Any) -> str:
+    """Return the text of a template of a package."""
+    import jinja2
+
+    rules: dict[str, Any] = {"undefined": jinja2.StrictUndefined, "keep_trailing_newline": True}
+    environment = jinja2.Environment(loader=jinja2.PackageLoader(package, "."), **rules)
+    return environment.get_template(f"{template}.j2").render(values)
+
+
 class Writer:
     """Differences between precisions: constants and the names of mathematical functions."""
 

@@ -14,7 +14,7 @@ from planarfriction import validation, writing
 from planarfriction.compiler import compiled_math
 from planarfriction.errors import InvalidValueError
 from planarfriction.export.body import body_of
-from planarfriction.export.c_source import SQRT, Writer, comment, of_compiled, passes_of
+from planarfriction.export.c_source import SQRT, Writer, comment, of_compiled, passes_of, rendered
 from planarfriction.export.c_values import Array, Fixed, Scalar
 from planarfriction.export.loops import Loops
 from planarfriction.export.pieces import Pieces, pieces_of
@@ -24,16 +24,13 @@ from planarfriction.kernels import tilt
 from planarfriction.kernels.surfaces import CELLS
 from planarfriction.online.loops import friction_filter, grips
 
-CONTROLLERS = (grips.hold,)
-"""Loops of controllers that have source."""
-
 
 def grip_of(controller: Any, name: str) -> dict[str, Any]:
     """Return the lines and tables of `planarfriction.online.Hold` of one part, in double precision.
 
     Raises InvalidValueError for anything else, and for an observer of many parts or with a sum of cells as its surface.
     """
-    if getattr(controller, "_grip", None) not in CONTROLLERS or controller.state.shape:
+    if getattr(controller, "_grip", None) is not grips.hold or controller.state.shape:
         raise InvalidValueError("controller", "be a Hold of one part (without batch)", type(controller).__name__)
     observer, writer = controller.observer, Writer()
     own, state = observer._filter, observer.state
@@ -102,15 +99,11 @@ PARAMETERS = {
 }
 """Parameters: their words in the header, and their conditions."""
 
-FILES = {"h": ".h", "c": ".c", "test.c": "_test.c", "cmake": ".cmake"}
-"""Ends of the names of files by their templates."""
-
-
-CASADI = {"casadi.c": "_casadi.c"}
-"""End of the name of the file for CasADi."""
-
-GRIP = {"grip.h": "_grip.h", "grip.c": "_grip.c"}
-"""Ends of the names of the files of a controller."""
+FILES = {
+    "library.h": ".h", "library.c": ".c", "library.test.c": "_test.c", "library.cmake": ".cmake",
+    "library.casadi.c": "_casadi.c", "grip.h": "_grip.h", "grip.c": "_grip.c",
+}  # fmt: skip
+"""Ends of the names of files by their templates; those for CasADi and of a controller are written if asked for."""
 
 
 def checked_name(name: Any) -> None:
@@ -152,29 +145,28 @@ def export_c(
         raise InvalidValueError("precision", "be double for CasADi and controllers", precision)
     given = {"patches": patches} | ({} if controller is None else {"grip": grip_of(controller, name)})
     folder = validation.path("folder", folder)
-    ends = FILES | (CASADI if casadi else {}) | (GRIP if "grip" in given else {})
-    texts = _texts(model, pieces_of(model, precision, fixed=False), name, precision, given, tuple(ends))
+    kinds = [kind for kind in FILES if (casadi or "casadi" not in kind) and ("grip" in given or "grip" not in kind)]
+    texts = _texts(model, pieces_of(model, precision, fixed=False), name, precision, given, kinds)
     writing.make_folder(folder)
-    files = tuple(folder / f"{name}{end}" for end in ends.values())
+    files = tuple(folder / f"{name}{FILES[kind]}" for kind in kinds)
     with contextlib.ExitStack() as stack:  # all can be written, or none is
         for file, text in zip(files, texts, strict=True):
             stack.enter_context(writing.replacing(file)).write(text.encode())
     return files
 
 
-def _texts(model: Any, pieces: Pieces, name: str, precision: str, given: dict, kinds: tuple[str, ...]) -> list[str]:
+def _texts(model: Any, pieces: Pieces, name: str, precision: str, given: dict, kinds: list[str]) -> list[str]:
     """Return the text of each kind of file."""
-    import jinja2
-
     import planarfriction
 
     writer = Writer(precision)
     slip = slip_of(model.patch, writer)
     functions = _functions(writer, pieces)
-    places, words = model.compiled.points()
-    moves, places = not words, dict(zip(("place_x", "place_y"), places.T, strict=True))
     functions |= {} if pieces.fixed else {"tilt": tilt_of(pieces.count)}
-    tables = _tables(writer, places | pieces.tables, functions) | ({} if slip is None else _tables(writer, slip.tables))
+    read, always = "\n".join(functions.values()), ("share", "rungs", *(() if pieces.fixed else ("place_x", "place_y")))
+    tables = {table: each for table, each in pieces.tables.items() if table in always or f"{table}[" in read}
+    tables |= {} if slip is None else slip.tables
+    tables = {table: _table(writer, numbers) for table, numbers in tables.items()}
     step = functions["step"].splitlines()
     vector = Writer(precision, own=precision == "double")
     share = "(at->low[k] + at->part * (at->high[k] - at->low[k]))" if pieces.rungs else "share[k]"
@@ -198,7 +190,6 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, given: dict, k
             },
             "ranges": " && ".join(PARAMETERS[each][1] for each in pieces.parameters),
             "tables": tables,
-            "columns": _columns(pieces),
             "pattern": _pattern(pieces),
             "suffix": writer.suffix,
             "largest": writer.constant(PRECISIONS[precision]),
@@ -206,7 +197,6 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, given: dict, k
             "one": writer.constant(1.0),
             "slip": slip and slip.words,
             "passes": passes,
-            "moves": moves,
             "body": body_of(model, precision, given["patches"]),
             "share": share,
             "own": own,
@@ -215,18 +205,7 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, given: dict, k
             "functions": pieces.count * sum(any(f"{each}{writer.suffix}(" in line for each in _SLOW) for line in step),
         }
     )
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("planarfriction.export", "."),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-    )
-    names = [f"{kind}.j2" if kind in GRIP else f"library.{kind}.j2" for kind in kinds]
-    return [environment.get_template(each).render(values) for each in names]
-
-
-def _columns(pieces: Pieces) -> int:
-    """Return the number of derivatives of a number of a cell."""
-    return pieces.states + 3 + len(pieces.parameters) + pieces.fixed
+    return [rendered("planarfriction.export", kind, **values) for kind in kinds]
 
 
 def _places(pieces: Pieces) -> list[str]:
@@ -245,7 +224,7 @@ def _functions(writer: Writer, pieces: Pieces) -> dict[str, str]:
     """Return the lines of the functions of cell k."""
     wrench = ["w[0]", "w[1]", "w[2]"]
     results = [*_places(pieces), *wrench]
-    rows = [f"rows[{row}][{column}]" for row in range(3 + pieces.states) for column in range(_columns(pieces))]
+    rows = [f"rows[{row}][{column}]" for row in range(3 + pieces.states) for column in range(pieces.columns)]
     traces = {
         "step": (pieces.step, results),
         "steady": (pieces.steady, wrench),
@@ -264,19 +243,6 @@ def tilt_of(count: int) -> str:
     if count > 1:
         loops.add(tilt.tilt, (x, y, shares, Fixed(count), Scalar("cx"), Scalar("cy"), shares))
     return re.sub(r"\breal\b", "double", "\n\n".join(loops.functions))
-
-
-def _tables(
-    writer: Writer, tables: dict[str, np.ndarray], functions: dict[str, str] | None = None
-) -> dict[str, tuple[str, list[str]]]:
-    """Return type and constants of the tables that functions read."""
-    return {
-        table: _table(writer, numbers)
-        for table, numbers in tables.items()
-        if functions is None
-        or (table in ("share", "rungs", "place_x", "place_y") and len(numbers) > 0)
-        or any(f"{table}[" in each for each in functions.values())
-    }
 
 
 _SLOW = "sqrt", "exp", "sin", "cos", "pow", "atan2"

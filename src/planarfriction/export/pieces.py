@@ -75,7 +75,7 @@ class Pieces(NamedTuple):
     states: int
     """Number of states of a cell; the first of all cells come first."""
     tables: dict[str, np.ndarray]
-    """Constant arrays by name; `share` [count] is that in the load."""
+    """Constant arrays by name; `share` [count] is that in the load, `place_x` and `place_y` are those of its parts."""
     step: Block
     """New states, then the wrench per unit load, from `p`, `k`, `z`, `v`, `dt`, and `normal_force` if it is `fixed`."""
     parameters: dict[str, float]
@@ -90,6 +90,13 @@ class Pieces(NamedTuple):
     """Number of loads, the table `rungs`, that `share` [rungs, count] is for; 0 for a fixed shape."""
     fixed: bool = False
     """True for a stiffness that does not grow with the load."""
+    moves: bool = False
+    """True if the patch moves where pressures that follow moments cannot be had by other shares."""
+
+    @property
+    def columns(self) -> int:
+        """Number of derivatives of a number of a cell."""
+        return self.states + 3 + len(self.parameters) + self.fixed
 
 
 def pieces_of(model: Any, precision: str = "double", *, fixed: bool = True, count: int = 0) -> Pieces:
@@ -223,7 +230,8 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
         rows = tuple((by_z, lever.wrench(own, by_u), *(by_law[i] for i in kept)) for by_z, by_u, *by_law in bars)
         return new, lever.wrench(own, traction), rows
 
-    tables, rungs = dict(zip(names, np.pad(numbers, [(0, 0), (0, more)], mode="edge"), strict=False)), 0
+    places = zip(("place_x", "place_y", *names), (*model.patch.positions.T, *numbers), strict=False)
+    tables, rungs = {name: np.pad(each, (0, more), mode="edge") for name, each in places}, 0
     if model.patch.depends_on_load:
         ladder = ladder_of(model.patch)
         tables |= {"share": ladder.shares, "rungs": ladder.rungs}
@@ -277,8 +285,9 @@ def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
         ]
         return tuple(new), tuple(out[:3]), tuple(rows)
 
-    tables = {"share": np.ones(1)} | ({"surface": surface.data} if len(surface.data) else {})
-    return Pieces(1, 3, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes))
+    tables: dict[str, Any] = {"place_x": found.place[:1], "place_y": found.place[1:], "share": np.ones(1)}
+    tables |= {"surface": surface.data} if len(surface.data) else {}
+    return Pieces(1, 3, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes), moves=True)
 
 
 _KINDS = {DistributedModel: _distributed, ReducedModelPublished: _published}

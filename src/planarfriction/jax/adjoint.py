@@ -21,7 +21,6 @@ from jax.core import ShapedArray
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 
-from planarfriction.derivatives.scene_function import SceneFunction
 from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.formulas import LARGEST
 from planarfriction.tensors.operations import Arrays, RolloutOperation, SceneOperation
@@ -47,26 +46,6 @@ def _called(operation: Any, name: str, held: Arrays, numbers: Numbers, kept: boo
         results, states = operation.run(held, inputs, kept)
         return *results, *states
     return operation.push(held, inputs, linear) if name == "push" else operation.pull(held, inputs, linear, memory)
-
-
-class HostScene(NamedTuple):
-    """Motion and wrenches of a scene, of its numbers; fixed when a function is compiled."""
-
-    function: SceneFunction
-    inner, outer = SceneOperation.inner, SceneOperation.outer
-    like, keeps = 0, False
-
-    def shapes(self, numbers: Any) -> list[tuple[int, ...]]:
-        """Return the shapes of motion and wrenches."""
-        return [(*numbers.shape[:-1], *shape) for shape in self.function.results]
-
-    def refuse_if_strict(self, name: str, by_dt: bool) -> None:
-        """Raise FrictionError for a second derivative."""
-        raise FrictionError("the motion of a scene has first derivatives only")
-
-    def on_host(self, name: str, outer: int, held: Arrays, numbers: Numbers, kept: bool) -> Arrays:
-        """Return the results of a method of `SceneOperation`."""
-        return _called(SceneOperation(self.function), name, held, numbers, kept)
 
 
 class HostRollout(NamedTuple):
@@ -95,19 +74,6 @@ class HostRollout(NamedTuple):
     def shapes(self, state: Any, twist: Any, *inputs: Any) -> list[tuple[int, ...]]:
         """Return the shapes of last state, wrenches and the states before each step."""
         return [state.shape, twist.shape, (*twist.shape[:-1], *state.shape[state.ndim - self.axes :])]
-
-    def refuse_if_strict(self, name: str, by_dt: bool) -> None:
-        """Raise FrictionError, if strict, for a derivative that the adjoint does not have."""
-        if self.strict and name == "run":
-            rule = (
-                "be held fixed with method='adjoint': differentiate with respect to the parameters, weights, state, "
-                "twist and normal_force, or leave method out"
-            )
-            raise InvalidValueError("dt" if by_dt else self.leaf, rule, "a derivative of it")
-        if self.strict:
-            raise FrictionError(
-                "the adjoint gives first derivatives only: leave method out, or use 'eager', to differentiate twice"
-            )
 
     def by_operations(self, dt: Any, *arrays: Any) -> Any:
         """Return last state and wrenches by operations of JAX."""
@@ -229,7 +195,10 @@ def _on_host(operands, found, *, operation, name: str, outer: int, kept: bool) -
     """Return the results, as arrays of NumPy of the shapes and types `found`."""
     held, *numbers = _split([np.asarray(array) for array in operands], operation, name, kept)
     numbers = Numbers(*([np.asarray(array, float) for array in each] for each in numbers))
-    results = operation.on_host(name, outer, held, numbers, kept)
+    if isinstance(operation, HostRollout):
+        results = operation.on_host(name, outer, held, numbers, kept)
+    else:
+        results = _called(operation, name, held, numbers, kept)
     return tuple(value.astype(of.dtype) for value, of in zip(results, found, strict=True))
 
 
@@ -276,7 +245,19 @@ def _jvp(primals, tangents, *, operation, name: str, outer: int, kept: bool):
 
 def _jvp_by_operations(primals, tangents, dots, *, operation, name: str, outer: int, kept: bool):
     """Return values and changes by operations of JAX, for derivatives that the adjoint does not have."""
-    operation.refuse_if_strict(name, by_dt=type(tangents[0]) is not ad.Zero)
+    if isinstance(operation, SceneOperation):
+        raise FrictionError("the motion of a scene has first derivatives only")
+    if operation.strict and name == "run":
+        rule = (
+            "be held fixed with method='adjoint': differentiate with respect to the parameters, weights, state, "
+            "twist and normal_force, or leave method out"
+        )
+        by_dt = type(tangents[0]) is not ad.Zero
+        raise InvalidValueError("dt" if by_dt else operation.leaf, rule, "a derivative of it")
+    if operation.strict:
+        raise FrictionError(
+            "the adjoint gives first derivatives only: leave method out, or use 'eager', to differentiate twice"
+        )
     roll: Callable[..., Any] = operation.by_operations
     for _ in range(outer):
         roll = jax.vmap(roll)

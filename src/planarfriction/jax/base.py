@@ -9,7 +9,6 @@ import jax
 import jax.numpy as jnp
 
 from planarfriction import validation
-from planarfriction.derivatives.parameters import Packed
 from planarfriction.errors import InvalidValueError
 from planarfriction.jax.namespace import xp
 from planarfriction.laws import FrictionLaw
@@ -80,10 +79,6 @@ class FrictionPytree(TensorModel):
         one = jax.checkpoint(one, prevent_cse=False)  # pyright: ignore[reportPrivateImportUsage]
         end, wrenches = jax.lax.scan(one, state, (jnp.moveaxis(twist, -2, 0), jnp.moveaxis(normal_force, -1, 0)))
         return end, jnp.moveaxis(wrenches, 0, -2)
-
-    def compiled(self) -> Packed:
-        """Return the model, of NumPy arrays and with any law, as compiled rollouts take it."""
-        raise NotImplementedError
 
     def _values(self, parameters: Any) -> dict[str, jax.Array]:
         return {name: jnp.asarray(value) for name, value in self._record(parameters)._asdict().items()}

@@ -10,11 +10,10 @@ import jax.numpy as jnp
 
 from planarfriction.derivatives import Rollout
 from planarfriction.jax import adjoint
-from planarfriction.jax.adjoint import HostScene
 from planarfriction.jax.base import FrictionPytree
 from planarfriction.jax.namespace import xp
 from planarfriction.tensors.namespace import rollout_inputs
-from planarfriction.tensors.operations import simulator
+from planarfriction.tensors.operations import SceneOperation, simulator
 
 
 def rest(model: FrictionPytree, batch: int | Sequence[int] = ()) -> jax.Array:
@@ -76,4 +75,4 @@ def rollout(
     return Rollout(*model.rollout(state, twist, load, dt))
 
 
-simulate_scene = simulator(xp, lambda function, numbers: adjoint.call(HostScene(function), (), numbers))
+simulate_scene = simulator(xp, lambda function, numbers: adjoint.call(SceneOperation(function), (), numbers))

@@ -86,6 +86,12 @@ class SceneOperation(NamedTuple):
     """Simulations that have been run, for `pull`; None to simulate once more."""
     inner = (1,)
     outer = (2, 3)
+    like, keeps = 0, False
+    """Index of the input whose number type results have; True if `run` keeps arrays for `pull`."""
+
+    def shapes(self, numbers: Any) -> list[tuple[int, ...]]:
+        """Return the shapes of motion and wrenches."""
+        return [(*numbers.shape[:-1], *shape) for shape in self.function.results]
 
     def run(self, held: Arrays, inputs: Arrays, keep: bool) -> tuple[Arrays, Arrays]:
         """Return motion and wrenches."""

@@ -110,10 +110,6 @@ class TensorModel:
         """Shape of the state of one contact."""
         return (3,)
 
-    def rest(self, batch: int | Sequence[int] = ()) -> Any:
-        """Return the state of a contact at rest, or of a `batch`: `[*batch, *state_shape]`."""
-        raise NotImplementedError
-
     def rate(self, state: Any, twist: Any, normal_force: Any, *, moments: Any = None, parameters: Any = None) -> Any:
         """Return the rate of the state, of its shape; of the load it depends on the moments alone, as in `step`."""
         return self._evaluated(state, twist, normal_force, parameters, moments)[0]
@@ -141,13 +137,6 @@ class TensorModel:
         """Return state and wrench after a step of the model that `pressed` has returned, with inputs as arrays."""
         new, wrench = step(self.xp, self.equations, pressed.contact, state, pressed.seen(self.xp, twist), load, dt)
         return new, pressed.pull(self.xp, wrench)
-
-    def rollout(self, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None) -> Any:
-        """Return the last state and the wrenches `[..., T, 3]` of steps through twists `[..., T, 3]` and loads.
-
-        Each step is an operation of the tensor library; inputs are arrays that have been checked.
-        """
-        raise NotImplementedError
 
     def _values(self, parameters: Any) -> dict[str, Any]:
         """Return physical values by name, from `parameters` or, if None, the model's own."""

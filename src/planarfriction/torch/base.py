@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import torch
 from torch import Tensor, nn
@@ -20,17 +20,6 @@ from planarfriction.torch.parameters import PhysicalParameters
 
 TRAINABLE = LAW[:-1]
 """Parameters that are trainable unless the caller chooses: the law without the breakaway ratio."""
-
-
-class Compiled(NamedTuple):
-    """A model as compiled rollouts take it."""
-
-    pack: Callable[..., Packed]
-    """Function that makes the model from the weights, if there are any, and the `buffers` as NumPy arrays."""
-    buffers: tuple[Tensor, ...]
-    """The model's own numbers of the patch."""
-    weights: tuple[Tensor, ...] = ()
-    """The weights of the cells, if there are cells: they can have gradients."""
 
 
 _BRISTLES = {False: "plain", True: "elasto-plastic"}
@@ -119,8 +108,11 @@ class FrictionModule(TensorModel, nn.Module):
         """Return the rate of the state, and the wrench; `moments` as in `step`."""
         return self._evaluated(state, twist, normal_force, parameters, moments)
 
-    def compiled(self) -> Compiled:
-        """Return the model as compiled rollouts take it."""
+    def compiled(self) -> tuple[Callable[..., Packed], tuple[Tensor, ...], tuple[Tensor, ...]]:
+        """Return the model as compiled rollouts take it: a function of arrays, its buffers, and the weights of cells.
+
+        The function packs the model from the weights, if there are cells, and the buffers.
+        """
         raise NotImplementedError
 
     def rollout(

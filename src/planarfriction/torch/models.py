@@ -18,7 +18,7 @@ from planarfriction.patch import ContactPatch
 from planarfriction.tensors import distributed, published
 from planarfriction.tensors.models import CellsModel, PublishedModel, few_discs
 from planarfriction.tensors.steps import LAW
-from planarfriction.torch.base import TRAINABLE, Compiled, FrictionModule
+from planarfriction.torch.base import TRAINABLE, FrictionModule
 
 
 class DistributedModel(FrictionModule, CellsModel):
@@ -73,11 +73,10 @@ class DistributedModel(FrictionModule, CellsModel):
         """Return a physical value, or the `weights`, with its gradient."""
         return self.weights if name == "weights" else super().value(name)
 
-    def compiled(self) -> Compiled:
-        """Return the model as compiled rollouts take it."""
+    def compiled(self) -> tuple[Any, tuple[Tensor, ...], tuple[Tensor, ...]]:
+        """Return the model as compiled rollouts take it (see `FrictionModule.compiled`)."""
         reference = () if self.reference_load is None else (self.reference_load,)
-        pack = functools.partial(pack_cells, self.elasto_plastic)
-        return Compiled(pack, (self.positions, *reference), (self.weights,))
+        return functools.partial(pack_cells, self.elasto_plastic), (self.positions, *reference), (self.weights,)
 
 
 class SurfaceBuffers(nn.Module):
@@ -137,10 +136,10 @@ class ReducedModelPublished(FrictionModule, PublishedModel):
         values = published.values_of(law, shape)
         self._adopt({name: values[name] for name in PARAMETERS}, trainable, shape.contact_radius, **kind)
 
-    def compiled(self) -> Compiled:
-        """Return the model as compiled rollouts take it."""
+    def compiled(self) -> tuple[Any, tuple[Tensor, ...], tuple[Tensor, ...]]:
+        """Return the model as compiled rollouts take it (see `FrictionModule.compiled`)."""
         pack = functools.partial(pack_surface, self.elasto_plastic, self.surface.kind, self.surface.size)
-        return Compiled(pack, (self.surface.data,) if self.root is None else (self.surface.data, self.root))
+        return pack, (self.surface.data,) if self.root is None else (self.surface.data, self.root), ()
 
 
 class ReducedModel(DistributedModel):

@@ -32,14 +32,6 @@ class _Pressing(torch.autograd.Function):
         ctx.mark_non_differentiable(output)
 
     @staticmethod
-    def backward(ctx, *bars):
-        return (None,) * 6
-
-    @staticmethod
-    def jvp(ctx, *tangents):
-        return None
-
-    @staticmethod
     def vmap(info, in_dims, *tensors):
         fronted = [
             each.unsqueeze(0).expand(info.batch_size, *each.shape) if dim is None else each.movedim(dim, 0)

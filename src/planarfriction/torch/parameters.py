@@ -28,8 +28,8 @@ from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.tensors.steps import LAW
 from planarfriction.torch.namespace import xp
 
-_GROWING = {*POSITIVE, "second_moment"}
-"""Parameters that are `p_0 exp(w)`; a trained mu_s has a rule of its own."""
+_GROWING = {*POSITIVE, "second_moment"} - {"mu_s"}
+"""Parameters that are `p_0 exp(w)`; a mu_c below a fixed mu_s has a rule of its own."""
 
 _AT_MU_S = "mu_c has been trained up to mu_s, which is fixed and which it cannot exceed: name mu_s in trainable too"
 _LARGEST_EXPONENT = 30.0
@@ -43,14 +43,6 @@ class PhysicalParameters(nn.Module):
     """The values as last set, `[P]`."""
     scale: Tensor
     """Physical size of a raw step of 1, where it has one, `[P]`."""
-    places: Tensor
-    """Indices of the raw numbers in the vector, `[number of trainable ones]`."""
-    grows: Tensor
-    """True for values that are `p_0 exp(w)`, `[P]`."""
-    moves: Tensor
-    """True for values that are `p_0 + scale w`, `[P]`."""
-    folds: Tensor
-    """True for values that are `scale |w|`, `[P]`."""
 
     def __init__(self, values: Mapping[str, float], trainable: Iterable[str], **kind):
         super().__init__()
@@ -59,17 +51,6 @@ class PhysicalParameters(nn.Module):
         self.register_buffer("values", torch.zeros(len(self.names), **kind))
         self.register_buffer("scale", torch.ones(len(self.names), **kind))
         self.raw = nn.ParameterDict({name: nn.Parameter(torch.zeros((), **kind)) for name in chosen})
-        device = self.values.device
-        places = torch.tensor([self.names.index(name) for name in self.raw], dtype=torch.long, device=device)
-        self.register_buffer("places", places, persistent=False)
-        bounded = "mu_c" if "mu_s" not in chosen else ""  # a mu_c below a fixed mu_s has a rule of its own
-        for rule, members in {
-            "grows": _GROWING - {bounded},
-            "moves": {"centre_x", "centre_y"},
-            "folds": {"sigma_1", "sigma_2"},
-        }.items():
-            mask = torch.tensor([name in chosen and name in members for name in self.names], device=device)
-            self.register_buffer(rule, mask, persistent=False)
         self.set(values)
 
     @torch.no_grad()
@@ -94,29 +75,31 @@ class PhysicalParameters(nn.Module):
         return self._physical()
 
     def _physical(self) -> Tensor:
-        if not self.raw:
-            return self.values
-        raw = torch.zeros_like(self.values).index_copy(0, self.places, torch.stack(list(self.raw.values())))
-        size = self.scale * torch.where(raw >= 0.0, raw, -raw)  # |w| with the slope 1 at 0
-        exponent = torch.where(self.grows, raw.clamp(-_LARGEST_EXPONENT, _LARGEST_EXPONENT), 0.0)
-        now = self.values * torch.exp(exponent)
-        now = torch.where(self.folds, size, now + torch.where(self.moves, self.scale * raw, 0.0))
-        if "mu_s" in self.raw:
-            now = self._with(now, "mu_s", self._of(now, "mu_c") * (1.0 + self._of(size, "mu_s")))
-        elif "mu_c" in self.raw:  # below the fixed mu_s
-            now = self._with(now, "mu_c", self._of(now, "mu_s") / (1.0 + self._of(size, "mu_c")))
-        if "breakaway_ratio" in self.raw:
-            below_one = 1.0 - 16.0 * torch.finfo(now.dtype).eps
-            ratio = (1.0 - torch.exp(-self._of(size, "breakaway_ratio"))).clamp(max=below_one)
-            now = self._with(now, "breakaway_ratio", ratio)
+        return torch.stack(list(self._named().values())) if self.raw else self.values
+
+    def _named(self) -> dict[str, Tensor]:
+        """Return the physical values by name; trained ones follow from their raw numbers."""
+        now, raws = dict(zip(self.names, self.values.unbind(), strict=True)), dict(self.raw.items())
+        for name, scale in zip(self.names, self.scale.unbind(), strict=True):  # mu_c comes before mu_s
+            if name not in raws:
+                continue
+            raw, bounded = raws[name], name == "mu_c" and "mu_s" not in raws  # below the fixed mu_s
+            if name in _GROWING and not bounded:
+                now[name] = now[name] * torch.exp(raw.clamp(-_LARGEST_EXPONENT, _LARGEST_EXPONENT))
+                continue
+            if name.startswith("centre"):
+                now[name] = now[name] + scale * raw
+                continue
+            size = scale * nn.functional.leaky_relu(-raw, -1.0)  # |w|, with the slope 1 at 0
+            if bounded:
+                now[name] = now["mu_s"] / (1.0 + size)
+            elif name == "mu_s":
+                now[name] = now["mu_c"] * (1.0 + size)
+            elif name == "breakaway_ratio":
+                now[name] = (1.0 - torch.exp(-size)).clamp(max=1.0 - 16.0 * torch.finfo(size.dtype).eps)
+            else:
+                now[name] = size
         return now
-
-    def _of(self, vector: Tensor, name: str) -> Tensor:
-        return vector[self.names.index(name)]
-
-    def _with(self, vector: Tensor, name: str, value: Tensor) -> Tensor:
-        i = self.names.index(name)
-        return torch.cat([vector[:i], value[None], vector[i + 1 :]])
 
 
 def _raw(name: str, values: Mapping[str, float], *, fixed_static: bool) -> tuple[float, float]:

@@ -40,10 +40,10 @@ class _OneSize(PhysicalParameters):
             values = {**values, "second_moment": now["second_moment"] * growth**2}
         super().set(values)
 
-    def _physical(self) -> Tensor:
-        now = super()._physical()
-        growth = self._of(now, "contact_radius") / self._of(self.values, "contact_radius")
-        return self._with(now, "second_moment", self._of(self.values, "second_moment") * growth**2)
+    def _named(self) -> dict[str, Tensor]:
+        now, set_last = super()._named(), dict(zip(self.names, self.values.unbind(), strict=True))
+        growth = now["contact_radius"] / set_last["contact_radius"]
+        return now | {"second_moment": set_last["second_moment"] * growth**2}
 
 
 class ReducedPlanarLuGre(ReducedModelPublished):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import torch
 from torch import Tensor
 
@@ -10,7 +12,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.tensors.namespace import rollout_inputs
 from planarfriction.tensors.operations import RolloutOperation, SceneOperation, simulator
 from planarfriction.torch import adjoint
-from planarfriction.torch.base import Compiled, FrictionModule
+from planarfriction.torch.base import FrictionModule
 from planarfriction.torch.namespace import xp
 
 
@@ -42,25 +44,24 @@ def rollout(
         raise InvalidValueError("dt", "be one number", f"shape {list(step.shape)}")
     if twist.shape[-2] == 0:
         raise InvalidValueError("twist", "have T > 0 steps", f"shape {list(twist.shape)}")
-    compiled = model.compiled()
-    obstacle = _obstacle(model, compiled, *inputs)
+    pack, buffers, weights = model.compiled()
+    obstacle = _obstacle(model, buffers, *inputs)
     if method == "adjoint" and obstacle:
         raise InvalidValueError("method", f"be 'eager' {obstacle}", repr(method))
     if method == "eager" or obstacle:
         return Rollout(*model.rollout(*inputs, parameters=parameters))
-    weights, held = compiled.weights, (step, *compiled.buffers)
     cells, weighs = len(weights) > 0, any(each.requires_grad for each in weights)
-    operation = RolloutOperation(compiled.pack, len(model.state_shape), cells, weighs)
-    return Rollout(*adjoint.call(operation, held, start, twist, load, model._vector(parameters), *weights))
+    operation, inputs = RolloutOperation(pack, len(model.state_shape), cells, weighs), (start, twist, load)
+    return Rollout(*adjoint.call(operation, (step, *buffers), *inputs, model._vector(parameters), *weights))
 
 
-def _obstacle(model: FrictionModule, compiled: Compiled, *tensors: Tensor) -> str:
+def _obstacle(model: FrictionModule, buffers: Sequence[Tensor], *tensors: Tensor) -> str:
     """Return the reason why the adjoint cannot be used, or an empty text."""
     if any(tensor.device.type != "cpu" for tensor in (*tensors, model.physical.values)):
         return "for tensors that are not on the processor"
     if tensors[-1].requires_grad:
         return "for a gradient to dt"
-    if any(buffer.requires_grad for buffer in compiled.buffers):
+    if any(buffer.requires_grad for buffer in buffers):
         return "for a gradient to the numbers of the patch"
     return "inside torch.compile" if torch.compiler.is_compiling() else ""
 

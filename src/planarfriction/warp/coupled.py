@@ -12,11 +12,12 @@ import warp as wp
 from planarfriction import coupling, validation
 from planarfriction.coupling import CoupledStep, HostStep
 from planarfriction.errors import InvalidValueError
+from planarfriction.export.pieces import pieces_of
 from planarfriction.models import FrictionModel
 from planarfriction.models.base import lever_of
 from planarfriction.warp import arrays
 from planarfriction.warp.kernels import Problems, kernel_of
-from planarfriction.warp.source import coupled_source_of, described
+from planarfriction.warp.source import coupled_source_of
 
 WRONG = {1: "parameters", 2: "state and host"}
 """Bits of `CoupledPatches.status`."""
@@ -69,15 +70,14 @@ class CoupledPatches:
         which = [next(i for i, each in enumerate(known) if each is model) for model in self.models]
         if follows is not None and len(follows) != len(which):
             raise InvalidValueError("follows", f"hold one for each of {len(which)} models", len(follows))
-        kinds = [described(model, precision) for model in known]
-        pieces = [each.pieces for each in kinds]
+        pieces = [pieces_of(model, precision) for model in known]
         can = [not pieces[kind].fixed for kind in which]
         for p, follow in enumerate(follows or ()):
             if follow and not can[p]:
                 raise InvalidValueError("follows", "be False for a law with a reference_load", f"True of model {p}")
         self._follows = follows is not None or all(can)
         radii = [lever_of(model) or 1.0 for model in self.models]
-        source = coupled_source_of(kinds, which, follows or can, radii, precision)
+        source = coupled_source_of(pieces, which, follows or can, radii, precision)
         self.state_shape = (sum(math.prod(model.state_shape) for model in self.models),)
         """Shape of the state of the patches of a world."""
         self.names = tuple((*pieces[kind].parameters, "scale") for kind in which)

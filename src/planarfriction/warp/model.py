@@ -11,10 +11,11 @@ import warp as wp
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.export.pieces import pieces_of
 from planarfriction.models import FrictionModel
 from planarfriction.warp import arrays
 from planarfriction.warp.kernels import Batch, kernel_of
-from planarfriction.warp.source import described, source_of
+from planarfriction.warp.source import source_of
 
 WRONG = {1: "parameters", 2: "state, twist and normal_force"}
 """Bits of `Model.status`."""
@@ -66,12 +67,12 @@ class Model:
         self.device, self.dtype = wp.get_device(device), dtype
         kinds = self._indices(which, len(models))
         precision, most = arrays.precision_of(dtype), max((each.state_shape for each in models), key=math.prod)
-        pieces = [described(each, precision, most[-1] if len(most) > 1 else 0) for each in models]
+        pieces = [pieces_of(each, precision, count=most[-1] if len(most) > 1 else 0) for each in models]
         sources = [source_of(each, precision) for each in pieces]
-        self._fixed = pieces[0].pieces.fixed
+        self._fixed = pieces[0].fixed
         if any(each.text != sources[0].text for each in sources):
             raise InvalidValueError("model", "have one source, as all of `ReducedModel(patch, law)` do", "several")
-        numbers = [{**each.pieces.parameters, "scale": 1.0} for each in pieces]
+        numbers = [{**each.parameters, "scale": 1.0} for each in pieces]
         self.names = tuple(numbers[0])
         """Parameters in the order of the columns of `parameters`."""
         self.state_shape = (self.contacts, *most)

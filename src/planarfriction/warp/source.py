@@ -7,15 +7,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.export.c_source import Writer
+from planarfriction.export.c_source import Writer, rendered
 from planarfriction.export.c_values import Array, Fixed
 from planarfriction.export.library import PARAMETERS, PRECISIONS, tilt_of
 from planarfriction.export.loops import Loops
-from planarfriction.export.pieces import Pieces, pieces_of
+from planarfriction.export.pieces import Pieces
 from planarfriction.export.twins import twin
 from planarfriction.kernels import coupling, small_matrices
 from planarfriction.kernels.trace import Block, Number, Trace, traced
-from planarfriction.models import FrictionModel
 
 ROUNDING = {"double": (coupling.ROUNDING,) * 2, "float": (3e-7, 1e-5)}
 """Errors of a twist, in the largest speed that goes into it, by precision: below the first no step gets, and below the
@@ -30,42 +29,21 @@ class Source(NamedTuple):
     """Tables of numbers, one after another."""
 
 
-class Described(NamedTuple):
-    """A model for the source."""
-
-    pieces: Pieces
-    points: np.ndarray
-    """Cells that share the load [n, 2] [m]."""
-    moves: bool
-    """True if the patch moves where their pressure cannot follow moments any further."""
-
-
-def described(model: FrictionModel, precision: str, count: int = 0) -> Described:
-    """Return the pieces of a model and the points that share its load, `count` of them if it has fewer cells.
-
-    Raises InvalidValueError for models without source (see `export_c`).
-    """
-    points, words = model.compiled.points()
-    pieces = pieces_of(model, precision, count=count)
-    more, mode = [(0, pieces.count - len(points)), (0, 0)], "edge" if len(points) else "constant"
-    return Described(pieces, np.pad(points, more, mode=mode), not words)
-
-
-def source_of(model: Described, precision: str) -> Source:
+def source_of(model: Pieces, precision: str) -> Source:
     """Return the source of a step in single or double precision ("float", "double")."""
     (own,), numbers = _described([model], precision, slopes=False)
-    return Source(_rendered("step.cpp.j2", own=own), numbers)
+    return Source(rendered("planarfriction.warp", "step.cpp", own=own), numbers)
 
 
 def coupled_source_of(
-    models: Sequence[Described], which: Sequence[int], follows: Sequence[bool], radii: Sequence[float], precision: str
+    models: Sequence[Pieces], which: Sequence[int], follows: Sequence[bool], radii: Sequence[float], precision: str
 ) -> Source:
     """Return the source of a step in contact space.
 
     `which` are the models of the patches, `follows` tells whose pressure follows moments, `radii` are lever arms [m].
     """
     kinds, numbers = _described(models, precision, slopes=True)
-    pieces = [models[kind].pieces for kind in which]
+    pieces = [models[kind] for kind in which]
     counts = {
         "columns": [len(each.parameters) + 1 for each in pieces],
         "states": [each.count * each.states for each in pieces],
@@ -74,8 +52,9 @@ def coupled_source_of(
     starts = {name: np.cumsum([0, *each]).tolist() for name, each in counts.items()}
     writer = Writer(precision)
     names = "SHORTENINGS", "JOINT", "ROUND", "STAGES", "SHORTER"
-    text = _rendered(
-        "coupled.cpp.j2",
+    text = rendered(
+        "planarfriction.warp",
+        "coupled.cpp",
         kinds=kinds,
         which=which,
         precision=precision,
@@ -104,23 +83,22 @@ def _systems(writer: Writer, unknowns: int) -> str:
     return "\n\n".join(loops.functions).replace("static ", "static CUDA_CALLABLE ")
 
 
-def _described(models: Sequence[Described], precision: str, slopes: bool) -> tuple[list[dict[str, Any]], np.ndarray]:
+def _described(models: Sequence[Pieces], precision: str, slopes: bool) -> tuple[list[dict[str, Any]], np.ndarray]:
     """Return what a template needs of each model, and the tables of all of them."""
     writer, described = Writer(precision), []
     joined: list[np.ndarray] = []
-    for pieces, points, moves in models:
+    for pieces in models:
         block = _slopes_by_twist(pieces) if slopes else pieces.step
         outputs = [f"next[{i}]" for i in range(pieces.states)]
         outputs += [f"w[{i}]" for i in range(len(block.results) - pieces.states)]
         lines = list(writer.lines(block, outputs, indent=" " * 12))
-        tables = dict(zip(("place_x", "place_y"), points.T, strict=True)) | {"share": pieces.tables["share"]}
+        tables = {name: pieces.tables[name] for name in ("place_x", "place_y", "share")}
         tables |= {name: each for name, each in pieces.tables.items() if any(f"{name}[" in line for line in lines)}
         described.append(
             {
                 "precision": precision,
                 "pieces": pieces,
                 "slopes": slopes,
-                "moves": moves,
                 "tilt": tilt_of(pieces.count).replace("static ", "CUDA_CALLABLE ").replace(")\n{", ") const\n{"),
                 "ranges": [PARAMETERS[each][1] for each in pieces.parameters],
                 "largest": writer.constant(PRECISIONS[precision]),
@@ -134,17 +112,9 @@ def _described(models: Sequence[Described], precision: str, slopes: bool) -> tup
 def _slopes_by_twist(pieces: Pieces) -> Block:
     """Return the step with the slopes of the wrench by the twist, row by row, and of a fixed stiffness by the load."""
     block, first = pieces.slopes(), pieces.states + 3
-    columns = pieces.states + 3 + len(pieces.parameters) + pieces.fixed
-    rows = [block.results[first + columns * row : first + columns * (row + 1)] for row in range(3)]
+    rows = [block.results[first + pieces.columns * row :][: pieces.columns] for row in range(3)]
     results = sum((row[pieces.states : pieces.states + 3] for row in rows), block.results[:first])
     return Block(block.operations, results + tuple(row[-1] for row in rows if pieces.fixed))
-
-
-def _rendered(name: str, **values: Any) -> str:
-    import jinja2
-
-    loader = jinja2.PackageLoader("planarfriction.warp", ".")
-    return jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined).get_template(name).render(values)
 
 
 def _placed(tables: dict[str, np.ndarray], joined: list[np.ndarray]) -> dict[str, int]:

@@ -52,8 +52,7 @@ class Asked(NamedTuple):
     twists: np.ndarray
     loads: np.ndarray
     touching: list[bool]
-    twist_answers: np.ndarray
-    load_answers: np.ndarray
+    answers: np.ndarray
     """Reaction of twists and loads to wrenches at the end, from which the next step starts."""
     velocities: np.ndarray
     """Velocities of the plant `[nv]` at the end of the step."""
@@ -127,10 +126,8 @@ class Asking:
                 misfit, off, twist = moved, 0.0 * owed, row.twist
                 break
         report = passes, iterations, row.residual[0], misfit, row.converged[0]
-        twists, loads = row.response.ravel(), row.load_response.ravel()
-        return Asked(
-            row.new, wrench, force, off, axes, twist - owed, load, self._touching, twists, loads, velocity, report
-        )
+        answers = np.concatenate([row.response.ravel(), row.load_response.ravel()])
+        return Asked(row.new, wrench, force, off, axes, twist - owed, load, self._touching, answers, velocity, report)
 
     def _forget(self) -> None:
         self._touching = [False] * len(self._touching)

@@ -24,6 +24,7 @@ from planarfriction.adapters.mujoco.patches import (
     memory,
     parameters_in,
     place_of_parameters,
+    surface_velocities,
 )
 from planarfriction.coupling import ITERATIONS, TOLERANCE
 from planarfriction.environments import SHAPE, check, defaults
@@ -81,7 +82,6 @@ class _Fixed:
     """True for patches whose pressure follows their contact forces."""
     shapes: tuple[tuple[int, ...], ...]
     """Shapes of the states."""
-    radius: np.ndarray
     memory: Any
     """Places of the memory of the patches in `userdata`."""
     nuserdata: int
@@ -121,8 +121,9 @@ class Friction:
         made = zip(numbers, np.array([defaults(patch.model.law) for patch in patches]).T, strict=True)
         changed = {name: jnp.asarray(numbers[name]) for name, own in made if (numbers[name] != own).any()}
         self.parameters: dict[str, jax.Array] = changed
-        fixed = responses.places(m, placed, radius), which, follows, shapes, radius, at, m.nuserdata
-        self._fixed = _Fixed(*fixed, numbers=check(numbers))
+        columns = (np.array([getattr(each, name) for each in placed]) for name in responses.PatchPlaces._fields[:6])
+        places = responses.PatchPlaces(*columns, radius=radius, surface=surface_velocities(m, placed))
+        self._fixed = _Fixed(places, which, follows, shapes, at, m.nuserdata, check(numbers))
 
     def replace(self, models: Sequence[FrictionPytree]) -> Self:
         """Return the same patches with other models, which must be of the same kinds in the same order.
@@ -170,7 +171,7 @@ class Friction:
     def states(self, d: Any) -> list[jax.Array]:
         """Return the state of each patch at the current time of the data."""
         at, sizes = self._fixed.memory, [math.prod(shape) for shape in self._fixed.shapes]
-        flat = self._now(d, at.new, at.state, sum(sizes))
+        flat = self._now(d, at.after, at.state, sum(sizes))
         parts = jnp.split(flat, np.cumsum(sizes)[:-1], axis=-1)
         return [z.reshape(*z.shape[:-1], *shape) for z, shape in zip(parts, self._fixed.shapes, strict=True)]
 
@@ -195,7 +196,7 @@ class Friction:
     def reset(self, d: Any) -> Any:
         """Return the data with all bristles relaxed."""
         at = self._fixed.memory
-        return d.replace(userdata=d.userdata.at[..., at.state : at.converged + 1].set(0.0))
+        return d.replace(userdata=d.userdata.at[..., at.before : at.converged + 1].set(0.0))
 
     def _each(self, d: Any, first: int, count: int) -> jax.Array:
         k = len(self._fixed.which)
@@ -237,7 +238,7 @@ class Friction:
         twist, load = answer.host.twists(wrench), answer.host.loads(wrench)
         new, _ = self._evaluate(own, pressed, shift, states, twist, load, dt)
         d = self._integrated(m, d, where.jacobian, wrench, answer)
-        kept = {"state": begun, "new": new, "guess": guess, "load": load, "held": held, "centre": where.moved(shift)}
+        kept = {"state": begun, "after": new, "guess": guess, "load": load, "held": held, "centre": where.moved(shift)}
         kept |= {"before": before, "axis": where.axes[:, 0]}
         shift = shift + own.displaced
         kept |= {"wrench": wrench_from(xp, wrench.reshape(-1, 3), -shift), "twist": twist_at(xp, twist, shift)}
@@ -273,7 +274,7 @@ class Friction:
 
     def _search(self, own: _Own, m, d, where: responses.Geometry, states, guess) -> _Search:
         """Find the constraints that are active in the end, and the wrenches, without derivatives."""
-        applied, dt, radius = d.qfrc_applied, m.opt.timestep, own.scale * self._fixed.radius
+        applied, dt, radius = d.qfrc_applied, m.opt.timestep, own.scale * self._fixed.places.radius
 
         def body(last: _Search) -> _Search:
             pushed = mjx.fwd_acceleration(m, d.replace(qfrc_applied=applied + last.wrench @ where.jacobian))

@@ -9,17 +9,14 @@ and it has derivatives where the solver's loop has none.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from mujoco import mjx
 
 from planarfriction.adapters.mjx.newton import HostResponse
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
-from planarfriction.adapters.mujoco.patches import Placed, surface_velocities
 from planarfriction.jax.namespace import xp
 from planarfriction.kernels.coupling_rows import ALONG, FLAT
 from planarfriction.tensors.pressure import centre_of
@@ -140,12 +137,6 @@ class PatchPlaces(NamedTuple):
     """Lever arms of the patches [m]."""
     surface: Any
     """Velocities of the surfaces of both geoms in their frames (`surfacevel`), `[k, 2, 6]`."""
-
-
-def places(m: Any, placed: Sequence[Placed], radius: np.ndarray) -> PatchPlaces:
-    """Return the places of patches found in a model."""
-    columns = (np.array([getattr(each, name) for each in placed]) for name in PatchPlaces._fields[:6])
-    return PatchPlaces(*columns, radius=radius, surface=surface_velocities(m, placed))
 
 
 class Geometry(NamedTuple):

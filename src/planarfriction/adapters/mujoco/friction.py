@@ -29,7 +29,6 @@ from planarfriction.adapters.mujoco.patches import (
     memory,
     parameters_in,
     place_of_parameters,
-    write_parameters,
 )
 from planarfriction.compiler.calls import address_of
 from planarfriction.compiler.memory import place_of, row_of
@@ -109,7 +108,14 @@ class Friction:
         if not counts:
             raise InvalidValueError("parameters", "hold an array, with a number for each environment", "none")
         models = [copy.copy(self.m) for _ in range(counts[0])]
-        write_parameters(models, self._place, len(self.patches), values)
+        shapes = (), (len(models),), (len(models), len(self.patches))
+        for name, value in values.items():
+            if value.shape not in shapes:
+                rule = f"have shape {' or '.join(str(list(each)) for each in shapes)}"
+                raise InvalidValueError(name, rule, value.shape)
+            rows = np.broadcast_to(value.reshape(*value.shape, *[1] * (2 - value.ndim)), shapes[2])
+            for m, row in zip(models, rows, strict=True):
+                self.parameters(m)[name][:] = row
         for m in models:
             check(self.parameters(m))
         return models
@@ -134,7 +140,7 @@ class Friction:
         """Return the state of all patches now, as a view of `userdata`, which `coupled.states` gives its shape."""
         at = self._memory
         stepped = d.time == d.userdata[at.next]
-        return self._own(d, at.new if stepped else at.state, self.coupled.state_shape[0])
+        return self._own(d, at.after if stepped else at.state, self.coupled.state_shape[0])
 
     def wrenches(self, d: Any) -> np.ndarray:
         """Return the last wrenches `[k, 3]` [N, N, N m] on the sites' bodies, in the patches' frames; a view."""
@@ -176,7 +182,7 @@ class Friction:
     def reset(self, d: Any) -> None:
         """Relax all bristles."""
         at = self._memory
-        d.userdata[at.state : at.converged + 1] = 0.0
+        d.userdata[at.before : at.converged + 1] = 0.0
         d.userdata[at.next] = d.time
 
     def draw(self, scene: Any, d: Any) -> None:
@@ -263,7 +269,7 @@ class Friction:
         extents = np.array([each.extent() for each in self.placed])
         laws = np.array([not is_rate_law(patch.model.law) for patch in self.patches], np.int64)
         self._kept = problem, columns, free, packed, extents, laws
-        places = {name: place_of(columns) + 8 * k * i for i, name in enumerate(_COLUMNS.values())}
+        places = {name: place_of(columns) + 8 * k * i for i, name in enumerate(_COLUMNS)}
         host = Host(
             m=self.m._address, same_count=len(same()), same=place_of(same()),
             nv=self.m.nv, nuserdata=self.m.nuserdata, count=k, states=self.coupled.state_shape[0],
@@ -276,11 +282,8 @@ class Friction:
         return row_of(host)
 
 
-_COLUMNS = {
-    "site": "sites", "own": "own", "other": "other", "owner": "own_bodies", "support": "other_bodies",
-    "pair": "pairs", "at_contact": "at_contact", "has_faces": "faces", "on_box": "boxes",
-}  # fmt: skip
-"""Attributes of `Placed` that compiled steps read, with the names of their addresses in `Host`."""
+_COLUMNS = "site", "own", "other", "owner", "support", "pair", "at_contact", "has_faces", "on_box"
+"""Attributes of `Placed` that compiled steps read, and fields of `Host` with their addresses."""
 
 _ALONE = "mj_step has none by itself; call friction.step(d) instead, or mj_step within friction.install()"
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import difflib
 import hashlib
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from planarfriction.adapters.mujoco.loops.centres import BEHIND, BEYOND
 from planarfriction.adapters.mujoco.loops.models import DIGEST, LONGEST
 from planarfriction.adapters.mujoco.loops.records import Memory, memory_layout
 from planarfriction.compiler.memory import Layout
-from planarfriction.environments import check, defaults
+from planarfriction.environments import defaults
 from planarfriction.equality import Checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import PARAMETERS
@@ -176,17 +176,6 @@ def parameters_in(m: Any, place: int, k: int) -> dict[str, np.ndarray]:
     """Return views `[k]` of the parameters of k patches in a model."""
     rows = m.numeric_data[place : place + k * len(PARAMETERS)].reshape(k, len(PARAMETERS))
     return dict(zip(PARAMETERS, rows.T, strict=True))
-
-
-def write_parameters(models: Sequence[Any], place: int, k: int, parameters: Mapping[str, Any]) -> None:
-    """Write parameters of k patches into models of E environments: by name a number, `[E]`, or `[E, k]`."""
-    shapes = (), (len(models),), (len(models), k)
-    for name, values in check(parameters).items():
-        if values.shape not in shapes:
-            raise InvalidValueError(name, f"have shape {' or '.join(str(list(each)) for each in shapes)}", values.shape)
-        values = np.broadcast_to(values.reshape(*values.shape, *[1] * (2 - values.ndim)), shapes[2])
-        for m, row in zip(models, values, strict=True):
-            parameters_in(m, place, k)[name][:] = row
 
 
 def _digest(patches: Sequence[PatchContact]) -> list[int]:

@@ -105,7 +105,7 @@ class Friction:
 
     def states(self) -> wp.array[Any]:
         """Return the states of all patches at the ends of the last steps, a view [worlds, states]."""
-        return self._kept(self._at.new, self.coupled.state_shape[0])
+        return self._kept(self._at.after, self.coupled.state_shape[0])
 
     def wrenches(self) -> wp.array[Any]:
         """Return the last wrenches on the sites' bodies, in the patches' frames, a view [worlds, 3k] [N, N, N m]."""
@@ -128,7 +128,7 @@ class Friction:
 
     def reset(self) -> None:
         """Relax all bristles."""
-        self._kept(self._at.state, self._at.converged + 1 - self._at.state).zero_()
+        self._kept(self._at.before, self._at.converged + 1 - self._at.before).zero_()
 
     def _kept(self, first: int, count: int) -> Any:
         return self._memory[:, first : first + count]
@@ -194,56 +194,41 @@ class Friction:
 
     def _make(self, worlds: int) -> None:
         """Make the arrays that steps work with."""
-        m, k, nv, device = self.m, len(self.patches), self.m.nv, self.coupled.device
-        njmax = self.data.efc.force.shape[1]
+        m, k, nv, n, njmax = self.m, len(self.patches), self.m.nv, 3 * len(self.patches), self.data.efc.force.shape[1]
 
-        def zeros(*shape: int, dtype: Any = float) -> Any:
-            return wp.zeros((worlds, *shape), dtype=dtype, device=device)
+        def zeros(struct: Any, others: tuple[int, ...], **shapes: tuple[int, ...]) -> Any:
+            """Return a struct with arrays of zeros, of these shapes behind the axis of worlds."""
+            made, device = struct(), self.coupled.device
+            for name, each in struct.vars.items():
+                shape = worlds, *shapes.get(name, others)
+                setattr(made, name, wp.zeros(shape, dtype=each.type.dtype, device=device))
+            return made
 
         self._dt = float(m.opt.timestep)
-        places = self._at._asdict()
-        self._places = _filled(geometry.Places(), {geometry.AFTER: places.pop("new"), **places})
-        self._patches = self._numbers()
-        self._frames = _filled(
-            geometry.Frames(),
-            {
-                "owner": zeros(njmax, dtype=int), "lever": zeros(njmax, dtype=wp.vec2), "touching": zeros(k, dtype=int),
-                "axes": zeros(k, dtype=wp.mat33), "origin": zeros(k, dtype=wp.vec3), "rolling": zeros(k),
-                "before": zeros(k, dtype=wp.vec3), "axis": zeros(k, dtype=wp.vec3), "drift": zeros(k, dtype=wp.vec3),
-                "jacobian": zeros(3 * k, nv), "held": zeros(k, dtype=wp.vec3), "centre": zeros(k, dtype=wp.vec3),
-            },
-        )  # fmt: skip
-        double = {"dtype": wp.float64}
-        self._scratch = _filled(
-            responses.Scratch(),
-            {
-                "done": zeros(dtype=int), "active": zeros(njmax, dtype=int), "stiff": zeros(nv, nv, **double),
-                "answers": zeros(nv, 3 * k + 1, **double), "gains": zeros(nv, 3 * k + 1, **double),
-                "acceleration": zeros(nv, **double), "pressed": zeros(k, dtype=wp.vec2),
-                "rounds": zeros(dtype=int), "passes": zeros(dtype=int),
-            },
-        )  # fmt: skip
-        self._state, self._results = self.coupled.rest(), self.coupled.results()
-        arrays = [zeros(k, 3), zeros(k), zeros(k, 3), zeros(3 * k, 3 * k), zeros(k, 3 * k), zeros(k, 2)]
-        names, self._host = ("twist", "load", "guess", "response", "load_response", "moments"), HostStep(*arrays)
-        self._problem = _filled(geometry.Problem(), {"state": self._state, **dict(zip(names, arrays, strict=True))})
-        self._metric = zeros(self.model.nC)
+        self._places, self._patches = _filled(geometry.Places(), self._at._asdict()), self._numbers()
+        self._frames = zeros(geometry.Frames, (k,), owner=(njmax,), lever=(njmax,), jacobian=(n, nv))
+        both = {"answers": (nv, n + 1), "gains": (nv, n + 1), "stiff": (nv, nv), "acceleration": (nv,)}
+        self._scratch = zeros(responses.Scratch, (), active=(njmax,), pressed=(k,), **both)
+        wide = {"response": (n, n), "load_response": (k, n), "moments": (k, 2), "state": self.coupled.state_shape}
+        self._problem = p = zeros(geometry.Problem, (k, 3), load=(k,), **wide)
+        self._host = HostStep(p.twist, p.load, p.guess, p.response, p.load_response, p.moments)
+        self._state, self._results = p.state, self.coupled.results()
+        self._metric = wp.zeros((worlds, self.model.nC), dtype=float, device=self.coupled.device)
         damped = bool(m.dof_damping.any()) and not m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
         self._implicit = int(damped) if m.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER else 2
 
     def _numbers(self) -> Any:
         """Return the numbers of the patches for kernels."""
-        device, shapes = self.coupled.device, [each.model.state_shape for each in self.patches]
+        shapes = [each.model.state_shape for each in self.patches]
         names = "site", "own", "other", "owner", "support", "at_contact"
-        columns = {name: [int(getattr(each, name)) for each in self.placed] for name in names}
-        columns |= {"bristles": [math.prod(shape[1:]) for shape in shapes]}
-        columns |= {"first": np.cumsum([0, *map(math.prod, shapes)])[:-1].tolist()}
-        found = {name: wp.array(each, dtype=int, device=device) for name, each in columns.items()}
-        surface = surface_velocities(self.m, self.placed).astype(np.float32)
-        found["surface"] = wp.array(surface, dtype=wp.spatial_vector, device=device)
-        found["radius"] = wp.array([lever_of(each.model) for each in self.patches], dtype=float, device=device)
-        sizes = {"count": len(self.patches), "states": self.coupled.state_shape[0]}
-        return _filled(geometry.Patches(), found | sizes)
+        found = {name: [int(getattr(each, name)) for each in self.placed] for name in names}
+        found |= {"bristles": [math.prod(shape[1:]) for shape in shapes]}
+        found |= {"first": np.cumsum([0, *map(math.prod, shapes)])[:-1].tolist()}
+        found |= {"radius": [lever_of(each.model) for each in self.patches]}
+        found |= {"surface": surface_velocities(self.m, self.placed).astype(np.float32)}
+        kinds, device = geometry.Patches.vars, self.coupled.device
+        arrays = {name: wp.array(each, dtype=kinds[name].type.dtype, device=device) for name, each in found.items()}
+        return _filled(geometry.Patches(), arrays | {"count": len(shapes), "states": self.coupled.state_shape[0]})
 
     def _bound(self, m: Any, d: Any) -> Any:
         """Return the arrays of model and data for kernels."""

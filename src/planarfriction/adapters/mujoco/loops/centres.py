@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from planarfriction.adapters.mujoco.loops.geometry import axes, column, owners_of, places_of
-from planarfriction.adapters.mujoco.loops.parameters import displacement_of, scale_of
+from planarfriction.adapters.mujoco.loops.models import displacement_of, scale_of
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import at, doubles, integers
@@ -74,8 +74,8 @@ def _move(own, s, nefc, p, guess, dx, dy):
 def _fault(own, m, d, s, p, x, y):
     """Return the fault of patch p, with the centre of its contact forces at x, y in its frame."""
     scale, (dx, dy) = scale_of(own, m, p), displacement_of(own, m, p)
-    frame, site, extent = at(s.frames, 6 * p), integers(own.sites)[p], at(doubles(own.extents), 6 * p)
-    normal, faces = axes(s, p)[2], integers(own.faces)[p] != 0
+    frame, site, extent = at(s.frames, 6 * p), integers(own.site)[p], at(doubles(own.extents), 6 * p)
+    normal, faces = axes(s, p)[2], integers(own.has_faces)[p] != 0
     if integers(own.at_contact)[p] == 0:
         size = scale * extent[4]
         slack = MARGIN * size + s.depths[2 * p + 1]
@@ -100,7 +100,7 @@ def _support(own, m, d, s, p, support):
     """
     other, shrunk = integers(own.other)[p], 1.0 / scale_of(own, m, p)
     support[4] = 0.0
-    if integers(own.boxes)[p] == 0:
+    if integers(own.on_box)[p] == 0:
         return
     x, y, normal = axes(s, p)
     turned = at(doubles(integers(d + own.data.geom_xmat)[0]), 9 * other)
@@ -135,11 +135,11 @@ def _resize(own, m, s, nefc, p, guess):
 def follow_centres(own, m, d, s, nefc, radius, problem, kept):
     """Move origins towards the centres of the contact forces, remember them, and note a patch that is misplaced.
 
-    Displace the patches from there, and write the faces that bear them (see `parameters`).
+    Displace the patches from there, and write the faces that bear them (see `models`).
     """
     kept.misplaced[0], dt = 0.0, doubles(m + own.model.timestep)[0]
     for p in range(own.count):
-        held, centre, site = at(kept.held, 3 * p), at(kept.centre, 3 * p), integers(own.sites)[p]
+        held, centre, site = at(kept.held, 3 * p), at(kept.centre, 3 * p), integers(own.site)[p]
         centre[0], centre[1], centre[2] = 0.0, 0.0, 0.0
         if s.counts[p] == 0:
             continue

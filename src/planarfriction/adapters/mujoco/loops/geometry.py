@@ -82,7 +82,7 @@ def axes(s, p):
 @kernel
 def _put_axis(own, d, s, p, before, axis):
     """Write the x axis of patch p: that of its site, across the normal, on the side of the last one; see `FLAT`."""
-    turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * integers(own.sites)[p])
+    turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * integers(own.site)[p])
     frame, x, y, last = (
         three(at(s.frames, 6 * p)),
         column(turned, 0),
@@ -140,7 +140,7 @@ def _put_origin(own, d, s, p, normal, held):
     """
     frame, local = at(s.frames, 6 * p), three(held)
     middle = times(1.0 / s.counts[p], three(at(frame, 3)))
-    site, new = integers(own.sites)[p], square(local) == 0.0
+    site, new = integers(own.site)[p], square(local) == 0.0
     turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
     origin = plus(three(at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site)), 1.0, turned_by(turned, local))
     if integers(own.at_contact)[p] != 0:
@@ -164,7 +164,7 @@ def _rows(own, m, d, s, nefc, p, kept):
     clear(rows, 3 * nv)
     moves, turns, velocity, roll, rock = s.moves, s.turns, doubles(integers(d + own.data.qvel)[0]), 0.0, 0.0
     for side in range(2):
-        body = integers(own.own_bodies)[p] if side == 0 else integers(own.other_bodies)[p]
+        body = integers(own.owner)[p] if side == 0 else integers(own.support)[p]
         if body == 0:
             continue
         sign = 1.0 if side == 0 else -1.0

@@ -1,16 +1,76 @@
-"""Models that the steps of a `Host` serve, and the options that fit them, which users may set at any time."""
+"""Models that the steps of a `Host` serve; what users may set in them at any time: options, and parameters of patches.
+
+Parameters stand in a custom numeric, which copies of a model may change. Size and displacement act where twists and
+wrenches come in and go out. With the spin's row of the Jacobian times the size, the step in contact space sees the
+patch in the model's own size: twists `(v, scale omega)`, torques over scale.
+"""
 
 from __future__ import annotations
 
-from planarfriction.adapters.mujoco.loops.parameters import are_in_range
+from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import doubles, integers, integers32
+from planarfriction.compiler.memory import at, doubles, integers, integers32
+from planarfriction.formulas import PARAMETERS, LawNumbers
+from planarfriction.kernels.vectors import copy
 
 LONGEST = 0.01
 """Longest time step [s] where MuJoCo makes contacts softer for it, and the integrator is implicit."""
 
 DIGEST = 5
 """Numbers of the record of a prepared model in front of the parameters of its patches."""
+
+COUNT = len(PARAMETERS)
+
+_PLACES = tuple(LawNumbers._fields.index(name) for name in PARAMETERS if name in LawNumbers._fields)
+_SIGMA_0, _SIGMA_1, _SIGMA_2, _MU_C, _MU_S, _V_S, _RATIO, _SCALE, _X, _Y = range(COUNT)
+
+
+@kernel
+def parameters_of(own, m, p):
+    """Return the parameters of patch p in a model, in the order of `PARAMETERS`."""
+    return at(doubles(integers(m + own.model.numeric_data)[0]), own.parameters + COUNT * p)
+
+
+@kernel
+def are_in_range(own, m):
+    """Return True if the parameters of all patches follow their rules (`environments.RULES`)."""
+    valid = True
+    for p in range(own.count):
+        q = parameters_of(own, m, p)
+        for i in range(COUNT):
+            valid = valid and xp.in_range(q[i])
+        valid = valid and q[_SIGMA_0] > 0.0 and q[_SIGMA_1] >= 0.0 and q[_SIGMA_2] >= 0.0
+        valid = valid and q[_MU_C] > 0.0 and q[_MU_S] >= q[_MU_C] and q[_V_S] > 0.0
+        valid = valid and q[_RATIO] >= 0.0 and q[_RATIO] < 1.0 and q[_SCALE] > 0.0
+    return valid
+
+
+@kernel
+def scale_of(own, m, p):
+    """Return the size of patch p in a model, as a multiple of that of its friction model."""
+    return parameters_of(own, m, p)[_SCALE]
+
+
+@kernel
+def displacement_of(own, m, p):
+    """Return the displacement of patch p in a model along its axes [m]."""
+    q = parameters_of(own, m, p)
+    return q[_X], q[_Y]
+
+
+@kernel
+def write_laws(own, m, patches, problem, place):
+    """Let the patches act with the laws of the model, in copies of their records behind the address `place`."""
+    for p in range(patches.count):
+        if integers(own.laws)[p] == 0:
+            continue
+        words, record, copied = integers(own.record_words)[p], integers(problem.records[p]), integers(place)
+        copy(record, copied, words)
+        law, q = doubles(place), parameters_of(own, m, p)
+        for i in range(len(_PLACES)):
+            law[_PLACES[i]] = q[i]
+        problem.records[p] = place
+        place = at(place, words)
 
 
 @kernel
@@ -46,15 +106,15 @@ def serves(own, m):
 @kernel
 def fits(own, m):
     """Return True if the options of a model fit its steps (`Friction` says which do not)."""
-    at, e, dt = own.model, own.constants, doubles(m + own.model.timestep)[0]
-    integrator = integers32(m + at.integrator)[0]
+    offsets, e, dt = own.model, own.constants, doubles(m + own.model.timestep)[0]
+    integrator = integers32(m + offsets.integrator)[0]
     implicit = integrator == e.IMPLICIT or integrator == e.IMPLICITFAST
-    fit = (implicit or integrator == e.EULER) and integers32(m + at.noslip_iterations)[0] <= 0
-    fit = fit and integers32(m + at.enableflags)[0] & e.SLEEP == 0
-    softened = implicit and dt <= LONGEST and integers32(m + at.disableflags)[0] & e.NO_REFSAFE == 0
+    fit = (implicit or integrator == e.EULER) and integers32(m + offsets.noslip_iterations)[0] <= 0
+    fit = fit and integers32(m + offsets.enableflags)[0] & e.SLEEP == 0
+    softened = implicit and dt <= LONGEST and integers32(m + offsets.disableflags)[0] & e.NO_REFSAFE == 0
     for p in range(own.count):
-        pair = integers(own.pairs)[p]
-        constant = doubles(integers(m + at.pair_solref)[0])[2 * pair]
-        fit = fit and integers32(integers(m + at.pair_dim)[0])[pair] == 1
+        pair = integers(own.pair)[p]
+        constant = doubles(integers(m + offsets.pair_solref)[0])[2 * pair]
+        fit = fit and integers32(integers(m + offsets.pair_dim)[0])[pair] == 1
         fit = fit and (softened or constant <= 0.0 or dt <= 0.5 * constant)
     return fit and are_in_range(own, m)

@@ -52,28 +52,31 @@ Constants = _integers(
 
 
 class Remembered(NamedTuple):
-    """Numbers in the user data that patches remember from step to step."""
+    """Numbers in the user data that patches remember from step to step.
 
+    What is copied at once lies side by side: all of the beginning of a step, and in the same order all of its end.
+    """
+
+    before: Doubles
+    """x axes of patches at the beginning of the step, in the frames of their sites, [3k]; 0 before any."""
     state: Doubles
     """State of all patches at `time`."""
-    new: Doubles
-    """State of all patches at `next`."""
     guess: Doubles
     """Wrenches at the beginning of the step, [3k]."""
+    held: Doubles
+    """Origins of patches at the beginning of the step, in the frames of their sites, [3k]; 0 at a site, or for none."""
+    axis: Doubles
+    """x axes of patches in the step, [3k]."""
+    after: Doubles
+    """State of all patches at `next`."""
     wrench: Doubles
     """Wrenches of the step, [3k]."""
+    centre: Doubles
+    """Origins of patches in the step, [3k]."""
     twist: Doubles
     """[3k]"""
     load: Doubles
     """[k]"""
-    held: Doubles
-    """Origins of patches at the beginning of the step, in the frames of their sites, [3k]; 0 at a site, or for none."""
-    centre: Doubles
-    """Origins of patches in the step, [3k]."""
-    before: Doubles
-    """x axes of patches at the beginning of the step, in the frames of their sites, [3k]; 0 before any."""
-    axis: Doubles
-    """x axes of patches in the step, [3k]."""
     warmstart: Doubles
     """`qacc_warmstart` at the beginning of the step, [nv]."""
     passive: Doubles
@@ -99,7 +102,7 @@ Memory = offsets_of(Remembered)
 
 def memory_layout(states: int, k: int, nv: int) -> Layout:
     """Return the layout of `Remembered` for k patches with so many states in all."""
-    shapes = dict.fromkeys(Remembered._fields, 1) | dict.fromkeys(("state", "new"), states) | {"load": k}
+    shapes = dict.fromkeys(Remembered._fields, 1) | dict.fromkeys(("state", "after"), states) | {"load": k}
     shapes |= dict.fromkeys(("guess", "wrench", "twist", "held", "centre", "before", "axis"), 3 * k)
     return Layout(Remembered, **shapes | dict.fromkeys(("warmstart", "passive", "total"), nv))
 
@@ -110,7 +113,7 @@ class Scratch(NamedTuple):
     problem: Doubles
     """Words of a `coupling_rows.Problem`."""
     records: Integers
-    """Records of the patches with the laws of the model (see `parameters.write_laws`)."""
+    """Records of the patches with the laws of the model (see `models.write_laws`)."""
     jacobian: Doubles
     """Jacobian of the twists, [3k, nv]."""
     inertia: Doubles
@@ -196,20 +199,20 @@ class Host(NamedTuple):
     """Address of `coupling.solve`."""
     plan: int
     """Address of `step.plan`."""
-    sites: int
+    site: int
     """Address of the sites of the patches, int [k]; the following fields are addresses too."""
     own: int
     """Geoms on the bodies of the sites."""
     other: int
-    own_bodies: int
-    other_bodies: int
-    pairs: int
+    owner: int
+    support: int
+    pair: int
     """Contact pairs of the model."""
     at_contact: int
     """Address of flags: 1 where the origin is at the centre of the contact forces."""
-    faces: int
+    has_faces: int
     """Address of flags: 1 where a side of the geom on the site's body, and an axis on it, can be told from others."""
-    boxes: int
+    on_box: int
     """Address of flags: 1 where the other geom is a box, whose faces bear patches as far as they go."""
     extents: int
     """Address of least and largest x and y of each patch, its largest distance from the origin, and the width of

@@ -13,8 +13,7 @@ from numba import types
 
 from planarfriction.adapters.mujoco.loops.centres import follow_centres
 from planarfriction.adapters.mujoco.loops.geometry import place
-from planarfriction.adapters.mujoco.loops.models import fits, serves
-from planarfriction.adapters.mujoco.loops.parameters import displacement_of, scale_of, write_laws
+from planarfriction.adapters.mujoco.loops.models import displacement_of, fits, scale_of, serves, write_laws
 from planarfriction.adapters.mujoco.loops.records import Host, Remembered, Scratch, read
 from planarfriction.adapters.mujoco.loops.responses import is_sparse, leaves_range, respond
 from planarfriction.compiler import callback, entry, jit, kernel
@@ -57,16 +56,10 @@ def _recall(host, kept, d):
         copy(kept.warmstart, warmstart, host.nv)
         return again
     if now == kept.next[0] and started:
-        copy(kept.new, kept.state, host.states)
-        copy(kept.wrench, kept.guess, 3 * host.count)
-        copy(kept.centre, kept.held, 3 * host.count)
-        copy(kept.axis, kept.before, 3 * host.count)
+        copy(kept.axis, kept.before, host.states + 9 * host.count)
     else:
         # other times than those of the last step, or a rollout, which clears where the solver starts but not this
-        clear(kept.state, host.states)
-        clear(kept.guess, 3 * host.count)
-        clear(kept.held, 3 * host.count)
-        clear(kept.before, 3 * host.count)
+        clear(kept.before, host.states + 9 * host.count)
     copy(warmstart, kept.warmstart, host.nv)
     kept.time[0] = now
     return again
@@ -185,11 +178,7 @@ def _solve(own, patches, m, d, nefc):
 @kernel
 def _forget(host, kept, d):
     """Clear the memory: no patch is in contact, or none can have friction."""
-    clear(kept.new, host.states)
-    clear(kept.wrench, 3 * host.count)
-    clear(kept.twist, 3 * host.count)
-    clear(kept.load, host.count)
-    clear(kept.centre, 3 * host.count)
+    clear(kept.after, host.states + 10 * host.count)  # and wrenches, origins, twists and loads behind the state
     copy(doubles(integers(d + host.data.qfrc_passive)[0]), kept.total, host.nv)
     kept.iterations[0], kept.passes[0], kept.residual[0], kept.converged[0] = 0.0, 0.0, 0.0, 1.0
     kept.misplaced[0] = 0.0
@@ -203,13 +192,13 @@ def _remember(own, m, iterations, passes):
     for p in range(host.count):
         kept.wrench[3 * p + 2] *= scale_of(host, m, p)
     if valid:
-        copy(problem.new, kept.new, host.states)
+        copy(problem.new, kept.after, host.states)
         copy(problem.twist, kept.twist, 3 * host.count)
         copy(problem.load, kept.load, host.count)
         for p in range(host.count):
             kept.twist[3 * p + 2] /= scale_of(host, m, p)
     else:
-        clear(kept.new, host.states)
+        clear(kept.after, host.states)
     kept.iterations[0], kept.passes[0] = iterations, passes
     kept.residual[0], kept.converged[0] = problem.residual[0], problem.converged[0] if valid else 0.0
 

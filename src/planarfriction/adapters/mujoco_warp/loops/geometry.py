@@ -5,8 +5,6 @@ As `planarfriction.adapters.mujoco.loops.geometry` and `centres`, one thread a w
 
 # No `from __future__ import annotations` here: Warp reads the types themselves.
 
-from typing import Any
-
 import mujoco
 import warp as wp
 
@@ -124,17 +122,8 @@ class Frames:
     """Twists of the surfaces relative to the bodies, of the own one less those of the other [E, k]."""
 
 
-AFTER = "after"
-"""Name of the place of `new` states, which C++ keeps for itself."""
-
-
-def _places() -> Any:
-    """Return a struct with the places of what patches remember (see `Memory`)."""
-    names = [AFTER if name == "new" else name for name in Memory._fields]
-    return wp.struct(type("Places", (), {"__annotations__": dict.fromkeys(names, int)}))
-
-
-Places = _places()
+Places = wp.struct(type("Places", (), {"__annotations__": dict.fromkeys(Memory._fields, int)}))
+"""Places of what patches remember (see `Memory`)."""
 
 
 @wp.kernel(enable_backward=False)
@@ -142,20 +131,10 @@ def recall(patches: Patches, at: Places, host: Host, frames: Frames, problem: Pr
     """Bring states, guesses and origins to the times of the worlds: those of the last step's end, or of its start."""
     w = wp.tid()
     time = host.time[w]
-    if time == memory[w, at.next]:
-        for i in range(patches.states):
-            memory[w, at.state + i] = memory[w, at.after + i]
-        for i in range(3 * patches.count):
-            memory[w, at.guess + i] = memory[w, at.wrench + i]
-            memory[w, at.held + i] = memory[w, at.centre + i]
-            memory[w, at.before + i] = memory[w, at.axis + i]
-    elif time != memory[w, at.time]:
-        for i in range(patches.states):
-            memory[w, at.state + i] = 0.0
-        for i in range(3 * patches.count):
-            memory[w, at.guess + i] = 0.0
-            memory[w, at.held + i] = 0.0
-            memory[w, at.before + i] = 0.0
+    goes_on = time == memory[w, at.next]
+    if goes_on or time != memory[w, at.time]:
+        for i in range(patches.states + 9 * patches.count):
+            memory[w, at.before + i] = wp.where(goes_on, memory[w, at.axis + i], 0.0)
     memory[w, at.time] = time
     memory[w, at.next] = time + host.timestep[w % host.timestep.shape[0]]
     for i in range(patches.states):
