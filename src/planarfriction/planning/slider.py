@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.equality import ByValue, Checked, checked
+from planarfriction.equality import ByValue, Checked, Kept, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.limit_surface import LimitSurface
 
@@ -24,12 +23,8 @@ class Slider(ByValue):
 
     surface: LimitSurface
     """Limit surface of the patch on which it stands; its frame is the slider's."""
-    outline: np.ndarray
+    outline: Kept[ArrayLike, np.ndarray]
     """Corners of the convex outline `[M, 2]` in that frame [m], in either sense of rotation."""
-
-    if TYPE_CHECKING:  # what is given may be more than what is kept
-
-        def __init__(self, surface: LimitSurface, outline: ArrayLike) -> None: ...
 
     def __post_init__(self) -> None:
         validation.instance("surface", self.surface, LimitSurface, "a limit surface")

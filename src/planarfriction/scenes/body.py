@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.equality import ByValue, checked
+from planarfriction.equality import ByValue, Kept, checked
 from planarfriction.errors import InvalidValueError
 
 
@@ -41,29 +41,16 @@ class Body(ByValue):
     """Mass [kg]."""
     inertia: float = checked(validation.positive)
     """Moment of inertia about the centre of mass [kg m^2]."""
-    position: tuple[float, float] = checked(floats, 2, default=(0.0, 0.0))
+    position: Kept[ArrayLike, tuple[float, float]] = checked(floats, 2, default=(0.0, 0.0))
     """Initial position of the centre of mass in the world [m]."""
     angle: float = checked(validation.number, default=0.0)
     """Initial angle of the body's axes in the world [rad]."""
-    velocity: tuple[float, float, float] = checked(floats, 3, default=(0.0, 0.0, 0.0))
+    velocity: Kept[ArrayLike, tuple[float, float, float]] = checked(floats, 3, default=(0.0, 0.0, 0.0))
     """Initial twist `(vx, vy, omega)` of the centre of mass, world axes [m/s, m/s, rad/s]."""
-    gravity: tuple[float, float] = checked(floats, 2, default=(0.0, -9.81))
+    gravity: Kept[ArrayLike, tuple[float, float]] = checked(floats, 2, default=(0.0, -9.81))
     """Gravity in the plane of motion, world axes [m/s^2]."""
-    outline: np.ndarray | None = checked(_polygon, default=None, repr=False)
+    outline: Kept[ArrayLike | None, np.ndarray | None] = checked(_polygon, default=None, repr=False)
     """Polygon in body axes with the centre of mass at the origin, shape `[M, 2]` [m], or None.
 
     It is for drawings, and for contacts with an `edge`.
     """
-
-    if TYPE_CHECKING:  # what is given may be more than what is kept
-
-        def __init__(
-            self,
-            mass: float,
-            inertia: float,
-            position: ArrayLike = (0.0, 0.0),
-            angle: float = 0.0,
-            velocity: ArrayLike = (0.0, 0.0, 0.0),
-            gravity: ArrayLike = (0.0, -9.81),
-            outline: ArrayLike | None = None,
-        ) -> None: ...

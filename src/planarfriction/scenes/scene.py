@@ -7,13 +7,13 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.equality import ByValue, checked
+from planarfriction.equality import ByValue, Kept, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.pictures import picture
 from planarfriction.scenes.body import Body
@@ -56,15 +56,15 @@ class Scene(ByValue):
     Raises InvalidValueError, naming the parameter, if the parts do not make a valid scene.
     """
 
-    body: Body = checked(validation.instance, Body, "a Body")
+    body: Kept[Body | None, Body] = checked(validation.instance, Body, "a Body")
     """The body that moves; None: one without weight, moved as `velocity` prescribes."""
-    contacts: Sequence[Contact] = checked(_contacts)
+    contacts: Kept[Contact | Sequence[Contact], Sequence[Contact]] = checked(_contacts)
     """The contacts it slides on, at least one."""
     t_end: float = checked(validation.positive)
     """Duration [s]."""
-    force: Signal | None = checked(as_signal, 3, default=None)
+    force: Kept[Signal | ArrayLike | None, Signal | None] = checked(as_signal, 3, default=None)
     """Applied wrench `(fx, fy, tau)` at the centre of mass, world axes, `[T, 3]` [N, N, N m], or None."""
-    velocity: Signal | None = checked(as_signal, 3, default=None)
+    velocity: Kept[Signal | ArrayLike | None, Signal | None] = checked(as_signal, 3, default=None)
     """Prescribed twist `(vx, vy, omega)` in **body axes**, `[T, 3]` [m/s, m/s, rad/s], or None for a free body.
 
     It is the velocity of the origin of the body's axes. Mass, inertia, gravity and initial velocity then have no
@@ -84,26 +84,8 @@ class Scene(ByValue):
     """State of the bristles at the start: "rest", relaxed; "equilibrium", carrying the load of a body at rest (with the
     least elastic energy, which determines how contacts share it); "sliding", in the steady state of the initial
     velocity."""
-    springs: Sequence[Spring] = checked(_listed, Spring, default=())
+    springs: Kept[Spring | Sequence[Spring], Sequence[Spring]] = checked(_listed, Spring, default=())
     """Springs that tie the body to anchors; one, several or none."""
-
-    if TYPE_CHECKING:  # what is given may be more than what is kept
-
-        def __init__(
-            self,
-            body: Body | None,
-            contacts: Contact | Sequence[Contact],
-            t_end: float,
-            force: Signal | ArrayLike | None = None,
-            velocity: Signal | ArrayLike | None = None,
-            stop_speed: float | None = None,
-            save_every: float = 0.01,
-            rtol: float = RTOL,
-            atol: float = ATOL,
-            name: str = "scene",
-            start: Literal["rest", "equilibrium", "sliding"] = "rest",
-            springs: Spring | Sequence[Spring] = (),
-        ) -> None: ...
 
     def __post_init__(self) -> None:
         if self.body is None and self.velocity is not None:

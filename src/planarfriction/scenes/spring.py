@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.equality import ByValue, checked
+from planarfriction.equality import ByValue, Kept, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.geometry import rotate
 from planarfriction.scenes.body import floats
@@ -39,26 +39,14 @@ class Spring(ByValue):
     """Stiffness [N/m], >= 0."""
     damping: float = checked(validation.non_negative, default=0.0)
     """Damping [N s/m], >= 0."""
-    anchor: Signal = checked(_pose, default=(0.0, 0.0, 0.0))  # pyright: ignore[reportAssignmentType]
+    anchor: Kept[Signal | ArrayLike, Signal] = checked(_pose, default=(0.0, 0.0, 0.0))
     """Pose `(x, y, angle)` of the anchor in the world, `[T, 3]` [m, m, rad]; `(x, y)` stands for an angle of 0."""
-    at: tuple[float, float] = checked(floats, 2, default=(0.0, 0.0))
+    at: Kept[ArrayLike, tuple[float, float]] = checked(floats, 2, default=(0.0, 0.0))
     """Point of the body, in its axes from its centre of mass [m]."""
     torsion: float = checked(validation.non_negative, default=0.0)
     """Stiffness about the vertical [N m/rad], >= 0."""
     torsion_damping: float = checked(validation.non_negative, default=0.0)
     """Damping about the vertical [N m s/rad], >= 0."""
-
-    if TYPE_CHECKING:  # what is given may be more than what is kept
-
-        def __init__(
-            self,
-            stiffness: float,
-            damping: float = 0.0,
-            anchor: Signal | ArrayLike = (0.0, 0.0, 0.0),
-            at: ArrayLike = (0.0, 0.0),
-            torsion: float = 0.0,
-            torsion_damping: float = 0.0,
-        ) -> None: ...
 
     def pull(self, time: ArrayLike, pose: ArrayLike) -> np.ndarray:
         """Return the wrench `(fx, fy, tau)` `[..., 3]` of the stretch, without damping, on bodies at `pose` `[..., 3]`.
