@@ -22,9 +22,9 @@ from planarfriction import environments, reading, shown, sweeps, validation, wri
 from planarfriction.cli import doctor, identify, options
 from planarfriction.errors import FrictionError
 from planarfriction.patch import Grid, read_pressure_map
+from planarfriction.reading import Section
 from planarfriction.scenes import files, ready
 from planarfriction.scenes.model_files import patch_from_dict
-from planarfriction.scenes.section import Section
 from planarfriction.sweeps import quantities, settings
 from planarfriction_explorer import code, drawing, ladder, looks, pictures, state
 from tests.support import recorded, synthetic

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import Any
 
@@ -11,14 +10,10 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.online.loops import grips
-from planarfriction.online.observer import Estimate, FrictionObserver, estimate_of
-from planarfriction.online.sensors import GRAVITY, Measurement
+from planarfriction.online.observer import GRAVITY, Estimate, FrictionObserver, Measurement, estimate_of
 
 _LEAST_MU = 3.0902
 """Standard deviations by which mu_c is assumed to be smaller where it cannot be found: one part in a thousand slips."""
-
-trapezoid = functools.partial(grips.trapezoid.py_func, np)
-"""Place, speed and acceleration at times [s] of a displacement whose ramps take a quarter each of the duration."""
 
 
 class GripController:

@@ -16,10 +16,9 @@ from planarfriction import validation
 from planarfriction.equality import ByValue, Kept, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.pictures import picture
-from planarfriction.scenes.body import Body
+from planarfriction.scenes.body import Body, Spring
 from planarfriction.scenes.contact import Contact
 from planarfriction.scenes.signal import Signal, as_signal, breaks_between, sample_count
-from planarfriction.scenes.spring import Spring
 
 STARTS = ("rest", "equilibrium", "sliding")
 """Ways in which bristles may start."""

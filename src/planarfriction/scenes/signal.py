@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 from planarfriction import validation
 from planarfriction.equality import ByValue, Kept
 from planarfriction.errors import InvalidValueError, shown
-from planarfriction.reading import Table
-from planarfriction.scenes.section import Section
+from planarfriction.reading import Section, Table
 
 Hold = Literal["previous", "linear"]
 
