@@ -26,7 +26,7 @@ import planarfriction as pf
 from planarfriction import sweeps
 from planarfriction.errors import FileError, SweepError, SweepInterrupted
 from planarfriction.sweeps import bookkeeping, keys, records, running
-from planarfriction.sweeps.quantities import grid_of
+from planarfriction.sweeps.settings import grid_of
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 PATCH = pf.ContactPatch.disc(0.01, cells=7)

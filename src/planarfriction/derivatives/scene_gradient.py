@@ -12,8 +12,7 @@ from planarfriction import validation
 from planarfriction.derivatives.path import KeptMotion, SceneDerivatives
 from planarfriction.derivatives.scene_inputs import SceneInputs
 from planarfriction.errors import InvalidValueError
-from planarfriction.scenes.options import SolverOptions
-from planarfriction.scenes.scene import Scene
+from planarfriction.scenes.scene import Scene, SolverOptions
 
 Cotangent = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Function of times `[M]` and recorded values `[M, ...]` that returns the derivatives of a cost by these values."""

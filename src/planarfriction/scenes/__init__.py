@@ -9,7 +9,6 @@ import lazy_loader
 from planarfriction.families import SCENES
 from planarfriction.scenes.body import Body, Spring
 from planarfriction.scenes.contact import Contact
-from planarfriction.scenes.options import SolverOptions
 from planarfriction.scenes.ready import (
     curling,
     drift,
@@ -22,7 +21,7 @@ from planarfriction.scenes.ready import (
     published_velocity,
     pushed,
 )
-from planarfriction.scenes.scene import Scene
+from planarfriction.scenes.scene import Scene, SolverOptions
 from planarfriction.scenes.signal import Signal
 from planarfriction.scenes.solution import Solution, Statistics
 

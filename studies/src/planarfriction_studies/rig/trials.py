@@ -13,7 +13,8 @@ from planarfriction.laws import LuGre
 from planarfriction.models import ReducedModel
 from planarfriction.online.controllers import Hinge, Hold, SlideBy, TurnBy
 from planarfriction.online.loops import grips
-from planarfriction.online.observer import GRAVITY, FrictionObserver, Measurement
+from planarfriction.online.observer import FrictionObserver
+from planarfriction.online.sensors import GRAVITY, Measurement
 from planarfriction.patch import ContactPatch, SoftFinger
 from planarfriction_studies.rig.baselines import LINEAR_RULE, ROTATION_RULE, ellipsoid_load, hinge_rule, hold_rule
 from planarfriction_studies.rig.gripper import DT, UNIT, Gripper, Parts
