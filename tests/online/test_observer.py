@@ -13,7 +13,7 @@ from numba import njit
 
 import planarfriction as pf
 from planarfriction.online import FrictionObserver, Measurement
-from planarfriction.online.loops import filter_state
+from planarfriction.online.loops import filter_state, square_root
 from planarfriction.online.loops import friction_filter as kernels
 from planarfriction_studies.rig import Gripper, Parts
 
@@ -225,9 +225,9 @@ def test_a_batch_is_many_observers():
 
 @njit
 def updated(state, h, column):
-    filter_state.measure(state, h, 0.7, 0.04, column)
-    filter_state.spread(state, 3, 0.25, column)
-    filter_state.reset(state, 1, 5.0, 0.5, column)
+    square_root.measure(state, h, 0.7, 0.04, column)
+    square_root.spread(state, 3, 0.25, column)
+    square_root.reset(state, 1, 5.0, 0.5, column)
 
 
 def test_measurements_and_spreads_are_those_of_a_kalman_filter():

@@ -1,80 +1,8 @@
-"""State of the friction filter: unknowns x, the lower triangular root S of their covariance `S S'`, and a memory."""
+"""Layout of the state of the friction filter: unknowns, root of their covariance, and what it remembers of samples."""
 
 from __future__ import annotations
 
-import math
-
-from planarfriction.compiler import kernel
-from planarfriction.kernels.vectors import clear
-
-N = 12
-"""Number of unknowns."""
-
-ROOT = N
-"""Place of the root in a state, row by row, after x."""
-
-
-@kernel
-def measure(s, h, innovation, variance, column):
-    """Update with a scalar `innovation` of slope `h [N]` and variance: rotate `[[sqrt(variance), h'S], [0, S]]`."""
-    corner = math.sqrt(variance)
-    clear(column, N)
-    for j in range(N - 1, -1, -1):
-        v = 0.0
-        for i in range(j, N):
-            v += s[ROOT + N * i + j] * h[i]
-        size = math.sqrt(corner * corner + v * v)
-        cosine, sine, corner = corner / size, v / size, size
-        for i in range(j, N):
-            a, b = column[i], s[ROOT + N * i + j]
-            column[i], s[ROOT + N * i + j] = cosine * a + sine * b, cosine * b - sine * a
-    for i in range(N):
-        s[i] += column[i] * innovation / corner
-
-
-@kernel
-def _take_in(s, first, column):
-    """Rotate a column, zero above its row `first`, into the root: the covariance grows by its outer product."""
-    for j in range(first, N):
-        a, b = s[ROOT + N * j + j], column[j]
-        size = math.sqrt(a * a + b * b)
-        if size > 0.0:
-            cosine, sine = a / size, b / size
-            for k in range(j, N):
-                a, b = s[ROOT + N * k + j], column[k]
-                s[ROOT + N * k + j], column[k] = cosine * a + sine * b, cosine * b - sine * a
-
-
-@kernel
-def spread(s, i, variance, column):
-    """Add a variance to unknown i."""
-    clear(column, N)
-    column[i] = math.sqrt(variance)
-    _take_in(s, i, column)
-
-
-@kernel
-def reset(s, i, value, deviation, column):
-    """Forget unknown i: a value with a standard deviation, independent of all others."""
-    for k in range(N):
-        column[k] = s[ROOT + N * k + i] if k > i else 0.0
-    for j in range(i + 1):
-        s[ROOT + N * i + j] = 0.0
-    for k in range(i + 1, N):
-        s[ROOT + N * k + i] = 0.0
-    s[i], s[ROOT + N * i + i] = value, deviation
-    _take_in(s, i + 1, column)  # what the others had in that column goes on
-
-
-@kernel
-def variance_of(s, i, k):
-    """Return the variance of the sum of unknowns i and k, or of i alone if they are one."""
-    total = 0.0
-    for j in range(N):
-        each = s[ROOT + N * i + j] + (s[ROOT + N * k + j] if k != i else 0.0)
-        total += each * each
-    return total
-
+from planarfriction.online.loops.square_root import ROOT, N
 
 TWIST, MU, RATIO, SCALE, BIAS = 3, 6, 7, 8, 9
 """Places of the unknowns after the remainder of the count [m], which is the error of a place."""

@@ -19,7 +19,7 @@ from planarfriction.compiler import jit, kernel
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
 from planarfriction.kernels.vectors import clear
 from planarfriction.online.loops import filter_state as at
-from planarfriction.online.loops.filter_state import ROOT, N, measure, reset, spread, variance_of
+from planarfriction.online.loops.square_root import ROOT, N, measure, reset, spread, variance_of
 
 RESTART = 10.0
 """Samples in a row whose time went back after which the clock counts as set anew."""
