@@ -59,6 +59,7 @@ default_role = "literal"
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
+autodoc_type_aliases = {"ArrayLike": "ArrayLike"}  # by its name, not as the union that it is
 python_maximum_signature_line_length = 90
 autodoc_default_options = {"members": True}
 napoleon_google_docstring = napoleon_numpy_docstring = False  # `api_pages` applies it where there are sections

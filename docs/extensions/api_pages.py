@@ -197,6 +197,7 @@ def generate(app: Sphinx) -> None:
             continue
         rows.append((file, first_sentence(importlib.import_module(name))))
     lines = [*heading("Python"), "Every public name, from its docstring, by subject.", ""]
+    lines += ["A field of the type ``Kept[A, B]`` is given as A, and kept as B.", ""]
     for subject, (sentence, *_) in SUBJECTS.items():
         pages[subject.lower()] = subject_page(subject, rows, documented)
         lines += [f"- :doc:`{subject.lower()}`: {sentence}"]
@@ -231,7 +232,13 @@ def as_restructured_text(app: Sphinx, what: str, name: str, thing: Any, options:
         lines[i] = "`".join(pieces)
 
 
+def with_names(app: Sphinx, what: str, name: str, thing: Any, options: Any, signature: str | None, returns: Any) -> Any:
+    """Show aliases of types by their names inside other types too."""
+    return signature and re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", signature), returns
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("builder-inited", generate)
     app.connect("autodoc-process-docstring", as_restructured_text)
+    app.connect("autodoc-process-signature", with_names)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -8,16 +8,28 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
 from planarfriction.described import described
 
 _KindT = TypeVar("_KindT", bound=type)
+_GivenT = TypeVar("_GivenT")
+_KeptT = TypeVar("_KeptT")
 
 _SHORT = 9
 """Numbers of an array, items of a sequence, that a `repr` shows."""
+
+
+class Kept(Generic[_GivenT, _KeptT]):
+    """Type of a field that is given as one type and kept, after its check, as another; only type checkers use it."""
+
+    if TYPE_CHECKING:
+
+        def __get__(self, record: object, kind: type) -> _KeptT: ...
+
+        def __set__(self, record: object, value: _GivenT) -> None: ...
 
 
 def checked(check: Callable[..., Any], *arguments: Any, **options: Any) -> Any:

@@ -165,8 +165,8 @@ SCENES = Family(
         "free-slide": ("a puck thrown onto a table", "scenes.ready:free_slide"),
         "driven": ("a patch moved with a prescribed velocity", "scenes.ready:driven"),
         "pushed": ("a plate on a table, pushed along by finger pads that move", "scenes.ready:pushed"),
-        "pivot": ("a part that swings down in a loosened grip and is caught", "scenes.worlds:pivot"),
-        "foot": ("a robot that turns on one foot as its weight moves", "scenes.worlds:foot"),
-        "curling": ("a curling stone that slides and spins to rest", "scenes.worlds:curling"),
+        "pivot": ("a part that swings down in a loosened grip and is caught", "scenes.ready:pivot"),
+        "foot": ("a robot that turns on one foot as its weight moves", "scenes.ready:foot"),
+        "curling": ("a curling stone that slides and spins to rest", "scenes.ready:curling"),
     },
 )

@@ -16,7 +16,7 @@ PICTURES = {
     "solution in a notebook": "notebook:solution_html",
     "animation": "animation:animate_solution",
     "identification": "identification:plot_identification",
-    "joint": "joint:plot_joint",
+    "joint": "identification:plot_joint",
     "grip": "planning:plot_grip",
     "push": "planning:plot_push",
 }

@@ -5,14 +5,14 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import geometry, validation
 from planarfriction.coupling import CoupledPatches, HostStep
-from planarfriction.equality import ByValue, by_parts, checked
+from planarfriction.equality import ByValue, Kept, by_parts, checked
 from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.models import FrictionModel
 
@@ -46,21 +46,10 @@ class SlidingBody(ByValue):
     """Moment of inertia about the centre of mass [kg m^2]."""
     models: FrictionModel | Sequence[FrictionModel]  # pyright: ignore[reportGeneralTypeIssues]
     """Friction model, or a list with one for each patch."""
-    positions: np.ndarray = (0.0, 0.0)  # pyright: ignore[reportAssignmentType]
+    positions: Kept[ArrayLike, np.ndarray] = (0.0, 0.0)  # pyright: ignore[reportAssignmentType]
     """Origins of the patches about the centre of mass, in body axes, `[k, 2]` [m]."""
-    angles: np.ndarray = 0.0  # pyright: ignore[reportAssignmentType]
+    angles: Kept[ArrayLike, np.ndarray] = 0.0  # pyright: ignore[reportAssignmentType]
     """Angles of the patches' axes in body axes `[k]` [rad]."""
-
-    if TYPE_CHECKING:  # what is given may be more than what is kept
-
-        def __init__(
-            self,
-            mass: float,
-            inertia: float,
-            models: FrictionModel | Sequence[FrictionModel],
-            positions: ArrayLike = (0.0, 0.0),
-            angles: ArrayLike = 0.0,
-        ) -> None: ...
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -18,9 +18,9 @@ from planarfriction.laws import LAWS, FrictionLaw, LuGre
 from planarfriction.limit_surface.comparison import angles
 from planarfriction.planning import holding_load
 from planarfriction.planning.holding import GRAVITY
+from planarfriction.reading import Section
 from planarfriction.scenes.body import floats
 from planarfriction.scenes.model_files import law_from_dict
-from planarfriction.scenes.section import Section
 from planarfriction_explorer.drawing import MOST_SIDE, Drawing
 
 FIRST_PATCH = "NonConvex1"

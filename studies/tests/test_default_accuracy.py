@@ -75,14 +75,15 @@ def test_absolute_tolerance_follows_the_relative_one():
 
 
 def test_velocities_are_measured_against_the_slowest_creep():
-    from planarfriction.scenes.packing import pack
+    from planarfriction.scenes.packing import SegmentBatches
 
     patch = PUBLISHED_PATCHES["Circle"]()
     models = {"fine": pf.ReducedModelPublished(patch, LAW), "plain": pf.DistributedModel(patch, LAW)}
     natural = {}
     for name, kinds in {"plain": ["plain"], "both": ["plain", "fine"]}.items():
         contacts = [pf.Contact(models[kind], pf.Signal.constant(1.0), name=kind) for kind in kinds]
-        natural[name] = pack(pf.Scene(pf.Body(0.2, 5e-4), contacts, 1.0), 1.0).state_scale[-6:-3]
+        scene = pf.Scene(pf.Body(0.2, 5e-4), contacts, 1.0)
+        natural[name] = SegmentBatches(scene, 1.0).state_scale[-6:-3]
     np.testing.assert_allclose(natural["plain"][:2], 0.1 * LAW.v_s, rtol=1e-12)
     np.testing.assert_allclose(natural["both"][:2], 0.01 * LAW.v_s, rtol=1e-12)
     # spins are those that move the lever arm as fast

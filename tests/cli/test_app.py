@@ -20,8 +20,8 @@ from PIL import Image
 
 import planarfriction as pf
 from planarfriction import __version__, scenes
-from planarfriction.cli import commands, main, output
-from planarfriction.cli.app import app
+from planarfriction.cli import main, output
+from planarfriction.cli.app import ELSEWHERE, GROUP, app
 from planarfriction.cli.options import find_patch
 from planarfriction.cli.run import build_scenes, largest_differences
 from planarfriction.errors import SimulationInterrupted, SolverError
@@ -450,8 +450,8 @@ def test_the_help_names_every_ready_scene(command):
 @pytest.fixture
 def only_the_library(monkeypatch):
     """Take the commands of other packages away, as in an installation of the library alone."""
-    entries = [each for each in entry_points(group=commands.GROUP) if each.name == "explore"]
-    monkeypatch.setattr(commands, "entry_points", lambda *, group: entries)
+    entries = [each for each in entry_points(group=GROUP) if each.name == "explore"]
+    monkeypatch.setattr("planarfriction.cli.app.entry_points", lambda *, group: entries)
     monkeypatch.setattr(app, "commands", {name: app.commands[name] for name in LIBRARY if name in app.commands})
 
 
@@ -459,13 +459,11 @@ def test_a_bare_library_says_what_it_has_and_where_the_rest_is(only_the_library,
     def missing(name):
         raise PackageNotFoundError(name)
 
-    monkeypatch.setattr(commands, "distribution", missing)
+    monkeypatch.setattr("planarfriction.cli.app.distribution", missing)
     assert app.list_commands(click.Context(app)) == LIBRARY
     assert main(["--help"]) == 0
     out = capsys.readouterr().out
-    assert " ".join(out.split()).endswith(commands.ELSEWHERE) and "bench" not in re.findall(
-        r"^  (\S+)", out, re.MULTILINE
-    )
+    assert " ".join(out.split()).endswith(ELSEWHERE) and "bench" not in re.findall(r"^  (\S+)", out, re.MULTILINE)
     assert main(["bench"]) == 2
     assert "No such command 'bench'" in capsys.readouterr().err
 
@@ -475,12 +473,12 @@ def test_entry_points_of_each_distribution_are_its_commands(folder):
     project = Path(__file__).parents[2] / folder / "pyproject.toml"
     if not project.exists():
         pytest.skip("no project beside these tests")
-    entries = tomllib.loads(project.read_text(encoding="utf-8"))["project"]["entry-points"][commands.GROUP]
+    entries = tomllib.loads(project.read_text(encoding="utf-8"))["project"]["entry-points"][GROUP]
     for name, value in entries.items():
-        command = EntryPoint(name, value, commands.GROUP).load()
+        command = EntryPoint(name, value, GROUP).load()
         assert isinstance(command, click.Command) and (command.name == name) and command.get_short_help_str()
     listed = app.list_commands(click.Context(app))
-    assert set(entries) <= set(listed) and commands.ELSEWHERE not in app.get_help(click.Context(app))
+    assert set(entries) <= set(listed) and ELSEWHERE not in app.get_help(click.Context(app))
 
 
 def test_commands_of_ones_own_package_are_added_but_replace_none(monkeypatch, capsys):
@@ -490,7 +488,7 @@ def test_commands_of_ones_own_package_are_added_but_replace_none(monkeypatch, ca
 
     entries = [SimpleNamespace(name=name, load=lambda: hello) for name in ("hello", "run")]
     monkeypatch.setattr(app, "commands", dict(app.commands))
-    monkeypatch.setattr(commands, "entry_points", lambda *, group: entries)
+    monkeypatch.setattr("planarfriction.cli.app.entry_points", lambda *, group: entries)
     assert main(["hello"]) == 0
     assert capsys.readouterr().out == "hello\n"
     assert app.commands["run"] is not hello

@@ -44,7 +44,7 @@ def test_ctrl_c_prints_what_was_found_so_far(path, capsys, monkeypatch):
         if "evaluation" in text and next(after, None) is None:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("planarfriction.cli.identify.work_progress", lambda label: contextlib.nullcontext(shown))
+    monkeypatch.setattr("planarfriction.cli.console.work_progress", lambda label: contextlib.nullcontext(shown))
     assert main(["identify", str(path), "--patch", "disc", *FAST, *START]) == 130
     (line,) = capsys.readouterr().out.splitlines()
     words, _, found = line.partition("[SI]: ")

@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from planarfriction.cli.commands import ELSEWHERE
+from planarfriction.cli.app import ELSEWHERE
 from tests.support.repository import ROOT, script
 
 DISTRIBUTIONS = script(".ci/check_dist.py").DISTRIBUTIONS

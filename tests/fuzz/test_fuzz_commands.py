@@ -17,7 +17,7 @@ from test_fuzz_tables import LOGS, MAPS
 from planarfriction import FrictionError
 from planarfriction.cli import INTERRUPTED, OUT_OF_TOLERANCE, main
 from planarfriction.cli.app import app
-from planarfriction.cli.identify_plan import plan
+from planarfriction.cli.identify import plan
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"
 PLAN = "identify plan"

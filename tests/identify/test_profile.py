@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planarfriction.identify.parameters import Coordinates
-from planarfriction.identify.profile import stretches
+from planarfriction.identify.search import stretches
 
 
 def stretch(residual, slope, width):

@@ -13,7 +13,7 @@ import numpy as np
 from planarfriction.joints import Drive, JointFit, JointFriction, JointLog, Plant
 from planarfriction.joints.fit import attempt, improves, minimise, with_term
 from planarfriction.joints.problem import Problem, moving
-from planarfriction.joints.verdicts import judge
+from planarfriction.joints.result import judge
 from tests.joints.test_joint_fit import PENDULUM, SERVO, servo_logs, torque_log
 
 TERMS = ("load", "stribeck", "bristles", "directional")

@@ -9,8 +9,7 @@ from planarfriction.joints import Drive, JointFit, JointFriction, JointLog, Plan
 from planarfriction.joints.fit import improves
 from planarfriction.joints.loops.runs import run_measured
 from planarfriction.joints.problem import Problem
-from planarfriction.joints.result import Trial
-from planarfriction.joints.verdicts import judge, speed_lag, standing
+from planarfriction.joints.result import Trial, judge, speed_lag, standing
 
 LUGRE = JointFriction(0.8, 0.3, 0.0, 0.0, 1.2, 0.05, 400.0, 2.0)
 SERVO = {"inertia": 2e-3, "offset": 0.01, "torque_gain": 0.1, "back_emf": 0.03, "mu_c": 0.02, "sigma_2": 0.005}

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from planarfriction.online import FrictionObserver, Hinge, Hold, Measurement, SlideBy, TurnBy
-from planarfriction.online.controllers import trapezoid
-from planarfriction.online.loops import friction_filter
+from planarfriction.online.loops import friction_filter, grips
 from planarfriction_studies.rig import Gripper, Parts
 from planarfriction_studies.rig.trials import known_model, random_parts, trial
 
@@ -155,7 +154,7 @@ def test_a_wrong_sign_holds_by_the_least_friction():
 
 def test_the_trapezoid_is_the_integral_of_its_speed():
     time = np.linspace(-0.5, 3.0, 3501)
-    place, speed, push = trapezoid(time, 0.03, 2.0)
+    place, speed, push = grips.trapezoid.py_func(np, time, 0.03, 2.0)
     assert place[-1] == pytest.approx(0.03)
     assert np.abs(np.gradient(place, time) - speed).max() < 1e-4
     assert np.cumsum(push)[-1] * 1e-3 == pytest.approx(0.0, abs=1e-4)
@@ -209,7 +208,7 @@ def observer():
 @pytest.mark.parametrize("speed, place", [(0.0, 0.0), (0.02, 0.004), (0.005, 0.006)])
 def test_the_grip_of_a_slip_is_what_balances_less_what_accelerates(observer, speed, place):
     slide, delay, top = SlideBy(observer, -0.02), 0.02, 9.81
-    wished, wished_speed, push = trapezoid(0.5 + delay, 0.02, 2.0)
+    wished, wished_speed, push = grips.trapezoid.py_func(np, 0.5 + delay, 0.02, 2.0)
     a = push + 8.0 * (wished_speed - speed) + 16.0 * (wished - place - speed * delay)
     assert abs(a) < 0.25 * top
     state = {"balance": 4.0, "began": 0.499, "slid": (0.0, -place, 0.0), "velocity": (0.0, -speed, 0.0)}

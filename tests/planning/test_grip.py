@@ -13,8 +13,7 @@ import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from planarfriction.planning import holding_load, plan_grip
 from planarfriction.planning.grip import _bounds
-from planarfriction.planning.motions import Aim, Grips, grip_position, load_on, slide_of
-from planarfriction.planning.report import report_of
+from planarfriction.planning.motions import Aim, Grips, grip_position, load_on, report_of, slide_of
 from tests.support.repository import script
 
 LAW = pf.LuGre(mu_c=1.0, mu_s=1.2, elasto_plastic=0.9)

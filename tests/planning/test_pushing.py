@@ -11,7 +11,7 @@ import planarfriction as pf
 from planarfriction.planning import Pusher, Slider, motion_cone, plan_push, push
 from planarfriction.planning.contact_modes import TouchPoint, motion_at
 from planarfriction.planning.push_plans import PushReport
-from planarfriction.planning.touch import CORNER, END, FACE, Scenery, Touch, flush_after, place_of, touch_after
+from planarfriction.planning.slider import CORNER, END, FACE, Scenery, Touch, flush_after, place_of, touch_after
 
 HALF = 0.045
 SQUARE = np.array([[-HALF, -HALF], [HALF, -HALF], [HALF, HALF], [-HALF, HALF]])

@@ -17,8 +17,7 @@ import planarfriction as pf
 from planarfriction import plots
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.plots import animation, film_files
-from planarfriction.plots.animation import frame_times
-from planarfriction.plots.film import Film
+from planarfriction.plots.animation import Film, frame_times
 from planarfriction.plots.limit_surface import scaled_samples
 from planarfriction.plots.panels import CellPanel, SurfacePanel, level_of
 from planarfriction.plots.track import track_of

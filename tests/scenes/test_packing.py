@@ -10,7 +10,7 @@ import pytest
 import planarfriction as pf
 from planarfriction.compiled import packed as limits
 from planarfriction.scenes import packing
-from planarfriction.scenes.packing import SegmentBatches, Segments
+from planarfriction.scenes.packing import MOST_PIECES, SegmentBatches, Segments
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 FINGER = pf.SoftFinger(c=6 * 0.02 / 9, n=1 / 3, k_per_newton=2.0, radius_max=0.01)
@@ -86,8 +86,8 @@ def test_windows_end_where_shapes_take_too_much_room_or_time(monkeypatch, name, 
 def test_one_window_holds_all_shapes_whatever_they_take(monkeypatch, name):
     for limit in ("MAX_PACK_BYTES", "MAX_PACK_SECONDS"):
         monkeypatch.setattr(limits, limit, 0.0)
-    packed = packing.pack(free(MODELS[name]()), 0.02)
-    assert packed.system.motion.breaks[-1] == 0.02 and len(packed.system.motion.row) > 5
+    (whole,) = SegmentBatches(free(MODELS[name]()), 0.02, most=MOST_PIECES)
+    assert whole.motion.breaks[-1] == 0.02 and len(whole.motion.row) > 5
 
 
 def test_windows_are_those_of_the_whole_motion():

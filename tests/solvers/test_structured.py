@@ -14,7 +14,7 @@ from planarfriction.compiler.calls import call
 from planarfriction.kernels import body, rosenbrock
 from planarfriction.kernels.body import right_hand_side
 from planarfriction.patch import PUBLISHED_PATCHES
-from planarfriction.scenes.packing import pack
+from planarfriction.scenes.packing import MOST_PIECES, SegmentBatches
 from planarfriction.solvers import RODAS3, RODAS4
 
 ELASTIC = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
@@ -63,7 +63,8 @@ def driven_scene() -> pf.Scene:
     "scene", [free_scene(), moving_scene(), driven_scene()], ids=["free", "on what moves", "prescribed"]
 )
 def test_structured_solve_is_the_solve_with_the_full_jacobian(scene):
-    packed = pack(scene, 1.0)
+    packed = SegmentBatches(scene, 1.0, most=MOST_PIECES)
+    system = next(iter(packed))
     generator = np.random.default_rng(3)
     natural = packed.state_scale.copy()
     natural[-6:-3] *= 100.0  # velocities of the size of v_s: changes of a creep are too small for differences
@@ -74,7 +75,7 @@ def test_structured_solve_is_the_solve_with_the_full_jacobian(scene):
 
     def rate(state: np.ndarray) -> np.ndarray:
         out = np.empty_like(state)
-        right_hand_side(packed.system.address, 0, 0.3, state, out)
+        right_hand_side(system.address, 0, 0.3, state, out)
         return out
 
     steps = 1e-5 * natural
@@ -82,7 +83,7 @@ def test_structured_solve_is_the_solve_with_the_full_jacobian(scene):
     r = rate(y) * generator.normal(size=len(y))
     for shift in (1e2, 1e5):
         out = np.empty_like(y)
-        _solve(packed.system.address, 0, 0.3, y, shift, r, dy, out)
+        _solve(system.address, 0, 0.3, y, shift, r, dy, out)
         expected = np.linalg.solve(shift * np.eye(len(y)) - jacobian, r)
         scale = np.maximum(np.abs(expected), 1e-3 * np.abs(expected).max() * natural / natural.max())
         # central differences with steps of 1e-5 of the natural scale leave 1e-6; kinks of the tables are not met here
@@ -130,11 +131,12 @@ def test_order_left_across_stick_and_slip():
 
 def test_agrees_with_another_integrator():
     scene = free_scene()
-    packed = pack(scene, 0.02)
+    packed = SegmentBatches(scene, 0.02, most=MOST_PIECES)
+    system = next(iter(packed))
 
     def rate(t: float, y: np.ndarray) -> np.ndarray:
         out = np.empty(len(y))
-        right_hand_side(packed.system.address, 0, t, np.ascontiguousarray(y), out)
+        right_hand_side(system.address, 0, t, np.ascontiguousarray(y), out)
         return out
 
     atol = 1e-9 * packed.state_scale

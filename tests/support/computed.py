@@ -33,8 +33,7 @@ from planarfriction.planning.contact_modes import TouchPoint
 from planarfriction.planning.pushing import _neighbour
 from planarfriction.plots import interactive_limit_surface, notebook
 from planarfriction.plots import track as tracks
-from planarfriction.plots.animation import frame_times
-from planarfriction.plots.film import Film
+from planarfriction.plots.animation import Film, frame_times
 from planarfriction.plots.film_files import write_frames
 from planarfriction.scenes.signal import SAME_TIME, breaks_between, displacement, sample_count, sample_times
 from planarfriction_studies.rig import Gripper

@@ -22,10 +22,10 @@ from planarfriction import environments, reading, shown, sweeps, validation, wri
 from planarfriction.cli import doctor, identify, options
 from planarfriction.errors import FrictionError
 from planarfriction.patch import Grid, read_pressure_map
+from planarfriction.reading import Section
 from planarfriction.scenes import files, ready
 from planarfriction.scenes.model_files import patch_from_dict
-from planarfriction.scenes.section import Section
-from planarfriction.sweeps import quantities, settings
+from planarfriction.sweeps import settings
 from planarfriction_explorer import code, drawing, ladder, looks, pictures, state
 from tests.support import recorded, synthetic
 from tests.support.computed import LAW, MAPS, as_arrays
@@ -75,7 +75,7 @@ CHECKS: dict[str, Callable[[Any], Any]] = {
     "pressure": lambda x: pf.ContactPatch.disc(0.01, 3, pressure=x).weights(1.0),
     "environments": lambda x: environments.check({"mu_c": x, "mu_s": 1.0}),
     "range": lambda x: environments.randomise(LAW, {"v_s": x}, 3),
-    "quantity": lambda x: quantities.grid_of({"a": x}),
+    "quantity": lambda x: settings.grid_of({"a": x}),
     "outline of a body": lambda x: pf.Body(1.0, 1.0, outline=x).outline,
     "load": lambda x: pf.Contact(pf.ReducedModel(pf.ContactPatch.disc(0.01, 5), LAW), x).normal_force.to_dict(),
     "place of a body": lambda x: pf.Body(1.0, 1.0, x).position,

@@ -1,8 +1,9 @@
-"""The commands and their options; each loads what it needs when it runs."""
+"""The commands and their options, each of which loads what it needs when it runs; other packages add more."""
 
 from __future__ import annotations
 
 import gc
+from importlib.metadata import PackageNotFoundError, distribution, entry_points
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +11,51 @@ import click
 from click.shell_completion import CompletionItem
 
 from planarfriction import __version__
-from planarfriction.cli.commands import Commands
 from planarfriction.cli.doctor import doctor
-from planarfriction.cli.identify_plan import FitOrPlan, complete_log
+from planarfriction.cli.export import export
+from planarfriction.cli.identify import identify
 from planarfriction.cli.options import FILE, cells_option, complete_scene, map_options, patch_option
 from planarfriction.cli.sweep import sweep
 from planarfriction.families import MODELS, SURFACES, Family
+
+GROUP = "planarfriction.commands"
+"""Group of the entry points: name of the command = module:command of click."""
+
+STUDIES = "planarfriction-studies"
+"""Distribution of experiments, measured data, the referee of simulators, benchmarks, and the rig of grippers."""
+
+ELSEWHERE = f"Experiments, measured data and benchmarks are in {STUDIES} (pip install ./studies)."
+"""Line below the commands where that distribution is missing."""
+
+
+class Commands(click.Group):
+    """Group that looks for commands of other packages only where its own do not suffice: a search takes 10 ms."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        self.add_installed()
+        return super().list_commands(ctx)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in self.commands:
+            self.add_installed()
+        return super().get_command(ctx, cmd_name)
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write where more commands come from, if they are not installed."""
+        try:
+            distribution(STUDIES)
+        except PackageNotFoundError:
+            formatter.write_paragraph()
+            formatter.write_text(ELSEWHERE)
+
+    def add_installed(self) -> None:
+        """Add the commands of other packages, without those whose package cannot be imported."""
+        for entry in entry_points(group=GROUP):
+            if entry.name not in self.commands:
+                try:
+                    self.add_command(entry.load(), entry.name)
+                except ImportError:
+                    continue
 
 
 class MemberOf(click.Choice):
@@ -122,71 +162,6 @@ def limit_surface(patch: str | None, pressure: Path | None, size: dict[str, Any]
     command.show(command.choose_patch(patch, pressure, size), **options)
 
 
-@app.command(short_help="Write the friction model of a file as C source.")
-@click.argument("file", type=FILE, shell_complete=complete_scene)
-@click.option("--out", type=FILE, required=True, help="Folder for the files.")
-@click.option(
-    "--name", default="friction", show_default=True, help="Name of the files, and prefix of the names in them."
-)
-@click.option("--precision", default="double", show_default=True, help="double or float.")
-@click.option("--patches", default=1, show_default=True, help="Patches of this model below a body.")
-@click.option("--contact", metavar="NAME", help="Contact whose model is exported, if a scene has different ones.")
-def export(file: Path, **options: Any) -> None:
-    """Write the friction model of a file as C source for a controller: NAME.h and NAME.c, C99 and C++17.
-
-    NAME_test.c compares the library with numbers of the model; NAME.cmake has targets for both.
-
-    FILE (.toml, .json) is a scene, or a model alone: patch, law and model, written as for a contact of a scene.
-
-    \b
-    Examples:
-      planarfriction export model.toml --out friction/
-      planarfriction export scene.toml --contact fingers --out src/ --name finger --precision float
-    """
-    from planarfriction.cli import export as command
-
-    command.export(file, **options)
-
-
-@app.command(cls=FitOrPlan, short_help="Estimate friction parameters from logs; plan the next measurement.")
-@click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True, shell_complete=complete_log)
-@patch_option("Default: Circle.")
-@map_options
-@click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: law and radius.")
-@click.option("--start", metavar="NAME=VALUE", multiple=True, help="Initial guess, or fixed value if not estimated.")
-@click.option("--normal-force", type=float, help="Normal force in N, if the logs have no such column.")
-@click.option("--contact", metavar="NAME", help="Contact whose columns (NAME.vx) are read, if there are several.")
-@click.option("--noise", metavar="FX,FY,TAU", help="Noise of the measured wrench in N and N m. Default: estimated.")
-@click.option("--plain", is_flag=True, help="Use plain LuGre bristles. Default: what fits better.")
-@click.option("--steady", is_flag=True, help="The logs begin in steady sliding, not at rest.")
-@click.option("--model", default="auto", show_default=True, help="reduced-published, reduced, distributed, or auto.")
-@click.option("--nuisance", metavar="NAMES", help="Rig disturbances: delay,bias,load,twist or none. Default: all.")
-@click.option("--starts", type=int, default=4, show_default=True, help="Number of starting points of the search.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Random seed of the starting points.")
-@click.option("--out", type=FILE, help="Folder for the estimates (JSON) and the residual plot (PNG).")
-def identify(logs: tuple[Path, ...], patch: str | None, size: dict[str, Any], **options: Any) -> int:
-    """Estimate friction parameters of a contact from logs of its motion and its friction wrench.
-
-    Each LOG is a CSV file with a heading and the columns t, vx, vy, omega (or x, y, theta), fx, fy, tau, normal_force
-    in s, m/s, rad/s, N and N m. Twist and wrench are about the origin of the contact frame, in its axes; the wrench
-    acts on the moving body. The files that `planarfriction run` writes are such logs. Prints the estimates, their
-    errors, and what the data do not determine. The command `identify plan` suggests which motion to measure next (for a
-    log called plan, write ./plan).
-
-    \b
-    Examples:
-      planarfriction identify log.csv --patch disc --out out/
-      planarfriction identify slow.csv fast.csv --patch pad.csv --cell-size 0.001
-      planarfriction identify log.csv --parameters mu_c,mu_s,v_s --start sigma_0=1e5 --start sigma_1=100
-      planarfriction identify plan slow.csv --patch disc
-      planarfriction identify joint arm.csv --inertia 0.05
-    """
-    from planarfriction.cli import identify as command
-    from planarfriction.cli.options import find_patch
-
-    return command.identify(logs, find_patch(patch, size), **options)
-
-
 @app.command(short_help="Compile everything in advance.")
 def warm() -> None:
     """Compile everything in advance, so that later runs need not wait. Code in the cache is not recompiled.
@@ -204,4 +179,6 @@ def warm() -> None:
 
 
 app.add_command(doctor)
+app.add_command(export)
+app.add_command(identify)
 app.add_command(sweep)

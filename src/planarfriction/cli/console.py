@@ -7,7 +7,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -20,65 +19,53 @@ EVERY = 10.0
 @contextmanager
 def simulation_progress(label: str, t_end: float) -> Iterator[Callable[[float], None]]:
     """Show a progress bar over simulated time [s]; a spinner until the first report, while kernels are compiled."""
-    with _bar() as bar:
-        task = bar.add_task(f"{label}: preparing (compiles once after installation)", total=None)
-
-        def report(time: float) -> None:
-            bar.update(task, completed=time, total=t_end, description=f"{label}: {time:.2f} of {t_end:g} s")
-
-        yield report
+    with _bar(f"{label}: preparing (compiles once after installation)") as update:
+        yield lambda time: update(f"{label}: {time:.2f} of {t_end:g} s", time, t_end)
 
 
 @contextmanager
 def work_progress(label: str) -> Iterator[Callable[..., None]]:
     """Show the current work, `report(words)`, with a bar over finished things of all: `report(words, done, of)`."""
-    with _bar() as bar:
-        task = bar.add_task(label, total=None)
-
-        def report(words: str, done: float | None = None, of: float | None = None) -> None:
-            bar.update(task, completed=done, total=of, description=f"{label}: {words}")
-
-        yield report
+    with _bar(label) as update:
+        yield lambda words, done=None, of=None: update(f"{label}: {words}", done, of)
 
 
 @contextmanager
-def _bar() -> Iterator[Any]:
+def _bar(words: str) -> Iterator[Callable[..., None]]:
     from planarfriction.compiler.notice import expect_compilation
 
     expect_compilation()  # the bar says it
     console = Console(stderr=True)
-    words = TextColumn("{task.description}", markup=False)
-    columns = SpinnerColumn(), words, BarColumn(bar_width=30), TimeElapsedColumn()
-    bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
-    with _Lines() if bar.disable else bar as shown:  # rich before 15 ends a bar that is not shown with an empty line
-        yield shown
+    if not console.is_terminal:  # rich before 15 ends a bar that is not shown with an empty line
+        with _lines(words) as update:
+            yield update
+        return
+    columns = SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(bar_width=30)
+    with Progress(*columns, TimeElapsedColumn(), console=console, transient=True) as bar:
+        task = bar.add_task(words, total=None)
+        yield lambda words, done, of: bar.update(task, completed=done, total=of, description=words)
 
 
-class _Lines:
-    """Progress for a file or a pipe: a line on stderr every `EVERY` seconds, written by a thread of its own."""
+@contextmanager
+def _lines(words: str) -> Iterator[Callable[..., None]]:
+    """Show progress in a file or a pipe: a line on stderr every `EVERY` seconds, written by a thread of its own."""
+    begin, ended = time.monotonic(), threading.Event()
 
-    def __enter__(self) -> _Lines:
-        self._words, self._begin, self._done = "", time.monotonic(), threading.Event()
-        self._writer = threading.Thread(target=self._write, daemon=True)
-        self._writer.start()
-        return self
+    def write() -> None:
+        while not ended.wait(EVERY):
+            note(f"{words}, {time.monotonic() - begin:.0f} s")
 
-    def __exit__(self, *_: object) -> None:
-        self._done.set()
-        self._writer.join()
+    def update(new: str, *_: object) -> None:
+        nonlocal words
+        words = new
 
-    def _write(self) -> None:
-        while not self._done.wait(EVERY):
-            note(f"{self._words}, {time.monotonic() - self._begin:.0f} s")
-
-    def add_task(self, description: str, total: float | None = None) -> int:
-        """Take the words that lines begin with."""
-        self._words = description
-        return 0
-
-    def update(self, task: int, *, description: str, **_: Any) -> None:
-        """Take new words."""
-        self._words = description
+    writer = threading.Thread(target=write, daemon=True)
+    writer.start()
+    try:
+        yield update
+    finally:
+        ended.set()
+        writer.join()
 
 
 def note(text: str) -> None:

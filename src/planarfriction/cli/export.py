@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import click
+
 import planarfriction as pf
-from planarfriction import validation
+from planarfriction.cli.options import FILE, complete_scene
 from planarfriction.errors import InvalidValueError
-from planarfriction.scenes.files import read_table
-from planarfriction.scenes.model_files import model_from_dict
-from planarfriction.scenes.section import Section
 
 
 def read_model(file: Path, contact: str | None) -> Any:
@@ -19,6 +18,11 @@ def read_model(file: Path, contact: str | None) -> Any:
     Raises FileError for what is neither, InvalidValueError for a contact that is not there, or one that is needed and
     not given.
     """
+    from planarfriction import validation
+    from planarfriction.reading import Section
+    from planarfriction.scenes.files import read_table
+    from planarfriction.scenes.model_files import model_from_dict
+
     table = read_table(file)
     if "contact" not in table:
         if contact is not None:
@@ -33,7 +37,26 @@ def read_model(file: Path, contact: str | None) -> Any:
     return models[validation.choice("--contact", contact, models)]
 
 
-def export(file: Path, *, contact: str | None, out: Path, name: str, precision: str, patches: int) -> None:
-    """Write the model of a file as C source, and print which files hold it."""
-    for each in pf.export_c(read_model(file, contact), out, name=name, precision=precision, patches=patches):
+@click.command(short_help="Write the friction model of a file as C source.")
+@click.argument("file", type=FILE, shell_complete=complete_scene)
+@click.option("--out", type=FILE, required=True, help="Folder for the files.")
+@click.option(
+    "--name", default="friction", show_default=True, help="Name of the files, and prefix of the names in them."
+)
+@click.option("--precision", default="double", show_default=True, help="double or float.")
+@click.option("--patches", default=1, show_default=True, help="Patches of this model below a body.")
+@click.option("--contact", metavar="NAME", help="Contact whose model is exported, if a scene has different ones.")
+def export(file: Path, out: Path, contact: str | None, **options: Any) -> None:
+    """Write the friction model of a file as C source for a controller: NAME.h and NAME.c, C99 and C++17.
+
+    NAME_test.c compares the library with numbers of the model; NAME.cmake has targets for both.
+
+    FILE (.toml, .json) is a scene, or a model alone: patch, law and model, written as for a contact of a scene.
+
+    \b
+    Examples:
+      planarfriction export model.toml --out friction/
+      planarfriction export scene.toml --contact fingers --out src/ --name finger --precision float
+    """
+    for each in pf.export_c(read_model(file, contact), out, **options):
         print(each)

@@ -1,4 +1,4 @@
-"""`planarfriction identify`: parameters of a contact from logs of its motion and its wrench."""
+"""`planarfriction identify`: parameters of a contact from logs, the motion to measure next, and friction of a joint."""
 
 from __future__ import annotations
 
@@ -7,33 +7,94 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import click
+from click.shell_completion import CompletionItem
+
 import planarfriction as pf
-from planarfriction import validation
-from planarfriction.cli import INTERRUPTED, output
-from planarfriction.cli.console import note, work_progress
+from planarfriction.cli import INTERRUPTED
+from planarfriction.cli.options import FILE, find_patch, map_options, patch_option
 from planarfriction.errors import IdentificationInterrupted, InvalidValueError
-from planarfriction.writing import make_folder, write_text
 
 
+class FitOrPlan(click.Command):
+    """`identify`: fits the logs that follow, unless the first word is that of a subcommand."""
+
+    def make_context(
+        self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
+    ) -> click.Context:
+        """Make the context of the fit, or of a subcommand."""
+        if args and args[0] in OTHERS:
+            return OTHERS[args[0]].make_context(f"{info_name} {args[0]}", args[1:], parent, **extra)
+        return super().make_context(info_name, args, parent, **extra)
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options, then the other commands."""
+        super().format_options(ctx, formatter)
+        with formatter.section("Commands"):
+            formatter.write_dl([(each, f"{OTHERS[each].short_help} See identify {each} --help.") for each in OTHERS])
+
+
+def complete_log(ctx: click.Context, parameter: object, incomplete: str) -> list[CompletionItem]:
+    """Return completions of a log: files, and the names of subcommands where they may stand."""
+    names = [] if ctx.params.get("logs") else [name for name in OTHERS if name.startswith(incomplete)]
+    words = [CompletionItem(name, help=OTHERS[name].short_help) for name in names]
+    return [*words, CompletionItem(incomplete, type="file")]
+
+
+@click.command(cls=FitOrPlan, short_help="Estimate friction parameters from logs; plan the next measurement.")
+@click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True, shell_complete=complete_log)
+@patch_option("Default: Circle.")
+@map_options
+@click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: law and radius.")
+@click.option("--start", metavar="NAME=VALUE", multiple=True, help="Initial guess, or fixed value if not estimated.")
+@click.option("--normal-force", type=float, help="Normal force in N, if the logs have no such column.")
+@click.option("--contact", metavar="NAME", help="Contact whose columns (NAME.vx) are read, if there are several.")
+@click.option("--noise", metavar="FX,FY,TAU", help="Noise of the measured wrench in N and N m. Default: estimated.")
+@click.option("--plain", is_flag=True, help="Use plain LuGre bristles. Default: what fits better.")
+@click.option("--steady", is_flag=True, help="The logs begin in steady sliding, not at rest.")
+@click.option("--model", default="auto", show_default=True, help="reduced-published, reduced, distributed, or auto.")
+@click.option("--nuisance", metavar="NAMES", help="Rig disturbances: delay,bias,load,twist or none. Default: all.")
+@click.option("--starts", type=int, default=4, show_default=True, help="Number of starting points of the search.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Random seed of the starting points.")
+@click.option("--out", type=FILE, help="Folder for the estimates (JSON) and the residual plot (PNG).")
 def identify(
-    paths: Sequence[Path],
-    patch: pf.ContactPatch,
-    *,
-    out: Path | None,
+    logs: tuple[Path, ...],
+    patch: str | None,
+    size: dict[str, Any],
+    parameters: str | None,
+    start: tuple[str, ...],
     normal_force: float | None,
     contact: str | None,
-    parameters: str | None,
-    start: Sequence[str],
     noise: str | None,
     plain: bool,
     steady: bool,
     model: str,
     nuisance: str | None,
+    out: Path | None,
     **search: Any,
 ) -> int:
-    """Estimate the parameters from the logs, print them, and write JSON and picture into `out`; options as typed."""
-    from planarfriction.identify import FitOptions, Log, identify_lugre
+    """Estimate friction parameters of a contact from logs of its motion and its friction wrench.
 
+    Each LOG is a CSV file with a heading and the columns t, vx, vy, omega (or x, y, theta), fx, fy, tau, normal_force
+    in s, m/s, rad/s, N and N m. Twist and wrench are about the origin of the contact frame, in its axes; the wrench
+    acts on the moving body. The files that `planarfriction run` writes are such logs. Prints the estimates, their
+    errors, and what the data do not determine. The command `identify plan` suggests which motion to measure next (for a
+    log called plan, write ./plan).
+
+    \b
+    Examples:
+      planarfriction identify log.csv --patch disc --out out/
+      planarfriction identify slow.csv fast.csv --patch pad.csv --cell-size 0.001
+      planarfriction identify log.csv --parameters mu_c,mu_s,v_s --start sigma_0=1e5 --start sigma_1=100
+      planarfriction identify plan slow.csv --patch disc
+      planarfriction identify joint arm.csv --inertia 0.05
+    """
+    from planarfriction.cli.console import note, work_progress
+    from planarfriction.cli.output import slug, write_picture
+    from planarfriction.identify import FitOptions, identify_lugre
+    from planarfriction.writing import make_folder, write_text
+
+    given = find_patch(patch, size)
     chosen: dict[str, Any] = {"parameters": parse_names(parameters), "start": parse_start(start), "model": model}
     options = FitOptions(
         noise=parse_noise(noise),
@@ -44,31 +105,33 @@ def identify(
     )
     if out is not None:
         make_folder(out)
-    logs = []
+    read = []
     with work_progress("identifying") as progress:
-        for path in paths:
+        for path in logs:
             progress(f"reading {path.name}")
-            logs.append(Log.from_csv(path, normal_force=normal_force, contact=contact))
+            read.append(pf.Log.from_csv(path, normal_force=normal_force, contact=contact))
         try:
-            found = identify_lugre(logs, patch, **chosen, options=options, progress=progress)
+            found = identify_lugre(read, given, **chosen, options=options, progress=progress)
         except IdentificationInterrupted as stop:
             print(stop)
             return INTERRUPTED
-    samples = sum(len(log.time) for log in logs)
-    title = f"{', '.join(log.name for log in logs)}: {samples} samples, {patch.name}"
+    samples = sum(len(log.time) for log in read)
+    title = f"{', '.join(log.name for log in read)}: {samples} samples, {given.name}"
     print(title, "", found.table(), sep="\n")
     note(f"{found.starts[0]} of {found.starts[1]} starting points led to this minimum")
     if out is not None:
-        stem = output.slug(logs[0].name)
+        stem = slug(read[0].name)
         table, picture = out / f"{stem}-identification.json", out / f"{stem}-residuals.png"
         write_text(table, json.dumps(found.to_dict(), indent=2) + "\n")
         note(f"wrote {table}")
-        note(f"wrote {output.write_picture(found.plot(), picture)}")
+        note(f"wrote {write_picture(found.plot(), picture)}")
     return 0
 
 
 def parse_start(entries: Sequence[str]) -> dict[str, float]:
     """Parse the values of `--start NAME=VALUE`, by name."""
+    from planarfriction import validation
+
     start = {}
     for entry in entries:
         name, equals, value = entry.partition("=")
@@ -96,4 +159,157 @@ def parse_nuisance(text: str | None) -> tuple[str, ...]:
 
 def parse_noise(text: str | None) -> list[float] | None:
     """Parse the three numbers of `--noise`."""
+    from planarfriction import validation
+
     return None if text is None else [validation.number_in("--noise", part) for part in text.split(",")]
+
+
+@click.command(short_help="Suggest which motion to measure next.")
+@click.argument("logs", metavar="[LOG]...", type=FILE, nargs=-1)
+@patch_option("Default: Circle.", "patch_name")
+@map_options
+@click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: law and radius.")
+@click.option("--wanted", metavar="NAMES", help="Parameters whose information counts. Default: all.")
+@click.option("--start", metavar="NAME=VALUE", multiple=True, help="Guess of a parameter, or fixed value.")
+@click.option("--normal-force", type=float, multiple=True, help="Load in N; may be repeated. Default: the logs', or 1.")
+@click.option("--speed", type=float, default=0.05, show_default=True, help="Largest speed in m/s.")
+@click.option("--spin", type=float, help="Largest angular speed in rad/s. Default: the rim as fast as --speed.")
+@click.option("--duration", type=float, default=2.0, show_default=True, help="Length of a motion in s.")
+@click.option("--rate", type=float, default=1000.0, show_default=True, help="Samples per second.")
+@click.option(
+    "--noise", metavar="FX,FY,TAU", help="Noise of the measured wrench in N and N m. Default: the logs', else 1 %."
+)
+@click.option("--out", type=FILE, help="File for the best motion (.csv).")
+def plan(
+    logs: tuple[Path, ...],
+    patch_name: str | None,
+    size: dict[str, Any],
+    parameters: str | None,
+    wanted: str | None,
+    start: tuple[str, ...],
+    normal_force: tuple[float, ...],
+    noise: str | None,
+    out: Path | None,
+    **motion: Any,
+) -> int:
+    """Rank motions by the information that each is expected to add to the logs so far.
+
+    Each LOG is a file as for `planarfriction identify`; the logs are fitted first. Without a log, the law is guessed
+    from --start. Prints the gains in bits, and the errors expected after the best motion; --out writes that motion.
+
+    \b
+    Examples:
+      planarfriction identify plan --patch disc --start mu_c=0.5 --start sigma_0=2e4 --out next.csv
+      planarfriction identify plan slow.csv --patch disc --speed 0.03 --spin 2
+      planarfriction identify plan slow.csv --wanted sigma_1
+    """
+    from planarfriction.cli import output
+    from planarfriction.cli.console import note
+    from planarfriction.identify import candidate_motions, design_experiment
+    from planarfriction.identify.logs import columns_of
+
+    patch = find_patch(patch_name, size)
+    names, values, spread = parse_names(parameters), parse_start(start), parse_noise(noise)
+    if out is not None:
+        output.check_kind(out)
+    measured = [pf.Log.from_csv(path, normal_force=normal_force[0] if normal_force else None) for path in logs]
+    patch, law = _known(measured, patch, names, values, spread)
+    loads = list(normal_force) or sorted({float(f"{log.normal_force.mean():.3g}") for log in measured}) or [1.0]
+    motions = candidate_motions(patch, law, normal_force=loads, **motion)
+    chosen = None if wanted is None else [name.strip() for name in wanted.split(",")]
+    options = {"parameters": names, "wanted": chosen, "noise": spread}
+    found = design_experiment(patch, law, logs=measured, motions=motions, **options)
+    print(found.table())
+    if out is not None:
+        output.write_csv(out, columns_of(found.best))
+        note(f"wrote {out}, with the expected wrench")
+    return 0
+
+
+def _known(
+    logs: list[pf.Log],
+    patch: pf.ContactPatch,
+    names: tuple[str, ...],
+    start: dict[str, float],
+    noise: list[float] | None,
+) -> tuple[pf.ContactPatch, pf.LuGre]:
+    """Find patch and law as the logs show them, or as guessed where there are none."""
+    from planarfriction.cli.console import note, work_progress
+    from planarfriction.identify import FitOptions, current_estimate, identify_lugre
+    from planarfriction.identify.wrenches import guessed_law
+
+    law = guessed_law(start)
+    if not logs:
+        return patch, law
+    with work_progress("identifying") as progress:
+        chosen = {"parameters": names, "start": start, "model": "reduced-published"}
+        found = identify_lugre(logs, patch, **chosen, options=FitOptions(noise=noise), progress=progress)
+    note(found.summary().replace("\n", " "))
+    return current_estimate(found, patch, law)
+
+
+@click.command(short_help="Estimate the friction of a joint from a torque, a voltage or the goal of a servo.")
+@click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True)
+@click.option("--mass", type=float, default=0.0, help="Mass at the end of a pendulum in kg.")
+@click.option("--length", type=float, default=0.0, help="Length of the pendulum in m.")
+@click.option("--arm-mass", type=float, help="Mass of its arm in kg.")
+@click.option("--inertia", type=float, help="Moment of inertia, without the pendulum, in kg m^2. Default: estimated.")
+@click.option("--torque-gain", type=float, help="kt/R in N m/V. Default: estimated.")
+@click.option("--kp", type=float, multiple=True, help="Gain of the servo; once for each log, or once for all.")
+@click.option("--gain", type=float, default=1.0, show_default=True, help="Duty per rad at a gain of 1.")
+@click.option("--supply", type=float, help="Voltage of the servo in V.")
+@click.option("--sag", type=float, default=0.0, show_default=True, help="Voltage lost at full duty in V.")
+@click.option("--terms", default="auto", show_default=True, help="load,stribeck,bristles,directional; none; or auto.")
+@click.option("--out", type=FILE, help="Folder for the estimates (JSON), the picture (PNG) and C source.")
+def joint(
+    logs: tuple[Path, ...],
+    torque_gain: float | None,
+    kp: tuple[float, ...],
+    gain: float,
+    supply: float | None,
+    sag: float,
+    terms: str,
+    out: Path | None,
+    **plant: Any,
+) -> int:
+    """Estimate the friction of a joint from logs of its motion; say what the logs leave open.
+
+    Each LOG is a CSV file with a heading and the columns t, q and one of torque, voltage (or duty and supply) and goal
+    in s, rad, N m and V; enabled, dq and external are read too. A goal needs --kp and --supply. Terms of the friction
+    are kept only if they predict left-out logs better.
+
+    \b
+    Examples:
+      planarfriction identify joint arm.csv --inertia 0.05
+      planarfriction identify joint a.csv b.csv c.csv d.csv --mass 0.5 --length 0.1 --kp 200 --supply 7.4 --gain 0.003
+    """
+    from planarfriction.cli.console import note, work_progress
+    from planarfriction.cli.output import slug, write_picture
+    from planarfriction.export.joint import export_joint_c
+    from planarfriction.joints import Drive, JointLog, Plant, identify_joint
+    from planarfriction.writing import make_folder, write_text
+
+    if len(kp) not in (0, 1, len(logs)):
+        raise InvalidValueError("--kp", "be given once, or once for each log", f"{len(kp)} times")
+    if kp and supply is None:
+        raise InvalidValueError("--supply", "be given with --kp", "none")
+    gains = (kp * len(logs) if len(kp) == 1 else kp) or (None,) * len(logs)
+    drives = [None if each is None else Drive(each, supply or 0.0, gain, sag) for each in gains]
+    read = [JointLog.from_csv(path, drive=drive) for path, drive in zip(logs, drives, strict=True)]
+    words = terms.split(",") if terms not in ("auto", "none") else terms if terms == "auto" else ()
+    if out is not None:
+        make_folder(out)
+    with work_progress("identifying") as progress:
+        fit = identify_joint(read, Plant(**plant), torque_gain=torque_gain, terms=words, progress=progress)
+    print(fit.table())
+    if out is not None:
+        stem = slug(read[0].name)
+        write_text(out / f"{stem}-joint.json", json.dumps(fit.to_dict(), indent=2) + "\n")
+        files = [out / f"{stem}-joint.json", write_picture(fit.plot(), out / f"{stem}-joint.png")]
+        for file in [*files, *export_joint_c(fit.friction, out, name="friction")]:
+            note(f"wrote {file}")
+    return 0
+
+
+OTHERS = {"plan": plan, "joint": joint}
+"""Subcommands of `identify`."""

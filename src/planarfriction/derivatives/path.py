@@ -19,9 +19,8 @@ from planarfriction.kernels.integration import Output
 from planarfriction.kernels.path import Path, Stretch, Tolerances
 from planarfriction.kernels.sdirk import workspace_for
 from planarfriction.kernels.tangent import Drives
-from planarfriction.scenes.options import SolverOptions
 from planarfriction.scenes.packing import SegmentBatches
-from planarfriction.scenes.scene import Scene
+from planarfriction.scenes.scene import Scene, SolverOptions
 from planarfriction.solvers import RODAS4
 from planarfriction.solvers.structured import start_of
 

@@ -15,8 +15,7 @@ from planarfriction.derivatives.scene_inputs import SCENE_PARAMETERS, STATES, Sc
 from planarfriction.derivatives.scenes import scene_sensitivities
 from planarfriction.errors import InvalidValueError
 from planarfriction.scenes.contact import Contact, with_friction
-from planarfriction.scenes.options import SolverOptions
-from planarfriction.scenes.scene import Scene
+from planarfriction.scenes.scene import Scene, SolverOptions
 from planarfriction.scenes.signal import Signal
 
 FACTORS = tuple(name for name in SCENE_PARAMETERS if name != "r")

@@ -19,8 +19,7 @@ from planarfriction.kernels.body import System
 from planarfriction.kernels.path import Path, Stretch, Tolerances
 from planarfriction.kernels.sdirk import workspace_for
 from planarfriction.kernels.tangent import Drives
-from planarfriction.scenes.options import SolverOptions
-from planarfriction.scenes.scene import Scene
+from planarfriction.scenes.scene import Scene, SolverOptions
 
 
 @dataclass(frozen=True, eq=False)

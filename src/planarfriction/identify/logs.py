@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.equality import ByValue
+from planarfriction.equality import ByValue, Kept
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.geometry import rotate
 from planarfriction.identify.columns import LOAD, MOTION, TWIST, WRENCH, find_columns
@@ -56,13 +56,13 @@ class Log(ByValue):
     increase, negative normal forces, and a `name`, `turns` or `held` of another kind.
     """
 
-    time: np.ndarray
+    time: Kept[ArrayLike, np.ndarray]
     """Sample times [s], `[T]`."""
-    twist: np.ndarray
+    twist: Kept[ArrayLike, np.ndarray]
     """`(vx, vy, omega)` [m/s, m/s, rad/s], `[T, 3]`."""
-    wrench: np.ndarray
+    wrench: Kept[ArrayLike, np.ndarray]
     """`(fx, fy, tau)` [N, N, N m], `[T, 3]`."""
-    normal_force: np.ndarray
+    normal_force: Kept[ArrayLike, np.ndarray]
     """Normal force [N], `[T]`, or one number for all samples."""
     name: str = "log"
     """Name for messages and plots."""
@@ -71,19 +71,6 @@ class Log(ByValue):
     held: bool = False
     """True if the twist of a sample is the mean since the one before: held by a controller, or differences of poses.
     Files and simulations show it by their angle, so only where the contact turns."""
-
-    if TYPE_CHECKING:  # what is given may be more than what is kept
-
-        def __init__(
-            self,
-            time: ArrayLike,
-            twist: ArrayLike,
-            wrench: ArrayLike,
-            normal_force: ArrayLike,
-            name: str = "log",
-            turns: int = 0,
-            held: bool = False,
-        ) -> None: ...
 
     def __post_init__(self) -> None:
         validation.instance("name", self.name, str, "a text")

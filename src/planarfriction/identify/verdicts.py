@@ -13,12 +13,11 @@ import numpy as np
 
 from planarfriction.described import described
 from planarfriction.identify.decimation import samples_of
-from planarfriction.identify.held import Pull
 from planarfriction.identify.logs import TWO_LOADS, Log
 from planarfriction.identify.parameters import ALL, SOFT_FINGER, bristles_of
 from planarfriction.identify.problem import SPOILED
 from planarfriction.identify.rig import CHANNELS
-from planarfriction.identify.uncertainty import HELD_OUT, STRAIN, Fit, Uncertainty
+from planarfriction.identify.uncertainty import HELD_OUT, STRAIN, Fit, Pull, Uncertainty
 
 TWO_SIDED = 1.96
 """Standard errors on either side of the estimate that hold 95 % of a normal distribution."""

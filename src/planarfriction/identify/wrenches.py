@@ -14,17 +14,15 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
 from planarfriction.identify.checks import check_logs, size_of, with_findings
 from planarfriction.identify.decimation import decimated, samples_of
-from planarfriction.identify.held import pulls_of_held
 from planarfriction.identify.logs import TWO_LOADS, Log, as_tuple, load_ratio, mean_load, one_coordinate
 from planarfriction.identify.options import FitOptions
 from planarfriction.identify.parameters import fitted_law, scaled_patch
 from planarfriction.identify.problem import SPOILED, LogProblem
-from planarfriction.identify.profile import stretches
 from planarfriction.identify.result import Identification
 from planarfriction.identify.rig import CHANNELS, Nuisance, wrench_noise
-from planarfriction.identify.search import guess_starts, interruptible, multistart, refine, warm_start
+from planarfriction.identify.search import guess_starts, interruptible, multistart, refine, stretches, warm_start
 from planarfriction.identify.simulators import SIMULATORS
-from planarfriction.identify.uncertainty import correlations, uncertainty
+from planarfriction.identify.uncertainty import correlations, pulls_of_held, uncertainty
 from planarfriction.identify.verdicts import Candidate, Evidence, judge, verdicts_on_samples, verdicts_on_turns
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models import ReducedModelPublished

@@ -12,8 +12,7 @@ from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.joints.log import JointLog, Plant, as_joint_logs
 from planarfriction.joints.problem import NEEDS, PARAMETERS, SHORT, TERMS, Problem
-from planarfriction.joints.result import JointFit, Trial
-from planarfriction.joints.verdicts import judge
+from planarfriction.joints.result import JointFit, Trial, judge
 
 SPANS = (SHORT, 0.6, np.inf)
 """Times [s] after which a simulated run begins again at the measured motion: short runs have one minimum, the last is

@@ -10,8 +10,7 @@ import numpy as np
 
 from planarfriction.joints.friction import JointFriction
 from planarfriction.joints.log import GRAVITY, JointLog, Plant
-from planarfriction.joints.loops.plant import PlantNumbers, run_plant
-from planarfriction.joints.loops.runs import run_measured
+from planarfriction.joints.loops.runs import PlantNumbers, run_measured, run_plant
 
 
 class Parameter(NamedTuple):

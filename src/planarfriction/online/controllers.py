@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import Any
 
@@ -16,9 +15,6 @@ from planarfriction.online.sensors import GRAVITY, Measurement
 
 _LEAST_MU = 3.0902
 """Standard deviations by which mu_c is assumed to be smaller where it cannot be found: one part in a thousand slips."""
-
-trapezoid = functools.partial(grips.trapezoid.py_func, np)
-"""Place, speed and acceleration at times [s] of a displacement whose ramps take a quarter each of the duration."""
 
 
 class GripController:

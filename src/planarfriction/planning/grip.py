@@ -16,8 +16,7 @@ from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.pictures import picture
 from planarfriction.planning.holding import dynamic_holding_load, holding_load
-from planarfriction.planning.motions import LOOSE, ROUGH, Aim, Grips, grip_position, load_on
-from planarfriction.planning.report import GripReport, report_of
+from planarfriction.planning.motions import LOOSE, ROUGH, Aim, GripReport, Grips, grip_position, load_on, report_of
 from planarfriction.scenes import Scene, Signal
 
 LEVELS = (0.93, 0.85, 0.7, 0.5, 0.25, 0.02)

@@ -14,8 +14,7 @@ from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.pictures import picture
 from planarfriction.planning.contact_modes import LEFT, RIGHT, STICK, TouchPoint, motion_at
-from planarfriction.planning.slider import Pusher, Slider
-from planarfriction.planning.touch import FACE, Scenery, Touch, flush_after, place_of, touch_after
+from planarfriction.planning.slider import FACE, Pusher, Scenery, Slider, Touch, flush_after, place_of, touch_after
 from planarfriction.scenes import Signal
 from planarfriction.scenes.signal import as_signal
 

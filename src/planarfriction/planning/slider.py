@@ -1,18 +1,20 @@
-"""The slider and the pusher: a convex outline with its limit surface, and a point or a flat face."""
+"""The slider and the pusher: a convex outline with its limit surface, a point or a flat face, and where they touch."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.equality import ByValue, Checked, checked
+from planarfriction.equality import ByValue, Checked, Kept, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.limit_surface import LimitSurface
+from planarfriction.planning.contact_modes import TouchPoint
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +26,8 @@ class Slider(ByValue):
 
     surface: LimitSurface
     """Limit surface of the patch on which it stands; its frame is the slider's."""
-    outline: np.ndarray
+    outline: Kept[ArrayLike, np.ndarray]
     """Corners of the convex outline `[M, 2]` in that frame [m], in either sense of rotation."""
-
-    if TYPE_CHECKING:  # what is given may be more than what is kept
-
-        def __init__(self, surface: LimitSurface, outline: ArrayLike) -> None: ...
 
     def __post_init__(self) -> None:
         validation.instance("surface", self.surface, LimitSurface, "a limit surface")
@@ -87,3 +85,194 @@ class Pusher(Checked):
         """Right and left end of the face, in the pusher's axes `[2, 2]` [m]; for a point that point `[1, 2]`."""
         half = 0.5 * self.width
         return np.array([[0.0, -half], [0.0, half]]) if half > 0.0 else np.zeros((1, 2))
+
+
+END, CORNER, FACE = "end", "corner", "face"
+
+_LEAST = 1e-4
+"""Least displacement between two looks at a free pusher, as a share of the slider's size: it may miss a graze."""
+
+_NEAR = 1e-9
+"""Distance that counts as touching, as a share of the slider's size."""
+
+_FLUSH = 1e-4
+"""Angle [rad] between a face and an edge that touch twice, beyond which they are not flush."""
+
+
+class Touch(NamedTuple):
+    """Feature that touches: an end of the pusher at an edge, a corner at the face, or the face at an edge."""
+
+    kind: str
+    edge: int
+    """The edge, or the corner."""
+    end: int = 0
+
+
+class Scenery:
+    """A slider, a pusher and the path of the latter: all the geometry of a push."""
+
+    def __init__(self, slider: Slider, pusher: Pusher, times: np.ndarray, poses: np.ndarray) -> None:
+        self.slider, self.pusher = slider, pusher
+        self._times, self._poses, self.path_end = times, poses, float(times[-1])
+        self._rates = np.diff(poses, axis=0) / np.diff(times)[:, None]
+        self._ends, self.near = pusher.ends, _NEAR * slider.size
+        edges = np.roll(slider.outline, -1, axis=0) - slider.outline
+        self._lengths = np.hypot(*edges.T)
+
+    def pose(self, t: float) -> np.ndarray:
+        """Return the pose of the pusher `[3]`."""
+        i = self._piece(t)
+        return self._poses[i] + (t - self._times[i]) * self._rates[i]
+
+    def _piece(self, t: float, forward: bool = False) -> int:
+        i = int(np.searchsorted(self._times, t, side="right" if forward else "left")) - 1
+        return min(max(i, 0), len(self._rates) - 1)
+
+    def piece_end(self, t: float) -> float:
+        """Return the time at which the line ends that the pusher follows from a time on."""
+        return float(self._times[self._piece(t, forward=True) + 1])
+
+    def end(self, i: int, t: float, q: np.ndarray) -> np.ndarray:
+        """Return an end of the pusher in the slider's axes `[2]`."""
+        x, y, angle = self.pose(t)
+        (a, b), c, s = self._ends[i], math.cos(angle), math.sin(angle)
+        return _inside(q, x + c * a - s * b, y + s * a + c * b)
+
+    def corners(self, t: float, q: np.ndarray) -> np.ndarray:
+        """Return the corners of the slider in the pusher's axes `[M, 2]`."""
+        c, s = math.cos(q[2]), math.sin(q[2])
+        world = self.slider.outline @ np.array([[c, s], [-s, c]]) + q[:2]
+        x, y, angle = self.pose(t)
+        c, s = math.cos(angle), math.sin(angle)
+        return (world - [x, y]) @ np.array([[c, -s], [s, c]])
+
+    def features(self, t: float, q: np.ndarray) -> list[tuple[float, Touch]]:
+        """Return everything that may touch, with its distance [m]."""
+        found = []
+        for i in range(len(self._ends)):
+            gaps = self.slider.gaps(self.end(i, t, q))
+            edge = int(gaps.argmax())
+            found.append((float(gaps[edge]), Touch(END, edge, i)))
+        half = 0.5 * self.pusher.width
+        if half > 0.0:
+            # a corner behind the face's line by more than the face is wide is on its back
+            for k, (ahead, aside) in enumerate(self.corners(t, q)):
+                if abs(aside) <= (1.0 + _NEAR) * half and ahead > -half:
+                    found.append((float(ahead), Touch(CORNER, k)))
+        return found
+
+    def gap(self, t: float, q: np.ndarray) -> float:
+        """Return the distance of pusher and slider [m], negative where they overlap."""
+        return min(each[0] for each in self.features(t, q))
+
+    def not_before(self, t: float, q: np.ndarray) -> float:
+        """Return a time up to which a free pusher cannot have gone further than it is away from a slider at rest."""
+        import shapely
+
+        ends = [self.end(i, t, q) for i in range(len(self._ends))]
+        pusher = shapely.Point(ends[0]) if len(ends) == 1 else shapely.LineString(ends)
+        away = max(shapely.distance(shapely.Polygon(self.slider.outline), pusher), _LEAST * self.slider.size)
+        vx, vy, omega = self.rate(t, forward=True)
+        speed = math.hypot(vx, vy) + abs(omega) * float(np.hypot(*np.transpose(self._ends)).max())
+        end = self.piece_end(t)
+        return min(end, t + away / speed) if speed * (end - t) > away else end
+
+    def clear(self, contact: Touch, t: float, q: np.ndarray) -> float:
+        """Return the distance of all that does not touch yet [m]."""
+        return min(gap for gap, each in self.features(t, q) if not _same(contact, each, len(self._lengths))) + self.near
+
+    def flush(self, t: float, q: np.ndarray) -> Touch:
+        """Return the face at the edge that it has closed with."""
+        c, s = math.cos(self.pose(t)[2] - q[2]), math.sin(self.pose(t)[2] - q[2])
+        along = self.slider.inward @ [c, s]
+        edge = int(along.argmax())
+        if math.acos(min(along[edge], 1.0)) > _FLUSH:
+            raise InvalidValueError("path", "not wedge the slider between two points of the face", f"t = {t:g} s")
+        return Touch(FACE, edge)
+
+    def within(self, contact: Touch, t: float, q: np.ndarray) -> float:
+        """Return the distance of what touches from the end of its edge, or of the face [m]."""
+        if contact.kind == CORNER:
+            return 0.5 * self.pusher.width - abs(self.corners(t, q)[contact.edge][1])
+        if contact.kind == END:
+            s = self.along(contact.edge, self.end(contact.end, t, q))
+            return min(s, self._lengths[contact.edge] - s)
+        low, high = self.overlap(contact.edge, t, q)
+        return high - low
+
+    def along(self, edge: int, point: np.ndarray) -> float:
+        """Return the position of a point along an edge [m]."""
+        return float((point - self.slider.outline[edge]) @ self.slider.along[edge])
+
+    def overlap(self, edge: int, t: float, q: np.ndarray) -> tuple[float, float]:
+        """Return the part of an edge that the face covers, from its left to its right end as it looks [m]."""
+        right, left = (self.along(edge, self.end(i, t, q)) for i in range(2))
+        return max(left, 0.0), min(right, self._lengths[edge])
+
+    def rate(self, t: float, forward: bool = False) -> np.ndarray:
+        """Return the velocity of the pusher `[3]`."""
+        return self._rates[self._piece(t, forward)]
+
+
+def _inside(q: np.ndarray, x: float, y: float) -> np.ndarray:
+    """Return a point of the world in the axes of a slider with the pose q."""
+    c, s = math.cos(q[2]), math.sin(q[2])
+    dx, dy = x - q[0], y - q[1]
+    return np.array([c * dx + s * dy, c * dy - s * dx])
+
+
+def _same(contact: Touch, other: Touch, edges: int) -> bool:
+    """Return True if a feature is the one that touches: an end at any edge, or a corner."""
+    return contact.kind == other.kind and (
+        contact.end == other.end if contact.kind == END else contact.edge % edges == other.edge
+    )
+
+
+def place_of(
+    scenery: Scenery, contact: Touch, t: float, q: np.ndarray, forward: bool = False
+) -> tuple[TouchPoint, np.ndarray]:
+    """Return the place at which a slider is touched, and the velocity of the pusher there, `[3]`, in its axes."""
+    slider, (x, y, angle), half = scenery.slider, scenery.pose(t), 0.0
+    if contact.kind == END:
+        at, normal = scenery.end(contact.end, t, q), slider.inward[contact.edge]
+    elif contact.kind == CORNER:
+        at = slider.outline[contact.edge]
+        normal = np.array([math.cos(angle - q[2]), math.sin(angle - q[2])])
+    else:
+        low, high = scenery.overlap(contact.edge, t, q)
+        half, normal = 0.5 * max(high - low, 0.0), slider.inward[contact.edge]
+        at = slider.outline[contact.edge] + 0.5 * (low + high) * slider.along[contact.edge]
+    vx, vy, omega = scenery.rate(t, forward)
+    c, s = math.cos(q[2]), math.sin(q[2])
+    arm = at - _inside(q, x, y)
+    velocity = np.array([c * vx + s * vy - omega * arm[1], c * vy - s * vx + omega * arm[0], omega])
+    return TouchPoint(at, normal, half), velocity
+
+
+def flush_after(scenery: Scenery, contact: Touch, t: float, q: np.ndarray, leans: int) -> Touch:
+    """Return what still touches when a face turns about its left end (1) or its right one (-1)."""
+    edge, corners = contact.edge, len(scenery.slider.outline)
+    right, left = (scenery.along(edge, scenery.end(i, t, q)) for i in range(2))
+    if leans > 0:
+        return Touch(END, edge, 1) if left >= 0.0 else Touch(CORNER, edge)
+    inside = right <= scenery.along(edge, scenery.slider.outline[(edge + 1) % corners])
+    return Touch(END, edge, 0) if inside else Touch(CORNER, (edge + 1) % corners)
+
+
+def touch_after(scenery: Scenery, t: float, q: np.ndarray) -> tuple[float, Touch] | None:
+    """Return time and place at which a pusher that does not touch a slider at rest begins to, or None."""
+    from scipy.optimize import brentq
+
+    off = lambda at: scenery.gap(at, q) + scenery.near  # noqa: E731
+    low, before = t, off(t)
+    while low < scenery.path_end:
+        high = scenery.not_before(low, q)
+        after = off(high)
+        if after < 0.0 <= before:
+            at = brentq(off, low, high, xtol=1e-14 * max(abs(high), 1.0))
+            near = [each for gap, each in scenery.features(at, q) if gap < 100.0 * scenery.near]  # pyright: ignore
+            if len(near) > 1:
+                return at, scenery.flush(at, q)  # pyright: ignore
+            return at, min(scenery.features(at, q))[1]  # pyright: ignore
+        low, before = high, after
+    return None

@@ -7,15 +7,23 @@ from typing import TYPE_CHECKING
 import lazy_loader
 
 from planarfriction.families import SCENES
-from planarfriction.scenes.body import Body
+from planarfriction.scenes.body import Body, Spring
 from planarfriction.scenes.contact import Contact
-from planarfriction.scenes.options import SolverOptions
-from planarfriction.scenes.ready import drift, driven, free_slide, in_hand, in_hand_load, published_velocity, pushed
-from planarfriction.scenes.scene import Scene
+from planarfriction.scenes.ready import (
+    curling,
+    drift,
+    driven,
+    foot,
+    free_slide,
+    in_hand,
+    in_hand_load,
+    pivot,
+    published_velocity,
+    pushed,
+)
+from planarfriction.scenes.scene import Scene, SolverOptions
 from planarfriction.scenes.signal import Signal
 from planarfriction.scenes.solution import Solution, Statistics
-from planarfriction.scenes.spring import Spring
-from planarfriction.scenes.worlds import curling, foot, pivot
 
 if TYPE_CHECKING:
     from planarfriction.scenes.simulation import simulate

@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.equality import ByValue
+from planarfriction.equality import ByValue, Kept
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.scenes.body import floats
@@ -46,11 +46,11 @@ class Contact(ByValue):
 
     model: Any = field(repr=False)
     """Friction model, for example one of `planarfriction.models`."""
-    normal_force: Signal
+    normal_force: Kept[Signal | ArrayLike, Signal]
     """Normal force [N], >= 0: a signal, or a number for a constant force."""
     mounted_on: Literal["world", "body"] = "world"
     """Part that the contact frame is fixed to: "world" or "body"."""
-    position: tuple[float, float] = (0.0, 0.0)
+    position: Kept[ArrayLike, tuple[float, float]] = (0.0, 0.0)  # pyright: ignore[reportAssignmentType]
     """Origin of the contact frame [m], in the world or, on the body, in its axes from its centre of mass."""
     angle: float = 0.0
     """Angle of the contact frame's axes in the world or in the body [rad]."""
@@ -58,7 +58,7 @@ class Contact(ByValue):
     """Number of identical contacts (same position, same load) that share this one's state."""
     name: str = "contact"
     """Name in the results; unique within its scene."""
-    support_velocity: Signal | None = None
+    support_velocity: Kept[Signal | ArrayLike | None, Signal | None] = None  # pyright: ignore[reportAssignmentType]
     """Prescribed twist `(vx, vy, omega)` of the world's side, world axes, `[T, 3]` [m/s, m/s, rad/s]; None: at rest.
 
     For a pad fixed to the world it is the twist at the origin of the contact frame, which moves with the pad. Under a
@@ -79,23 +79,6 @@ class Contact(ByValue):
     A cell that lies on the edge carries by the part of its area that is on the body, at the centroid of this part. The
     contact ends when none is. It is fixed to the world, and its model has bristles on cells.
     """
-
-    if TYPE_CHECKING:  # what is given may be more than what is kept
-
-        def __init__(
-            self,
-            model: Any,
-            normal_force: Signal | ArrayLike,
-            mounted_on: Literal["world", "body"] = "world",
-            position: ArrayLike = (0.0, 0.0),
-            angle: float = 0.0,
-            count: int = 1,
-            name: str = "contact",
-            support_velocity: Signal | ArrayLike | None = None,
-            pressure: Literal["fixed", "follows"] = "fixed",
-            height: float = 0.0,
-            edge: bool = False,
-        ) -> None: ...
 
     def __post_init__(self) -> None:
         validation.text("name of a contact", self.name)

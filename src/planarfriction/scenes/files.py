@@ -18,13 +18,11 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import FileError, InvalidValueError, shown
-from planarfriction.reading import read_text
-from planarfriction.scenes.body import Body
+from planarfriction.reading import Section, read_text
+from planarfriction.scenes.body import Body, Spring
 from planarfriction.scenes.contact import Contact
 from planarfriction.scenes.model_files import model_from_dict, model_to_dict
-from planarfriction.scenes.section import Section
 from planarfriction.scenes.signal import Signal, read_signal
-from planarfriction.scenes.spring import Spring
 from planarfriction.writing import write_text
 
 SCENE_KEYS = (

@@ -17,7 +17,7 @@ import numpy as np
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import LAWS, MODELS, SHAPES, SURFACES, Family
 from planarfriction.laws import ElastoPlastic
-from planarfriction.scenes.section import Section
+from planarfriction.reading import Section
 
 _GIVEN = ("patch", "law")
 """Parameters of models and surfaces that are not keys of their tables."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -65,20 +64,6 @@ def centres_of_pressure(contact: Contact, beside: np.ndarray, load: np.ndarray) 
         some = slice(first, first + most)
         found[some] = patch.weights(load[some], moments[some]) @ patch.positions
     return found
-
-
-class PackedScene(NamedTuple):
-    """A scene as the solver sees it."""
-
-    system: System
-    state: np.ndarray
-    """Bristles as the scene starts, body velocity, pose."""
-    state_scale: np.ndarray
-    """Natural scale of each state (see `SegmentBatches.state_scale`)."""
-    models: list[PackedModel]
-    """The model of each contact."""
-    loading: float
-    """Time to compile the models' functions and the solver's, or to load them from the cache [s]."""
 
 
 class Segments:
@@ -342,13 +327,6 @@ class SegmentBatches:
         kept = tuple(array for model in models for array in (model.records, *model.keepalive))
         pressures = sum(STATES for contact in scene.contacts if contact.pressure == "follows")
         return System(self._contacts, motion, kept, pressures)
-
-
-def pack(scene, t_end: float, *, sensitivities: bool = False) -> PackedScene:
-    """Return flat arrays of the scene from 0 to `t_end` [s] in one batch, whatever room and time its shapes take."""
-    whole = SegmentBatches(scene, t_end, sensitivities=sensitivities, most=MOST_PIECES)
-    system = next(iter(whole))
-    return PackedScene(system, whole.state, whole.state_scale, whole.models, whole.loading)
 
 
 def _in_order(loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

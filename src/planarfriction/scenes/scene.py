@@ -1,4 +1,4 @@
-"""Scenes: a body, the contacts it slides on, and everything that drives it, as plain immutable data."""
+"""Scenes: a body, its contacts, and everything that drives it, as plain immutable data; and options of simulations."""
 
 from __future__ import annotations
 
@@ -7,19 +7,18 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.equality import ByValue, checked
+from planarfriction.equality import ByValue, Checked, Kept, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.pictures import picture
-from planarfriction.scenes.body import Body
+from planarfriction.scenes.body import Body, Spring
 from planarfriction.scenes.contact import Contact
-from planarfriction.scenes.signal import Signal, as_signal, breaks_between, sample_count
-from planarfriction.scenes.spring import Spring
+from planarfriction.scenes.signal import MOST_SAMPLES, SAME_TIME, Signal, as_signal, breaks_between, sample_count
 
 STARTS = ("rest", "equilibrium", "sliding")
 """Ways in which bristles may start."""
@@ -56,15 +55,15 @@ class Scene(ByValue):
     Raises InvalidValueError, naming the parameter, if the parts do not make a valid scene.
     """
 
-    body: Body = checked(validation.instance, Body, "a Body")
+    body: Kept[Body | None, Body] = checked(validation.instance, Body, "a Body")
     """The body that moves; None: one without weight, moved as `velocity` prescribes."""
-    contacts: Sequence[Contact] = checked(_contacts)
+    contacts: Kept[Contact | Sequence[Contact], Sequence[Contact]] = checked(_contacts)
     """The contacts it slides on, at least one."""
     t_end: float = checked(validation.positive)
     """Duration [s]."""
-    force: Signal | None = checked(as_signal, 3, default=None)
+    force: Kept[Signal | ArrayLike | None, Signal | None] = checked(as_signal, 3, default=None)
     """Applied wrench `(fx, fy, tau)` at the centre of mass, world axes, `[T, 3]` [N, N, N m], or None."""
-    velocity: Signal | None = checked(as_signal, 3, default=None)
+    velocity: Kept[Signal | ArrayLike | None, Signal | None] = checked(as_signal, 3, default=None)
     """Prescribed twist `(vx, vy, omega)` in **body axes**, `[T, 3]` [m/s, m/s, rad/s], or None for a free body.
 
     It is the velocity of the origin of the body's axes. Mass, inertia, gravity and initial velocity then have no
@@ -84,26 +83,8 @@ class Scene(ByValue):
     """State of the bristles at the start: "rest", relaxed; "equilibrium", carrying the load of a body at rest (with the
     least elastic energy, which determines how contacts share it); "sliding", in the steady state of the initial
     velocity."""
-    springs: Sequence[Spring] = checked(_listed, Spring, default=())
+    springs: Kept[Spring | Sequence[Spring], Sequence[Spring]] = checked(_listed, Spring, default=())
     """Springs that tie the body to anchors; one, several or none."""
-
-    if TYPE_CHECKING:  # what is given may be more than what is kept
-
-        def __init__(
-            self,
-            body: Body | None,
-            contacts: Contact | Sequence[Contact],
-            t_end: float,
-            force: Signal | ArrayLike | None = None,
-            velocity: Signal | ArrayLike | None = None,
-            stop_speed: float | None = None,
-            save_every: float = 0.01,
-            rtol: float = RTOL,
-            atol: float = ATOL,
-            name: str = "scene",
-            start: Literal["rest", "equilibrium", "sliding"] = "rest",
-            springs: Spring | Sequence[Spring] = (),
-        ) -> None: ...
 
     def __post_init__(self) -> None:
         if self.body is None and self.velocity is not None:
@@ -215,3 +196,61 @@ class Scene(ByValue):
     def digest(self) -> str:
         """Return the SHA-256 of the content, in hexadecimal: equal scenes have equal digests."""
         return hashlib.sha256(self.to_json().encode()).hexdigest()
+
+
+MAX_STEPS = 5 * MOST_SAMPLES
+"""Steps that a run tries at most by default: five for each sample of the longest signal, a minute with few states."""
+
+
+class Plan(NamedTuple):
+    """Checked options of one simulation."""
+
+    end: float
+    """End [s]."""
+    times: np.ndarray
+    """Instants to record `[M]` [s]."""
+    rtol: float
+    """Relative tolerance [-]."""
+    atol: float
+    """Absolute tolerance, as a share of the natural scales [-]."""
+    max_steps: int
+    """Largest number of steps."""
+
+
+@dataclass(frozen=True)
+class SolverOptions(Checked):
+    """Options of the simulation of a scene; None takes those of the scene, or of the function that gets them.
+
+    Raises InvalidValueError for numbers that are not > 0, and a number of steps that is no integer.
+    """
+
+    t_end: float | None = checked(validation.positive, default=None)
+    """End [s], at most the scene's own."""
+    rtol: float | None = checked(validation.positive, default=None)
+    """Relative tolerance [-], > 0."""
+    atol: float | None = checked(validation.positive, default=None)
+    """Tolerance as a share of the natural scales [-], > 0 (see `simulate`); it follows `rtol` by default."""
+    save_every: float | None = checked(validation.positive, default=None)
+    """Recording interval [s]; the end is always recorded."""
+    max_steps: int = checked(validation.count, default=MAX_STEPS)
+    """Largest number of steps: whatever the scene asks for, a run ends."""
+
+    def plan(self, scene: Scene, rtol: float | None = None) -> Plan:
+        """Return what the options say for a scene; with `rtol` given, both tolerances are that by default.
+
+        Raises InvalidValueError for an end after the scene's own.
+        """
+        end = scene.t_end if self.t_end is None else self.t_end
+        if end > scene.t_end:
+            raise InvalidValueError("t_end", f"be at most the scene's {scene.t_end:g} s", end)
+        least, default = (scene.atol, scene.rtol) if rtol is None else (rtol, rtol)
+        relative = default if self.rtol is None else self.rtol
+        absolute = least * (relative / default) if self.atol is None else self.atol
+        every = scene.save_every if self.save_every is None else self.save_every
+        return Plan(end, recording_times(end, every), relative, absolute, self.max_steps)
+
+
+def recording_times(end: float, every: float) -> np.ndarray:
+    """Return every multiple of `every` up to the end, and the end [s]."""
+    times = np.arange(sample_count(end, every, "save_every") + 1) * every
+    return np.append(times, end) if end - times[-1] > SAME_TIME else times

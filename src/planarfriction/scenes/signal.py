@@ -6,16 +6,15 @@ import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.equality import ByValue
+from planarfriction.equality import ByValue, Kept
 from planarfriction.errors import InvalidValueError, shown
-from planarfriction.reading import Table
-from planarfriction.scenes.section import Section
+from planarfriction.reading import Section, Table
 
 Hold = Literal["previous", "linear"]
 
@@ -62,16 +61,12 @@ class Signal(ByValue):
     Raises InvalidValueError if times do not increase, values are not finite or shapes do not match.
     """
 
-    times: np.ndarray
+    times: Kept[ArrayLike, np.ndarray]
     """Sample times [s], shape `[T]`, strictly increasing."""
-    values: np.ndarray
+    values: Kept[ArrayLike, np.ndarray]
     """Sample values, shape `[T]` or `[T, k]`."""
     hold: Hold = "previous"
     """Course between the samples: "previous" or "linear"."""
-
-    if TYPE_CHECKING:  # what is given may be more than what is kept
-
-        def __init__(self, times: ArrayLike, values: ArrayLike, hold: Hold = "previous") -> None: ...
 
     def __post_init__(self) -> None:
         times = validation.array("times", self.times, (None,))

@@ -10,9 +10,8 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
 from planarfriction.kernels.integration import Method, Output
-from planarfriction.scenes.options import MAX_STEPS, SolverOptions
 from planarfriction.scenes.packing import SegmentBatches, centres_of_pressure
-from planarfriction.scenes.scene import Scene
+from planarfriction.scenes.scene import MAX_STEPS, Scene, SolverOptions
 from planarfriction.scenes.solution import History, Solution
 from planarfriction.solvers import RODAS4, integrate
 from planarfriction.solvers.structured import compiled_together

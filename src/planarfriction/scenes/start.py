@@ -8,7 +8,7 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction.errors import InvalidValueError
-from planarfriction.scenes.spring import pull_on
+from planarfriction.scenes.body import pull_on
 
 _LONG = 1e6
 """Step [s] in which bristles reach the steady state of a held twist: all that move by more than 1e-12 m/s."""

@@ -15,8 +15,8 @@ from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.scenes import Scene
 from planarfriction.scenes.signal import SAME_TIME
 from planarfriction.scenes.solution import History
-from planarfriction.sweeps.quantities import Grid
 from planarfriction.sweeps.records import FAILED, Record, failure, pack, unpack
+from planarfriction.sweeps.settings import Grid
 from planarfriction.writing import make_folder, replacing, write_text
 
 if TYPE_CHECKING:
@@ -184,7 +184,7 @@ def _name(content: bytes) -> str:
 
 def instants(ends: Iterable[tuple[float, float]]) -> np.ndarray:
     """Return the times at which any of several runs records [s], from their ends and intervals."""
-    from planarfriction.scenes.options import recording_times
+    from planarfriction.scenes.scene import recording_times
 
     times = np.unique(np.concatenate([recording_times(*each) for each in sorted(set(ends))]))
     return times[np.diff(times, prepend=-np.inf) > SAME_TIME]

@@ -27,9 +27,8 @@ from planarfriction.errors import InvalidValueError, SweepError, SweepInterrupte
 from planarfriction.scenes import Scene, Solution
 from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, Index
 from planarfriction.sweeps.keys import Keys
-from planarfriction.sweeps.quantities import check_takes, grid_of
 from planarfriction.sweeps.records import FAILED, TURN, Batch, Record, reason_of, run_all
-from planarfriction.sweeps.settings import Settable
+from planarfriction.sweeps.settings import Settable, check_takes, grid_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -19,8 +19,7 @@ from planarfriction.derivatives.rollouts import weights_vjp
 from planarfriction.derivatives.scene_function import SceneFunction
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
-from planarfriction.scenes.options import MAX_STEPS
-from planarfriction.scenes.scene import Scene
+from planarfriction.scenes.scene import MAX_STEPS, Scene
 from planarfriction.tensors.namespace import broadcast, finite, non_negative, positive, shaped
 
 Arrays = Sequence[Any]

@@ -11,7 +11,7 @@ import numpy as np
 from planarfriction.kernels.body import System
 from planarfriction.kernels.integration import Method, Output
 from planarfriction.scenes import Scene
-from planarfriction.scenes.packing import PackedScene, pack
+from planarfriction.scenes.packing import MOST_PIECES, SegmentBatches
 from planarfriction.solvers import RODAS4, Statistics, integrate
 
 LSODA: dict[str, Any] = {"method": "LSODA", "rtol": 1e-6, "atol": 1e-8, "max_step": 1e-3}
@@ -32,6 +32,18 @@ class Poses(NamedTuple):
     """Evaluations of the right-hand side, those for differences in Jacobians included."""
 
 
+class PackedScene(NamedTuple):
+    """A scene as the solvers see it."""
+
+    system: System
+    state: np.ndarray
+    """Bristles as the scene starts, body velocity, pose."""
+    state_scale: np.ndarray
+    """Natural scale of each state (see `SegmentBatches.state_scale`)."""
+    contacts: int
+    """Number of contacts."""
+
+
 @dataclass(frozen=True)
 class Window:
     """A scene between two jumps of its signals, as the solvers see it."""
@@ -42,7 +54,8 @@ class Window:
     @classmethod
     def of(cls, scene: Scene, begin: float, end: float) -> Window:
         """Make the window from `begin` to `end` [s]: 0 or jumps of a signal, or the end of the scene."""
-        packed = pack(scene, end)
+        whole = SegmentBatches(scene, end, most=MOST_PIECES)
+        packed = PackedScene(next(iter(whole)), whole.state, whole.state_scale, len(whole.models))
         breaks = packed.system.motion.breaks
         first = int(np.argmin(np.abs(breaks - begin)))
         assert abs(breaks[first] - begin) < 1e-9, f"no jump at {begin} s"
@@ -117,6 +130,6 @@ def _pieces(packed: PackedScene, kept: slice) -> PackedScene:
 
 
 def _output(packed: PackedScene, times: np.ndarray, *, bristles: bool) -> Output:
-    count, contacts = len(times), len(packed.models)
+    count, contacts = len(times), packed.contacts
     states = (count, len(packed.state) - 6) if bristles else (0, 0)
     return Output(times.copy(), *map(np.empty, ((count, 6), (count, contacts, 3), (count, contacts), states)))

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction.joints import JointLog
-from planarfriction.joints.loops.plant import run_plant
+from planarfriction.joints.loops.runs import run_plant
 from planarfriction.joints.problem import TERMS, Problem
 from planarfriction_studies.measured.joints import PENDULUM, read_logs
 

@@ -11,7 +11,8 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.laws import LuGre
 from planarfriction.models import ReducedModel
-from planarfriction.online.controllers import Hinge, Hold, SlideBy, TurnBy, trapezoid
+from planarfriction.online.controllers import Hinge, Hold, SlideBy, TurnBy
+from planarfriction.online.loops import grips
 from planarfriction.online.observer import FrictionObserver
 from planarfriction.online.sensors import GRAVITY, Measurement
 from planarfriction.patch import ContactPatch, SoftFinger
@@ -98,7 +99,7 @@ class Rule:
         holds = ellipsoid_load(wrench, radius, parts.mu_c) if turns else force / parts.mu_c
         self._holding = self._holding + (holds - self._holding) * DT / 0.05
         place, v = np.abs(self._slid[:, axis]), np.abs(self._velocity[:, axis])
-        wanted, wanted_speed, push = trapezoid(sample.time - 0.2, self.goal, self.duration)
+        wanted, wanted_speed, push = grips.trapezoid.py_func(np, sample.time - 0.2, self.goal, self.duration)
         commanded = rule.commanded(place, wanted, wanted_speed)
         self._total = np.where(sample.time > 0.2, self._total + DT * (commanded - v), 0.0)
         self._there = self._there | (place >= self.goal)

@@ -175,9 +175,10 @@ def _euler(case: Case, counts: Sequence[int], label: str, work: Work) -> dict[st
 def _euler_part(contacts: Sequence[Contact], part: int, state: np.ndarray | None) -> dict[str, np.ndarray]:
     """Return one of `_EULER_PARTS` equal parts: wrenches `[T, contacts, 3]` before each sample, and the state."""
     from planarfriction.kernels.body import right_hand_side
-    from planarfriction.scenes.packing import pack
+    from planarfriction.scenes.packing import MOST_PIECES, SegmentBatches
 
-    packed = pack(scene(contacts), T_END)
+    packed = SegmentBatches(scene(contacts), T_END, most=MOST_PIECES)
+    system = next(iter(packed))
     y = packed.state.copy() if state is None else state.copy()
     rate, bristles = np.empty_like(y), len(y) - 6
     steps = round(T_END / EULER_STEP) // _EULER_PARTS
@@ -186,9 +187,9 @@ def _euler_part(contacts: Sequence[Contact], part: int, state: np.ndarray | None
     samples = []
     for k in range(steps):
         y[bristles : bristles + 3] = twists[k]
-        right_hand_side(packed.system.address, 0, 0.0, y, rate)
+        right_hand_side(system.address, 0, 0.0, y, rate)
         if k % stride == 0:
-            samples.append(packed.system.wrench.copy())
+            samples.append(system.wrench.copy())
             y[:bristles][np.abs(y[:bristles]) < _NOTHING] = 0.0
         y[:bristles] += EULER_STEP * rate[:bristles]
     return {"wrench": np.array(samples), "state": y}
