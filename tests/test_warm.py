@@ -103,6 +103,7 @@ class Terminal(io.StringIO):
         (Terminal, "planarfriction.kernels.steps", 1),
         (io.StringIO, "planarfriction.kernels.steps", 0),
         (Terminal, "mine", 0),
+        (Terminal, None, 0),
     ],
 )
 def test_the_first_function_that_is_compiled_says_so(monkeypatch, stream, module, lines):

@@ -39,6 +39,7 @@ def test_wheel_in_an_empty_environment(tmp_path):
         shutil.copytree(ROOT / folder / "src", source / folder / "src", ignore=ignored)
         for name in ("pyproject.toml", "README.md", "LICENSE"):
             shutil.copy(ROOT / folder / name, source / folder)
+    shutil.copy(ROOT / "build_backend.py", source)
     elsewhere.mkdir()
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "NUMBA"))}
 

@@ -296,8 +296,9 @@ def test_the_ladder_of_the_models_follows_what_is_on_the_screen(visitor):
     assert [row.split("\t")[0].removeprefix("● ") for row in before.splitlines()[1:]] == list(RUNGS)
     after = visitor.ladder_after(lambda: visitor.drag((0.0, 10.0), (3.0, 5.0)), before)
     visitor.choose("law", "coulomb-stribeck")
-    refused = visitor.ladder_after(lambda: None, after)
-    assert "no creep_speed" in refused
+    while float(after.splitlines()[-1].split("\t")[2]) < 2.0:  # error of the published model, 1 % with the law before
+        after = visitor.ladder_after(lambda: None, after)
+    assert [float(row.split("\t")[2]) < 2.0 for row in after.splitlines()[2:]] == [True] * 3 + [False]
     visitor.page.locator(".clear button").click()
     visitor.page.locator("#ladder").wait_for(state="detached")
 

@@ -10,7 +10,7 @@ from planarfriction.derivatives import PARAMETERS
 
 torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
 
-from planarfriction.torch import DistributedModel, ReducedModelPublished  # noqa: E402
+from planarfriction.torch import DistributedModel, ReducedModel, ReducedModelPublished  # noqa: E402
 
 pytestmark = pytest.mark.torch
 
@@ -288,6 +288,17 @@ def test_second_derivatives():
         nudge = 1e-6 * torch.eye(len(x), dtype=torch.float64)
         differences = torch.stack([(gradient(x + n) - gradient(x - n)) / 2e-6 for n in nudge])
         torch.testing.assert_close(hessian, differences, rtol=1e-4, atol=1e-6 * hessian.abs().max().item())
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+@pytest.mark.parametrize("make", [distributed, lambda: ReducedModel(PATCH, ELASTIC, cells=8), reduced])
+def test_steps_compile_in_one_piece(make):
+    model = make()
+    _, twist, load = (tensor(a) for a in samples(10, np.random.default_rng(8)))
+    state = torch.full_like(model.rest(10), 1e-7)
+    compiled = torch.compile(lambda *given: model.step(*given, 1e-4), backend="eager", fullgraph=True)
+    for got, wanted in zip(compiled(state, twist, load), model.step(state, twist, load, 1e-4), strict=True):
+        torch.testing.assert_close(got, wanted, rtol=1e-12, atol=1e-18)
 
 
 @pytest.mark.slow

@@ -26,7 +26,8 @@ class _Said(Listener):
     done = False
 
     def on_start(self, event: Any) -> None:
-        if _Said.done or not event.data["dispatcher"].py_func.__module__.startswith("planarfriction"):
+        module = event.data["dispatcher"].py_func.__module__ or ""  # none of functions that are made from others
+        if _Said.done or not module.startswith("planarfriction"):
             return
         _Said.done = True
         if watched():

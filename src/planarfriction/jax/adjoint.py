@@ -100,7 +100,8 @@ class HostRollout(NamedTuple):
         numbers = numbers if name == "pull" else numbers._replace(memory=())
         inner = self.inner, (1 + self.axes,) * len(numbers.memory), self.inner if name == "push" else self.outer
         good, usable = _usable(self.axes, numbers, inner)
-        good, dt = good & (held[0] <= LARGEST), held[0] if held[0] <= LARGEST else 0.0
+        dt = float(held[0])
+        good, dt = good & (dt <= LARGEST), dt if dt <= LARGEST else 0.0
         found = _called(operation, name, [dt, *held[1:]], usable, kept)
         if name != "pull":
             return [_spoilt(good, value) for value in found]

@@ -13,6 +13,11 @@ def like(a: Any, numbers: Iterable[Any]) -> Any:
     return type(a)(*numbers) if hasattr(a, "_fields") else tuple(numbers)
 
 
+def _plain(original: Any) -> Any:
+    """Return the Python function of a compiled one, anything else as it is."""
+    return getattr(original, "py_func", original)
+
+
 class Rewriting:
     """Map from functions, modules and records of functions to their twins; anything else is its own twin.
 
@@ -23,15 +28,15 @@ class Rewriting:
         self, known: Iterable[tuple[Any, Any]], names: Mapping[str, Any] | None = None,
         finished: Callable[[FunctionType], Any] = lambda twin: twin,
     ) -> None:  # fmt: skip
-        self._twins = {
-            id(original): (twin, original) for original, twin in known
-        }  # an `id` is that of an object that is kept
+        # an `id` is that of an object that is kept
+        self._twins = {id(_plain(original)): (twin, original) for original, twin in known}
         self._names, self._finished = names or {}, finished
         self._begun: dict[int, tuple[Any, Any]] = {}
         self._lock = threading.RLock()
 
     def __call__(self, original: Any) -> Any:
         """Return the twin; other threads see it once the globals of all that it calls are there."""
+        original = _plain(original)
         if id(original) in self._twins:
             return self._twins[id(original)][0]
         with self._lock:
@@ -49,18 +54,19 @@ class Rewriting:
             return _Module(original, self)
         if isinstance(original, tuple):
             return like(original, [self(each) for each in original])
-        function = getattr(original, "py_func", original)
-        if not isinstance(function, FunctionType):
+        if not isinstance(original, FunctionType):
             return original
-        space: dict[str, Any] = {"__builtins__": function.__globals__.get("__builtins__"), **self._names}
-        cells = [CellType() for _ in function.__closure__ or ()]
-        made = FunctionType(function.__code__, space, function.__name__, function.__defaults__, tuple(cells))
+        space: dict[str, Any] = {"__builtins__": original.__globals__.get("__builtins__"), **self._names}
+        cells = [CellType() for _ in original.__closure__ or ()]
+        made = FunctionType(original.__code__, space, original.__name__, original.__defaults__, tuple(cells))
         twin = self._finished(made)
         self._begun[id(original)] = twin, original
-        for name in _global_names(function.__code__):
-            if name in function.__globals__:
-                space[name] = self(function.__globals__[name])
-        for cell, outer in zip(cells, function.__closure__ or (), strict=True):
+        names = _global_names(original.__code__)
+        for name in names & original.__globals__.keys():
+            space[name] = self(original.__globals__[name])
+            if isinstance(space[name], _Module):
+                space[name].look_up(names)
+        for cell, outer in zip(cells, original.__closure__ or (), strict=True):
             cell.cell_contents = self(outer.cell_contents)
         return twin
 
@@ -70,6 +76,12 @@ class _Module:
 
     def __init__(self, original: ModuleType, rewriting: Rewriting) -> None:
         self._module, self._rewriting = original, rewriting
+
+    def look_up(self, names: Iterable[str]) -> None:
+        """Hold what the module has under these names: `torch.compile` reads attributes, but makes no twins."""
+        for name in names:
+            if hasattr(self._module, name):
+                setattr(self, name, self._rewriting(getattr(self._module, name)))
 
     def __getattr__(self, name: str) -> Any:
         return self._rewriting(getattr(self._module, name))

@@ -13,7 +13,7 @@ from planarfriction.kernels import cells, discs, leaning_cells, points, settle
 from planarfriction.kernels.leaning_cells import Leaning
 from planarfriction.models import DistributedModel
 from planarfriction.patch import ContactPatch
-from planarfriction.tensors.elements import Vector, joined, over, split
+from planarfriction.tensors.elements import Vector, joined, split
 
 
 class Kind(NamedTuple):
@@ -76,7 +76,7 @@ def _bristle(xp, name: str, law: Any, shape: Cells, z, u, *dt):
     kind, (_, asymmetry) = KINDS[len(shape.levers)], _numbers(shape)
     vector = Vector if kind.bristles == 2 else split  # the source of discs names components
     law = law if asymmetry is None else Leaning(law, asymmetry)
-    found = over(xp)(getattr(kind, name))(law, vector(z), vector(u), *dt)
+    found = xp.over(getattr(kind, name))(law, vector(z), vector(u), *dt)
     return tuple(joined(xp, each) for each in found)
 
 
@@ -105,14 +105,14 @@ narrow = wide
 
 def drive(xp, law: LawNumbers, shape: Cells, twist) -> tuple[Any]:
     """Return the velocities that the cells see at a twist `[..., d, N]`, as a tuple of this array."""
-    seen = over(xp)(KINDS[len(shape.levers)].lever.seen)
+    seen = xp.over(KINDS[len(shape.levers)].lever.seen)
     return (joined(xp, seen(_numbers(shape)[0], split(twist[..., None]))),)
 
 
 def limited(xp, law: LawNumbers, shape: Cells, z):
     """Return bristles brought back onto their limits (see `kernels.settle`)."""
     seen_from = middle(xp, law, shape)
-    return seen_from + over(xp)(settle.within)(law, Vector(z - seen_from)).array
+    return seen_from + xp.over(settle.within)(law, Vector(z - seen_from)).array
 
 
 def evaluate(xp, law: LawNumbers, shape: Cells, z, by):
@@ -127,5 +127,5 @@ def advance(xp, law: LawNumbers, shape: Cells, z, by, dt):
 
 def wrench(xp, shape: Cells, pull):
     """Return the wrench about the origin per unit load `[..., 3]`."""
-    found = over(xp)(KINDS[len(shape.levers)].lever.wrench)(_numbers(shape)[0], split(shape.weights * pull))
+    found = xp.over(KINDS[len(shape.levers)].lever.wrench)(_numbers(shape)[0], split(shape.weights * pull))
     return xp.concatenate([each.sum(-1) for each in found], -1)

@@ -46,19 +46,23 @@ def joined(xp: Any, vector: Any) -> Any:
     return vector.array if isinstance(vector, Vector) else xp.concatenate(xp.broadcast_arrays(*vector), -2)
 
 
-class Placed(int):
+class Placed:
     """Size of a table, with places in it that are known: cells about which numbers were read count as the first."""
 
-    cell: tuple[Any, Any]
-    place: tuple[Any, ...]
+    def __init__(self, size: int, place: tuple[Any, ...]) -> None:
+        self.size, self.cell, self.place = size, place[:2], (0, 0, *place[2:])
 
-    def __new__(cls, size: int, place: tuple[Any, ...]) -> Placed:
-        made = super().__new__(cls, size)
-        made.cell, made.place = place[:2], (0, 0, *place[2:])
-        return made
+    def __add__(self, other: Any) -> Any:
+        return self.size + other
+
+    def __rmul__(self, other: Any) -> Any:
+        return other * self.size
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return other / self.size
 
 
-def _place(xp: Any, size: int, x: Any, y: Any, s: Any) -> tuple[Any, ...]:
+def _place(xp: Any, size: Any, x: Any, y: Any, s: Any) -> tuple[Any, ...]:
     """Return `surfaces.place`; on the spin axis the azimuth is 0."""
     if isinstance(size, Placed):
         return size.place

@@ -14,6 +14,7 @@ from typing import Any
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
+from planarfriction.tensors.elements import over
 
 _SAME = (
     *("exp", "sin", "cos", "sqrt", "log", "pow", "arctan2", "clip", "finfo", "ones_like", "full_like"),
@@ -44,6 +45,10 @@ class Namespace:
 
     def __getattr__(self, name: str) -> Any:
         raise AttributeError(f"the array namespace has no {name}")
+
+    def over(self, function: Any) -> Any:
+        """Return a function of numbers and tuples as one of arrays."""
+        return over(self)(function)
 
     def where(self, condition: Any, a: Any, b: Any) -> Any:
         """Return `a` where the condition holds, else `b`; a plain bool selects one of them as it is."""

@@ -12,12 +12,11 @@ from typing import Any, NamedTuple
 from planarfriction.kernels import tilt
 from planarfriction.kernels.tilt import FARTHEST, NARROW, SOFTNESS
 from planarfriction.tensors.distributed import Cells, positions_of
-from planarfriction.tensors.elements import over
 
 
 def centre_of(xp: Any, moments: Any, load: Any) -> Any:
     """Return the centre of pressure `(-m_y, m_x)/f_N` `[..., 2]` [m]; 0 without load."""
-    return xp.stack(over(xp)(tilt.centre)(moments[..., 0], moments[..., 1], xp.where(load > 0.0, load, math.inf)), -1)
+    return xp.stack(xp.over(tilt.centre)(moments[..., 0], moments[..., 1], xp.where(load > 0.0, load, math.inf)), -1)
 
 
 def twist_at(xp: Any, twist: Any, offset: Any) -> Any:

@@ -19,7 +19,7 @@ from planarfriction.limit_surface import LimitSurface
 from planarfriction.models.reduced_published import PublishedShape
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import surfaces
-from planarfriction.tensors.elements import Vector, joined, over, split
+from planarfriction.tensors.elements import Vector, joined, split
 
 
 class PublishedNumbers(NamedTuple):
@@ -93,7 +93,7 @@ def narrow(z):
 
 def _mapped(xp, function, own: PublishedNumbers, vector):
     """Return a function of a contact and a vector, at a vector `[..., 3, 1]`."""
-    return joined(xp, over(xp)(function)(own, split(vector)))
+    return joined(xp, xp.over(function)(own, split(vector)))
 
 
 def raw(xp, own: PublishedNumbers, z):
@@ -113,21 +113,21 @@ def drive(xp, law: LawNumbers, own: PublishedNumbers, twist) -> Drive:
     )
     speed = xp.norm(twist, -2)
     u = wide(own.surface(narrow(twist), narrow(speed)))
-    per_h = over(xp)(published_contact.per_h)(Vector(u), speed)
-    return Drive(u, speed, per_h, over(xp)(grip)(law, speed), viscous)
+    per_h = xp.over(published_contact.per_h)(Vector(u), speed)
+    return Drive(u, speed, per_h, xp.over(grip)(law, speed), viscous)
 
 
 def evaluate(xp, law: LawNumbers, own: PublishedNumbers, z, by: Drive):
     """Return the rate of the bristle, and its pull (see `wrench`)."""
     z = scaled(xp, own, z)
-    rate = by.velocity - over(xp)(published_contact.decay_of)(law, Vector(z), Vector(by.velocity), *by[1:4]) * z
+    rate = by.velocity - xp.over(published_contact.decay_of)(law, Vector(z), Vector(by.velocity), *by[1:4]) * z
     return raw(xp, own, rate), formulas.traction(z, rate, by.viscous, law)
 
 
 def advance(xp, law: LawNumbers, own: PublishedNumbers, z, by: Drive, dt):
     """Return the bristle after `dt` of a constant twist, and its pull (see `wrench`)."""
     z = scaled(xp, own, z)
-    new, k = over(xp)(bristle_step.step)(law, Vector(z), Vector(by.velocity), *by[1:4], dt)
+    new, k = xp.over(bristle_step.step)(law, Vector(z), Vector(by.velocity), *by[1:4], dt)
     new = new.array
     return raw(xp, own, new), formulas.traction(new, by.velocity - k * new, by.viscous, law)
 

@@ -14,7 +14,7 @@ from planarfriction.kernels import settle
 from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import refuse_creep, refuse_rate_law
 from planarfriction.patch import ContactPatch
-from planarfriction.tensors.elements import Vector, over
+from planarfriction.tensors.elements import Vector
 from planarfriction.tensors.namespace import Namespace, broadcast, finite, non_negative, shaped
 from planarfriction.tensors.pressure import Pressed, centre_of, follow
 
@@ -41,10 +41,10 @@ def evaluate(xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, 
     if reference is None:
         rate, pull = equations.evaluate(xp, law, shape, z, by)
     else:
-        z = over(xp)(settle.factor_at)(reference, inner(load)) * z
+        z = xp.over(settle.factor_at)(reference, inner(load)) * z
         rate, pull = equations.evaluate(xp, law, shape, z, by)
         out = z - equations.middle(xp, law, shape)
-        back = over(xp)(settle.recovery)(law, Vector(out), xp.norm(by[0], -2)) * out
+        back = xp.over(settle.recovery)(law, Vector(out), xp.norm(by[0], -2)) * out
         rate, pull = rate - back, pull + law.sigma_1 * back
     return equations.narrow(rate), load[..., None] * equations.wrench(xp, shape, pull)
 
@@ -67,7 +67,7 @@ def advance(xp: Any, equations: Any, contact: Contact, z: Any, by: Any, load: An
     if reference is None:
         new, pull = equations.advance(xp, law, shape, z, by, dt)
     else:
-        factor = over(xp)(settle.factor_at)(reference, xp.where(loaded, inner(load), reference))
+        factor = xp.over(settle.factor_at)(reference, xp.where(loaded, inner(load), reference))
         z = equations.limited(xp, law, shape, factor * z)
         new, pull = equations.advance(xp, law, shape, z, by, factor * dt)
         new = new / factor

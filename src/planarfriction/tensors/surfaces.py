@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 from planarfriction.kernels import surfaces as kernel
-from planarfriction.tensors.elements import Placed, over
+from planarfriction.tensors.elements import Placed
 
 _ROUNDING = 2.0**-52
 """Rounding error of the numbers that `_AT_REST` is made for."""
@@ -51,8 +51,8 @@ def _table(xp, kind: int, size: int, data, scaled):
     here = xp.stop_gradient(scaled)
     near, moved = _off_axis(xp, size, here)
     length, *heading = _upper(xp, xp.stack([scaled + xp.where(near, moved - here, 0.0), here], 0))
-    lookup = over(xp)(kernel._bilinear if kind == kernel.BILINEAR else kernel._potential)
-    at = Placed(size, over(xp)(kernel.place)(size, *heading))
+    lookup = xp.over(kernel._bilinear if kind == kernel.BILINEAR else kernel._potential)
+    at = Placed(size, xp.over(kernel.place)(size, *heading))
     u = length * xp.stack(lookup(_Corners(xp, at, data), 0, at, *heading, 1.0), -1)
     return u[0] + xp.where(near, xp.stop_gradient(u[1] - u[0]), 0.0)
 
@@ -83,7 +83,7 @@ def _upper(xp, scaled):
 def _off_axis(xp, size: int, scaled):
     """Return True for twists nearer to the spin axis than `_AXIS` [rad], `[..., 1]`, and all twists moved off it."""
     length, x, y, s = _upper(xp, scaled)
-    *_, polar, azimuth = over(xp)(kernel.place)(size, x, y, s)
+    *_, polar, azimuth = xp.over(kernel.place)(size, x, y, s)
     across = math.sin(_MOVED)
     moved = [across * xp.cos(azimuth), across * xp.sin(azimuth), math.cos(_MOVED) * xp.ones_like(s)]
     return (polar < kernel._AXIS)[..., None], length * xp.stack(moved, -1)

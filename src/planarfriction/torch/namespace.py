@@ -11,6 +11,7 @@ from torch import Tensor
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.tensors.elements import over
 from planarfriction.tensors.namespace import Namespace
 
 
@@ -78,8 +79,25 @@ def _narrowed(result: Tensor, *inputs: Tensor) -> Tensor:
     return result.to(functools.reduce(torch.promote_types, (each.dtype for each in inputs)))
 
 
+class _Twins:
+    """Functions over tensors by the names that `_name_of` gives them: `torch.compile` calls what it finds in a place."""
+
+
+@torch.compiler.assume_constant_result
+def _name_of(function: Any) -> str:
+    """Return the name of a function among the twins; it is made if it is not there."""
+    name = f"of_{id(function)}"
+    setattr(_Twins, name, staticmethod(over(xp)(function)))
+    return name
+
+
+def _over(function: Any) -> Any:
+    return getattr(_Twins, _name_of(getattr(function, "py_func", function)))
+
+
 xp = Namespace(
     torch,
+    over=_over,
     broadcast_arrays=torch.broadcast_tensors,
     stop_gradient=torch.detach,
     integers=lambda x: x.long(),
