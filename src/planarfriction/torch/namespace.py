@@ -80,7 +80,7 @@ def _narrowed(result: Tensor, *inputs: Tensor) -> Tensor:
 
 
 class _Twins:
-    """Functions over tensors by the names that `_name_of` gives them: `torch.compile` calls what it finds in a place."""
+    """Functions over tensors by the names of `_name_of`: `torch.compile` calls what it finds in a place."""
 
 
 @torch.compiler.assume_constant_result
