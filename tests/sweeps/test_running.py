@@ -593,3 +593,10 @@ def test_models_are_built_once_for_equal_scenes():
 )
 def test_what_is_left_is_said_in_the_unit_that_one_would_use(seconds, words):
     assert str(sweeps.Progress(10, 4, 1, 0, 0, seconds)) == f"4 of 10 runs (1 found), {words} left"
+
+
+def test_the_first_failure_is_that_of_the_grid_whatever_ends_first():
+    book = bookkeeping.Bookkeeper(grid_of({"load": [1.0, 2.0]}), False)
+    for i in (1, 0):
+        book.add((i,), "", records.Record(records.FAILED, f"reason {i}", {}), None)
+    assert book.first_failure() == "load=1.0: reason 0"

@@ -54,7 +54,6 @@ class Bookkeeper:
         self.runs: dict[Index, tuple[str, Record]] = {}
         """Keys and records of the runs that have been done."""
         self.found = self.new = self.failed = self.damaged = 0
-        self.first_failure = ""
         self._ends: set[tuple[float, float]] = set()
         self._folder = None if path is None else make_folder(path)
         self._begin = self._written = monotonic()
@@ -97,8 +96,12 @@ class Bookkeeper:
         self.new += 1
         if record.status == FAILED:
             self.failed += 1
-            self.first_failure = self.first_failure or f"{self.grid.words(index)}: {record.reason}"
         self.runs[index] = key, record
+
+    def first_failure(self) -> str:
+        """Return the values and the reason of the first run of the grid that failed, in whatever order they ended."""
+        index = min(index for index, (_, record) in self.runs.items() if record.status == FAILED)
+        return f"{self.grid.words(index)}: {self.runs[index][1].reason}"
 
     def flush(self, at_once: bool = False) -> None:
         """Write the open records as one file, whole or not at all, so seldom that a long sweep has few files."""

@@ -146,7 +146,7 @@ def sweep(
     except KeyboardInterrupt:
         raise SweepInterrupted(str(sweeping.progress()), book.dataset()) from None
     if book.failed == sweeping.grid.size:  # the mistake is in what all runs share
-        raise SweepError(f"all {book.failed} runs failed; the first: {book.first_failure}")
+        raise SweepError(f"all {book.failed} runs failed; the first: {book.first_failure()}")
     return book.dataset()
 
 
