@@ -21,6 +21,7 @@ from planarfriction.adapters import mujoco as adapter  # noqa: E402
 from planarfriction.adapters.mjx import Friction, PatchContact, newton, prepare  # noqa: E402
 from planarfriction.adapters.mjx.friction import _in_jax  # noqa: E402
 from planarfriction.coupling import CoupledPatches  # noqa: E402
+from planarfriction.models.base import lever_of  # noqa: E402
 from planarfriction_studies.bench import coulomb_disc  # noqa: E402
 from planarfriction_studies.bench.mujoco_scenes import STARTS, Native, disc, grip  # noqa: E402
 from tests.support.coupling_problems import random_bodies, random_patches, random_run  # noqa: E402
@@ -141,6 +142,7 @@ def test_environments_do_what_mujoco_does(discs):
         # both solve to 1e-9 m/s a step, and what is left of that adds up over 600 steps of 2 ms
         np.testing.assert_allclose(discs.path[i, 0], d.qpos, atol=600 * DT * 1e-9 + 1e-9)
     ours, theirs = discs.friction, friction
+    np.testing.assert_array_equal(ours._fixed.places.radius, [lever_of(each.model) for each in discs.patches])
     end = jax.tree.map(lambda each: each[0], discs.end)
     np.testing.assert_allclose(ours.loads(end), theirs.loads(d), rtol=1e-9)
     np.testing.assert_allclose(ours.wrenches(end), theirs.wrenches(d), atol=1e-6)

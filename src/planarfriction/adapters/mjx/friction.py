@@ -33,6 +33,7 @@ from planarfriction.formulas import LIGHTEST
 from planarfriction.jax import DistributedModel, ReducedModelPublished
 from planarfriction.jax.base import FrictionPytree
 from planarfriction.jax.namespace import xp
+from planarfriction.models.base import lever_of
 from planarfriction.tensors.pressure import twist_at, wrench_from
 from planarfriction.tensors.steps import LAW
 
@@ -114,7 +115,7 @@ class Friction:
         self.models: tuple[FrictionPytree, ...] = tuple(map(_in_jax, known))
         at = memory(patches, m.nv, m.nuserdata)
         which = tuple(next(i for i, model in enumerate(known) if model is patch.model) for patch in patches)
-        radius = np.array([np.sqrt((patch.model.patch.positions**2).sum(1).mean()) for patch in patches])
+        radius = np.array([lever_of(patch.model) for patch in patches])
         shapes = tuple(self.models[i].state_shape for i in which)
         follows = tuple(each.follows for each in placed)
         numbers = {name: view.copy() for name, view in parameters_in(m, place_of_parameters(m), len(patches)).items()}
