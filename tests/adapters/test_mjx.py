@@ -142,11 +142,17 @@ def test_environments_do_what_mujoco_does(discs):
         # both solve to 1e-9 m/s a step, and what is left of that adds up over 600 steps of 2 ms
         np.testing.assert_allclose(discs.path[i, 0], d.qpos, atol=600 * DT * 1e-9 + 1e-9)
     ours, theirs = discs.friction, friction
-    np.testing.assert_array_equal(ours._fixed.places.radius, [lever_of(each.model) for each in discs.patches])
     end = jax.tree.map(lambda each: each[0], discs.end)
     np.testing.assert_allclose(ours.loads(end), theirs.loads(d), rtol=1e-9)
     np.testing.assert_allclose(ours.wrenches(end), theirs.wrenches(d), atol=1e-6)
     assert bool(ours.report(end).converged) and float(ours.report(end).passes) == 1.0
+
+
+def test_the_lever_arm_of_a_patch_counts_the_radii_of_its_discs():
+    model = pf.ReducedModel(pf.ContactPatch.disc(0.05, 9), pf.LuGre(mu_s=1.2), cells=8)
+    m, _, patches = made(disc(*STARTS[0]), model)
+    assert model.patch.radii.all()
+    np.testing.assert_array_equal(Friction(m, patches)._fixed.places.radius, [lever_of(model)])
 
 
 def test_a_stiffness_that_ignores_the_load_does_what_it_does_in_mujoco():
