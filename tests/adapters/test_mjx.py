@@ -149,7 +149,7 @@ def test_environments_do_what_mujoco_does(discs):
 
 
 def test_the_lever_arm_of_a_patch_counts_the_radii_of_its_discs():
-    model = pf.ReducedModel(pf.ContactPatch.disc(0.05, 9), pf.LuGre(mu_s=1.2), cells=8)
+    model = pf.DistributedModel(pf.ContactPatch.disc(0.05, 9).discs(), pf.LuGre(mu_s=1.2))
     m, _, patches = made(disc(*STARTS[0]), model)
     assert model.patch.radii.all()
     np.testing.assert_array_equal(Friction(m, patches)._fixed.places.radius, [lever_of(model)])
