@@ -163,6 +163,7 @@ class _Adjoint:
         level = np.abs(np.append(of_motion * scale[-6:], of_forces)).max(initial=0.0) or 1.0
         self._atol = self._accuracy * level / scale
         self._space, self._known = workspace_for(1, self._inputs.inputs, n), 0.0
+        self._space.record.most[:] = level / self._inputs.input_scale
         self._next = len(self._time) - 1
         """Number of the instant whose cotangents come next."""
 

@@ -119,6 +119,8 @@ class SceneInputs:
         self.inputs = len(inputs)
         """Number of different inputs behind the numbers."""
         self._scale = np.ones(len(numbers))
+        self.input_scale = np.ones(len(inputs))
+        """Scale of each input, which all of its numbers share."""
         self._system: System | None = None
         self._hats: list[tuple[np.ndarray, np.ndarray]] = []
         """Pieces of the signals' changes between the breaks of the system."""
@@ -146,6 +148,7 @@ class SceneInputs:
             elif kind == tangent.INITIAL:
                 self._scale[p] = max(start[place], smallest[place])
                 slopes[p, place - 6] = self._scale[p]
+        self.input_scale[self._drives.input] = self._scale
         if scene.start != "rest" and len(slopes):
             slopes[:, :-6] = self._bristles_at_start(batches)
         return slopes
