@@ -36,6 +36,13 @@ NUMBERS = 4e6
 LEAST_NODES, MOST_NODES = 16, 4096
 """Least number of ends of steps that a part of the path holds, and most where all parts stay in memory."""
 
+ALLOWANCE, PER_JUMP = 20_000, 100
+"""Steps of the adjoint that a gradient may take besides `adjoint.PER_STEP` for each of the motion: about half a second,
+and after each instant that its cost sees."""
+
+TOO_SLOW = "the gradient takes many more steps than the motion: raise rtol, or use scene_sensitivities"
+"""Message of a gradient that would cost far more than its motion."""
+
 MOST_KEPT = 250_000_000
 """Largest number of numbers of the states along a path that stays in memory, with as many of their rates: 4 GB."""
 
@@ -164,6 +171,7 @@ class _Adjoint:
         self._atol = self._accuracy * level / scale
         self._space, self._known = workspace_for(1, self._inputs.inputs, n), 0.0
         self._space.record.most[:] = level / self._inputs.input_scale
+        self._space.record.left[:] = ALLOWANCE
         self._next = len(self._time) - 1
         """Number of the instant whose cotangents come next."""
 
@@ -208,6 +216,7 @@ class _Adjoint:
             at = system.address, int(path.piece[first]), instant, wrenches
             adjoint.jump(*at, self._state, drives, self._moments, self._space.address)
         self._state[-6:] += self._bars[self._next]
+        self._space.record.left[:] += PER_JUMP
 
     def _propagate(self, system: System, path: Path, first: int, last: int, drives: Drives, *span: float) -> None:
         since, until = span
@@ -216,3 +225,5 @@ class _Adjoint:
             numbers = self._state, drives, self._moments, self._known, tolerances, self._space.address
             adjoint.propagate_back(system.address, path, stretch, *numbers)
             self._known = 1.0
+            if self._space.record.left[0] <= 0.0:
+                raise SolverError(TOO_SLOW)

@@ -39,6 +39,7 @@ from planarfriction.kernels.sdirk import (
     ERROR,
     GAMMA,
     PLACES,
+    PLAIN,
     STAGES,
     START,
     Variation,
@@ -49,11 +50,16 @@ from planarfriction.kernels.sdirk import (
     read_workspace,
     stage_base,
     variation_of,
+    write_errors,
 )
 from planarfriction.kernels.small_matrices import applied
 from planarfriction.kernels.step_control import fitted, judged
 from planarfriction.kernels.tangent import MOST, Drives, partial_of, wrench_by_input
 from planarfriction.kernels.vectors import Vector, applied_back, dot, plus, put, three, times
+
+
+PER_STEP = 2.0
+"""Most steps of the adjoint for each step of the motion, on average; half of one is usual."""
 
 
 @kernel
@@ -151,6 +157,25 @@ def _step(
 
 
 @kernel
+def _error_of_step(
+    system: SystemRecord, piece: int, since: float, h: float, n: int, d: Variation, known: float,
+    tolerances: Tolerances, w: Workspace,
+) -> float:  # fmt: skip
+    """Return the error of a step that ended at `since`, where the matrix is of, per tolerance (see `sdirk.PLAIN`)."""
+    shift, rtol, atol = 1.0 / (h * GAMMA), tolerances.rtol, pointer(tolerances.atol)
+    write_errors(n, d, known)
+    error = error_of(system, n, d, h, rtol, atol)
+    if error > PLAIN:
+        for i in range(2):
+            estimate = at(d.stages, i * n)
+            for m in range(n):
+                w.right[m] = shift * estimate[m]
+            _solve(system, piece, since, shift, w.right, w, estimate)
+        error = error_of(system, n, d, h, rtol, atol)
+    return error
+
+
+@kernel
 def _weight(i: int) -> float:
     """Return the weight of stage i in the solution."""
     return STAGES[4, i] if i < 4 else GAMMA
@@ -194,20 +219,22 @@ def propagate_back(
 ) -> int:  # fmt: skip
     """Carry `adjoint` [n] back along a stretch of a path, and add to the `moments` [U, 2] of the inputs.
 
-    `known` is 0 where the adjoint has just jumped. Returns the number of steps.
+    `known` is 0 where the adjoint has just jumped. Returns the number of steps, of which the workspace says how many are
+    left; where they end, it stops. Each step of the motion that is passed over allows `PER_STEP` more.
     """
     system, w, n, first = read(address), read_workspace(workspace), adjoint.shape[0], stretch.first
-    until, rtol, atol = stretch.until, tolerances.rtol, pointer(tolerances.atol)
-    d, taken, k, since = variation_of(w, pointer(adjoint), 0, 0, n), 0, stretch.last - 1, stretch.begin
-    while since > until:
-        k = node_before(path, k, first, since)
+    d, taken, since, until = variation_of(w, pointer(adjoint), 0, 0, n), 0, stretch.begin, stretch.until
+    k = node_before(path, stretch.last - 1, first, since)
+    while since > until and w.left[0] > 0.0:
+        before, k = k, node_before(path, k, first, since)
+        w.left[0] += PER_STEP * (before - k) - 1.0
         local, remaining = path.since[k + 1] - path.since[k], since - until
         reach = since - path.since[xp.maximum(k + 1 - MOST, first)]
         h = fitted(xp.minimum(w.pace[0] * local, reach), remaining)
         _step(address, path, k, first, since, h, d, drives, w)
         taken += 1
-        of_gains = _error_of_gains(moments.shape[0], h, known, rtol, w)
-        error = xp.maximum(error_of(system, n, d, h, known, rtol, atol), of_gains)
+        of_gains = _error_of_gains(moments.shape[0], h, known, tolerances.rtol, w)
+        error = xp.maximum(_error_of_step(system, path.piece[k], since - h, h, n, d, known, tolerances, w), of_gains)
         accepted, w.pace[0] = judged(w.pace[0], error, h, local)
         if accepted:
             _gain(since, h, moments, w)

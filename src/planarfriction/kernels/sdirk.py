@@ -35,6 +35,11 @@ START, AGAIN = 0.125, np.array([-11.0 / 32.0, -11.0 / 64.0, 25.0 / 64.0, 0.0, 0.
 """Another difference of order 3, `START h s'` at the start of the step and `AGAIN` in `h G_i`: a Jacobian that jumps
 before the first stage would go unseen without it."""
 
+PLAIN = 0.3
+"""Error of a step, in units of the tolerance, above which its estimates are damped by `(I - h gamma J)^-1`: this damps
+what the method itself damps, so that a stiff bristle that follows the body costs no small steps (Hairer and Wanner,
+section IV.8). Below it the next step is longer anyway."""
+
 OTHERS = 0.05
 """Share of the largest derivative of its kind so far: none need be known better than to that. The derivative of a knot
 whose say has just begun is small, and follows swings of a contact that matter to nobody."""
@@ -71,6 +76,8 @@ class Workspace(NamedTuple):
     """Zeros, [n]."""
     pace: Doubles
     """Length of the next step, in steps of the motion, [1]."""
+    left: Doubles
+    """Number of steps that may still be taken, [1]."""
 
 
 read_workspace = reader(Workspace)
@@ -80,7 +87,7 @@ def workspace_for(count: int, inputs: int, n: int) -> Packed:
     """Return a workspace for `count` derivatives of n states (made outside compiled code, which it would slow down)."""
     shapes = dict.fromkeys(Workspace._fields, n) | dict.fromkeys(("level", "forcing"), (max(inputs, 1), n))
     shapes |= {"stages": (count, len(PLACES), n), "new": (count, n), "before": (count, n)}
-    shapes |= {"gain": (len(PLACES), inputs), "gain_before": inputs, "most": inputs, "pace": 1}
+    shapes |= {"gain": (len(PLACES), inputs), "gain_before": inputs, "most": inputs, "pace": 1, "left": 1}
     return Packed(Layout(Workspace, **shapes).made(pace=np.ones(1)))
 
 
@@ -141,11 +148,22 @@ def accept(n: int, d: Variation) -> None:
 
 
 @kernel
-def error_of(system: SystemRecord, n: int, d: Variation, h: float, known: float, rtol: float, atol: Doubles) -> float:
-    """Return the larger of two error estimates of a step of a derivative, per tolerance.
+def write_errors(n: int, d: Variation, known: float) -> None:
+    """Write two error estimates of a step, per second, into the first two rows of `d.stages`.
 
     The second counts only if it is `known` (1 or 0) how fast the derivative changes at the start, `d.before`.
     """
+    k = d.stages
+    for m in range(n):
+        one = ERROR[0] * k[m] + ERROR[1] * k[n + m] + ERROR[2] * k[2 * n + m] + ERROR[4] * k[4 * n + m]
+        other = START * d.before[m] + AGAIN[0] * k[m] + AGAIN[1] * k[n + m] + AGAIN[2] * k[2 * n + m]
+        k[m] = one
+        k[n + m] = known * other
+
+
+@kernel
+def error_of(system: SystemRecord, n: int, d: Variation, h: float, rtol: float, atol: Doubles) -> float:
+    """Return the larger of the error estimates in the first two rows of `d.stages`, per tolerance."""
     k, state, largest = d.stages, system.contacts.state, 0.0
     for c in range(system.size + 6):
         first, last, mean = system.bristles + c - system.size, system.bristles + c - system.size + 1, 1.0
@@ -156,11 +174,9 @@ def error_of(system: SystemRecord, n: int, d: Variation, h: float, known: float,
         for m in range(first, last):
             size = xp.maximum(xp.maximum(abs(d.value[m]), abs(d.new[m])), OTHERS * d.level[m])
             per = h / (atol[m] + rtol * size)
-            e = ERROR[0] * k[m] + ERROR[1] * k[n + m] + ERROR[2] * k[2 * n + m] + ERROR[4] * k[4 * n + m]
-            a = START * d.before[m] + AGAIN[0] * k[m] + AGAIN[1] * k[n + m] + AGAIN[2] * k[2 * n + m]
-            one += (e * per) * (e * per)
-            other += (a * per) * (a * per)
+            one += (k[m] * per) * (k[m] * per)
+            other += (k[n + m] * per) * (k[n + m] * per)
         if not xp.is_finite(one + other):
             return math.inf
-        largest = xp.maximum(largest, mean * xp.maximum(one, known * other))
+        largest = xp.maximum(largest, mean * xp.maximum(one, other))
     return math.sqrt(largest)

@@ -42,6 +42,8 @@ from planarfriction.kernels.rosenbrock import forget_unloaded
 from planarfriction.kernels.sdirk import (
     GAMMA,
     PLACES,
+    PLAIN,
+    Variation,
     Workspace,
     accept,
     error_of,
@@ -49,6 +51,7 @@ from planarfriction.kernels.sdirk import (
     read_workspace,
     stage_base,
     variation_of,
+    write_errors,
 )
 from planarfriction.kernels.small_matrices import applied
 from planarfriction.kernels.step_control import fitted, judged
@@ -202,6 +205,25 @@ def _step(
             keep_stage(i, shift, n, d, w.base)
 
 
+@kernel
+def _error_of_step(
+    address: Place, piece: int, since: float, h: float, n: int, d: Variation, known: float, tolerances: Tolerances,
+    w: Workspace,
+) -> float:  # fmt: skip
+    """Return the error of a step that ended at `since`, where the matrix is of, per tolerance (see `sdirk.PLAIN`)."""
+    system, shift, rtol, atol = read(address), 1.0 / (h * GAMMA), tolerances.rtol, pointer(tolerances.atol)
+    write_errors(n, d, known)
+    error = error_of(system, n, d, h, rtol, atol)
+    if error > PLAIN:
+        for i in range(2):
+            estimate = at(d.stages, i * n)
+            for m in range(n):
+                w.right[m] = shift * estimate[m]
+            call(system.solve, (address, piece, since, w.state, shift, w.right, estimate))
+        error = error_of(system, n, d, h, rtol, atol)
+    return error
+
+
 @jit
 def propagate(
     address: Place, path: Path, stretch: Stretch, slope: np.ndarray, drives: Drives, tolerances: Tolerances,
@@ -211,8 +233,8 @@ def propagate(
 
     Each step keeps its error below the tolerances, unless it is one of the shortest.
     """
-    system, w, n, slope = read(address), read_workspace(workspace), slope.shape[1], pointer(slope)
-    last, until, rtol, atol = stretch.last, stretch.until, tolerances.rtol, pointer(tolerances.atol)
+    w, n, slope = read_workspace(workspace), slope.shape[1], pointer(slope)
+    last, until = stretch.last, stretch.until
     taken, k, since = 0, stretch.first, stretch.begin
     while since < until:
         k = node_after(path, k, last, since)
@@ -224,7 +246,7 @@ def propagate(
         error, known = 0.0, 1.0 if since > 0.0 else 0.0
         for p in range(drives.kind.shape[0]):
             d = variation_of(w, slope, p, drives.input[p], n)
-            error = xp.maximum(error, error_of(system, n, d, h, known, rtol, atol))
+            error = xp.maximum(error, _error_of_step(address, path.piece[k], since + h, h, n, d, known, tolerances, w))
         accepted, w.pace[0] = judged(w.pace[0], error, h, local)
         if accepted:
             since = until if h == remaining else since + h
