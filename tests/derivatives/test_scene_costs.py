@@ -105,7 +105,7 @@ class Measured(NamedTuple):
     forwards: float
     """Error against the product with the derivatives forwards, in shares of the sum of sizes of its terms.
 
-    Sums below 1e-3 count as that: costs are about 1.
+    Sums below a thousandth of the sum for the cost itself count as that.
     """
     differences: float
     """Error of the change of the cost in a random direction against a central difference, in the same shares."""
@@ -130,13 +130,14 @@ def measured(seed: int, steps: Callable[[], int]) -> Measured:
     size = np.einsum("mi,mip->p", np.abs(motion), np.abs(forwards.d_motion))
     size += np.einsum("mci,mcip->p", np.abs(wrenches), np.abs(forwards.d_wrenches))
     missed = np.abs(reverse.gradient - expected)
-    error = max(missed[here].max() / (size[here].max() + 1e-3) for here in reverse.columns.values())
+    least = 1e-3 * (np.abs(motion * forwards.motion).sum() + np.abs(wrenches * forwards.wrenches).sum())
+    error = max(missed[here].max() / max(size[here].max(), least) for here in reverse.columns.values())
 
     function, values, way = in_a_direction(made)
     h = 1e-5
     moved = [function.run((values + sign * h * way)[None]) for sign in (1.0, -1.0)]
     last, first = (float((motion * m[0]).sum() + (wrenches * w[0]).sum()) for m, w in moved)
-    difference = abs((last - first) / (2.0 * h) - reverse.gradient @ way) / (size @ np.abs(way) + 1e-3)
+    difference = abs((last - first) / (2.0 * h) - reverse.gradient @ way) / max(size @ np.abs(way), least)
     return Measured(made.told, seen, run, taken, clock, error, float(difference))
 
 

@@ -151,7 +151,8 @@ def scene_gradient(
     backwards over the accepted steps, jumps by these cotangents at each instant, and accumulates `int l' df/dp dt`. It
     takes as long as one derivative, whatever the number of knots.
 
-    Raises `InvalidValueError` as `scene_sensitivities` does, and `SolverError` if the solver fails.
+    Raises `InvalidValueError` as `scene_sensitivities` does, and `SolverError` if the solver fails, or if the adjoint
+    needs many more steps than the motion.
     """
     functions = {"cotangent": cotangent, "wrench_cotangent": wrench_cotangent}
     for name, function in functions.items():
