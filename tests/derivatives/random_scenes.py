@@ -90,13 +90,14 @@ def _blows(rng: np.random.Generator, load: float, t_end: float) -> pf.Signal:
 def example(seed: int) -> Example:
     """Return the random scene of a seed."""
     rng = np.random.default_rng(seed)
-    kind, model_kind, cost = KINDS[seed % 5], MODELS[seed // 5 % 4], str(rng.choice(["end", "track", "speed", "wrench"]))
+    kind, model_kind = KINDS[seed % 5], MODELS[seed // 5 % 4]
+    cost = str(rng.choice(["end", "track", "speed", "wrench"]))
     mass, size, t_end = _spread(rng, 0.01, 10.0), _spread(rng, 5e-3, 5e-2), rng.uniform(0.1, 1.0)
     load: Any = 9.81 * mass
     model = _model(rng, model_kind, size, load)
     grip = model.law.mu_c * load
     times = np.linspace(0.0, t_end, int(rng.integers(5, 102)))
-    push = np.stack([_wave(rng, times, 1.2 * grip), _wave(rng, times, 0.5 * grip), _wave(rng, times, 0.3 * grip * size)], 1)
+    push = np.stack([_wave(rng, times, share * grip) for share in (1.2, 0.5, 0.3 * size)], axis=1)
     options: dict[str, Any] = {"force": pf.Signal(times, push, str(rng.choice(["linear", "linear", "previous"])))}
     body: dict[str, Any] = {"gravity": (0.0, 0.0)}
     thrown = (rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-20, 20))

@@ -19,7 +19,7 @@ from tests.derivatives.test_scene import MOTION
 
 LOAD, MASS = 2.94, 0.3
 STEP = 3.0
-"""Price of a step of the adjoint in trials of the motion, of which it has five stages for six: 1.5 to 3 were measured."""
+"""Price of a step of the adjoint in trials of the motion, which have six stages for five: 1.5 to 3 were measured."""
 
 
 def last_x(time: np.ndarray, motion: np.ndarray) -> np.ndarray:

@@ -36,9 +36,11 @@ NUMBERS = 4e6
 LEAST_NODES, MOST_NODES = 16, 4096
 """Least number of ends of steps that a part of the path holds, and most where all parts stay in memory."""
 
-ALLOWANCE, PER_JUMP = 20_000, 100
-"""Steps of the adjoint that a gradient may take besides `adjoint.PER_STEP` for each of the motion: about half a second,
-and after each instant that its cost sees."""
+ALLOWANCE = 20_000
+"""Steps of the adjoint that a gradient may take besides `adjoint.PER_STEP` for each of the motion: half a second."""
+
+PER_JUMP = 100
+"""Steps that it may take besides for each instant that its cost sees: 60 follow a jump of the adjoint."""
 
 TOO_SLOW = "the gradient takes many more steps than the motion: raise rtol, or use scene_sensitivities"
 """Message of a gradient that would cost far more than its motion."""

@@ -234,7 +234,8 @@ def propagate_back(
         _step(address, path, k, first, since, h, d, drives, w)
         taken += 1
         of_gains = _error_of_gains(moments.shape[0], h, known, tolerances.rtol, w)
-        error = xp.maximum(_error_of_step(system, path.piece[k], since - h, h, n, d, known, tolerances, w), of_gains)
+        of_step = _error_of_step(system, path.piece[k], since - h, h, n, d, known, tolerances, w)
+        error = xp.maximum(of_step, of_gains)
         accepted, w.pace[0] = judged(w.pace[0], error, h, local)
         if accepted:
             _gain(since, h, moments, w)
