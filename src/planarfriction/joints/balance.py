@@ -1,8 +1,10 @@
 """Torque balance of a joint along a measured motion: the model, its least squares, and the spread of its numbers.
 
-`tau = J a + o + gravity + friction`, smoothed as the measured torque is. In sliding, friction is `S(v) level + sigma_2 v
-+ asymmetry |v|` with `level = mu_c + rise exp(-(v/v_s)^2) + load |tau_motor - tau_external|`; the bristles of LuGre are a
-lag of it over the path, exactly. A joint without bristles needs no stiffness: its friction is a sign.
+`tau = J a + o + gravity + friction`, smoothed as the measured torque is. In sliding, friction is `S(v) level +
+asymmetry + sigma_2 v + viscous_asymmetry |v|` with `level = mu_c + rise exp(-(v/v_s)^2) + load |tau_motor -
+tau_external|`; the bristles of LuGre are a lag of its first two parts over the path, exactly. A joint without bristles
+needs no stiffness: its friction is a sign. An asymmetric level and an offset o of the sensor look alike, so there is
+one of them.
 """
 
 from __future__ import annotations
@@ -18,15 +20,15 @@ from planarfriction.joints.smoothing import DELAYS, NORMAL, Rows
 Values = Mapping[str, float]
 """Numbers of the model by name."""
 
-ALWAYS = ("inertia", "torque_offset", "mu_c", "sigma_2")
-"""Numbers of the model without any term."""
+ALWAYS = ("inertia", "mu_c", "sigma_2")
+"""Numbers of every model, beside an offset of the torque or an asymmetry."""
 
 TERMS: dict[str, tuple[str, ...]] = {
     "gravity": ("gravity_sin", "gravity_cos"),
     "stribeck": ("rise", "v_s"),
     "load": ("load",),
     "bristles": ("sigma_0", "sigma_1"),
-    "asymmetry": ("viscous_asymmetry",),
+    "asymmetry": ("viscous_asymmetry", "asymmetry"),
 }
 """Terms beside Coulomb and viscous friction, with their numbers."""
 
@@ -41,9 +43,6 @@ ROUNDS = 3
 
 HUBER = 3.0
 """Error, in standard deviations, from which on it counts linearly."""
-
-RIGID = {"gravity_sin": 0.0, "gravity_cos": 0.0, "rise": 0.0, "load": 0.0, "sigma_1": 0.0, "viscous_asymmetry": 0.0}
-"""Numbers of terms that are not there."""
 
 
 def predict(rows: Sequence[Rows], values: Values, terms: Sequence[str]) -> list[np.ndarray]:
@@ -66,13 +65,15 @@ def _predict(rows: Rows, values: Values, terms: Sequence[str]) -> np.ndarray:
     # torque of the motor less that of all else, but for friction
     driving = inertial + 2.0 * (gravity - rows.external)
     share = values["load"] if "load" in terms else 0.0
+    uneven = values.get("asymmetry", 0.0)
     through = driving + direction * level + viscous
     through = np.abs(through) / (1.0 - share * np.clip(np.sign(through) * direction, -1.0, 1.0))
     for _ in range(ROUNDS if share else 1):
-        friction = _bent(rows, direction * (level + share * through), level + share * through, values, terms)
+        even = level + share * through
+        friction = _bent(rows, direction * even + uneven, even + direction * uneven, values, terms)
         through = np.abs(driving + rows.smoothed(friction + viscous)) if share else through
     found = inertial + rows.smoothed(friction + viscous + gravity)
-    return values["torque_offset"] + rows.low_passed(found, values.get("low_pass", 0.0))
+    return values.get("torque_offset", 0.0) + rows.low_passed(found, values.get("low_pass", 0.0))
 
 
 def _bent(rows: Rows, sliding: np.ndarray, level: np.ndarray, values: Values, terms: Sequence[str]) -> np.ndarray:
@@ -112,7 +113,8 @@ class Refined(NamedTuple):
 
 def names_of(terms: Sequence[str], late: str) -> list[str]:
     """Return the names of what is estimated; `late` is "delay" or "low_pass"."""
-    return [*ALWAYS, late, *(name for term in TERMS if term in terms for name in TERMS[term])]
+    offset = [] if "asymmetry" in terms else ["torque_offset"]
+    return [*ALWAYS, *offset, late, *(name for term in TERMS if term in terms for name in TERMS[term])]
 
 
 class _Scaled:
@@ -122,14 +124,15 @@ class _Scaled:
         level = max(abs(values["mu_c"]), 1e-9)
         fastest = max(np.abs(each.speed).max() for each in rows)
         hardest = max(np.abs(each.acceleration).max() for each in rows)
+        offset = values.get("torque_offset", values.get("asymmetry", 0.0))
+        values = {"asymmetry": offset, "torque_offset": offset, **values}
         least = {
-            "torque_offset": 0.1 * level, "mu_c": level, "rise": 0.3 * level,
+            "torque_offset": 0.1 * level, "asymmetry": 0.1 * level, "mu_c": level, "rise": 0.3 * level,
             "gravity_sin": 0.3 * level, "gravity_cos": 0.3 * level, "delay": 1e-3, "low_pass": 1e-3, "load": 0.1,
             "sigma_1": 0.005 * values.get("sigma_0", 1.0), "inertia": 0.1 * level / hardest,
             "sigma_2": 0.1 * level / fastest, "viscous_asymmetry": 0.1 * level / fastest,
         }  # fmt: skip
         self.names = names
-        self.fixed = values
         self.scale = np.array([1.0 if each in FACTORS else max(abs(values[each]), least[each]) for each in names])
         self.start = np.array([np.log(values[each]) if each in FACTORS else values[each] for each in names]) / self.scale
 

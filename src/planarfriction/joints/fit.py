@@ -108,8 +108,7 @@ def _fit_torques(
 def numbers_of(fit: Refined) -> tuple[dict[str, float], dict[str, float], dict[str, tuple[float, float] | None]]:
     """Return the numbers of a fit to torques, their standard errors and their 95 % intervals, by name.
 
-    Gravity is given by its size and the angle at which it vanishes; an offset of the torque belongs to friction where
-    that differs between the directions.
+    Gravity is given by its size and the angle at which it vanishes.
     """
     from scipy.stats import t
 
@@ -131,8 +130,7 @@ def numbers_of(fit: Refined) -> tuple[dict[str, float], dict[str, float], dict[s
     for name, value in fit.values.items():
         if name not in fit.spread or name.startswith("gravity_"):
             continue
-        renamed = "asymmetry" if name == "torque_offset" and "asymmetry" in fit.terms else name
-        add(renamed, value, fit.spread[name])
+        add(name, value, fit.spread[name])
     if values.get("load", 0.0) >= MOST_LOAD:
         intervals["load"] = None
     if "gravity" in fit.terms:

@@ -158,7 +158,7 @@ def _best(terms: tuple[str, ...], sums: np.ndarray, folds: np.ndarray, grid: Gri
 
 
 def _names(terms: Sequence[str]) -> set[str]:
-    return {*COLUMNS[:4], *(name for term in terms for name in TERMS[term])}
+    return {*COLUMNS[:4], *(name for term in terms for name in TERMS[term])}  # an asymmetric level is the offset
 
 
 def _solve(sums: np.ndarray, columns: list[int], positive: list[int]) -> _Solution:

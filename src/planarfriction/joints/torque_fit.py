@@ -208,7 +208,8 @@ def doubt(data: Data, fit: Refined, term: str) -> str:
     least = {"gravity": MATTERS * level, "load": MATTERS, "asymmetry": MATTERS * level / data.fastest}[term]
     names = TERMS[term]
     size = float(np.hypot(*(values[name] for name in names))) if term == "gravity" else values[names[0]]
-    clear = max(abs(values[name]) / max(spread[name], 1e-300) for name in names)
+    tested = names[:1] if term == "asymmetry" else names  # its level may as well be an offset of the torque
+    clear = max(abs(values[name]) / max(spread[name], 1e-300) for name in tested)
     if term == "load" and size >= MOST_LOAD - 0.01:
         return "the level would grow with all of the torque"
     size = size if term == "load" else abs(size)
@@ -259,9 +260,21 @@ def _lagging(data: Data, fit: Refined) -> Refined:
     delay = fit.values["delay"]
     if delay <= max(LATEST, SURE * fit.spread["delay"]):
         return fit
-    late = refine(data.rows, fit.values, fit.terms, fit.scatter)
-    low = refine(data.rows, fit.values | {"low_pass": delay, "delay": 0.0}, fit.terms, fit.scatter, "low_pass")
-    return low if low.score < late.score else fit
+    low = refine(data.rows, fit.values | {"low_pass": delay, "delay": 0.0}, fit.terms, None, "low_pass")
+    return low if np.square(low.error).sum() < np.square(_low_passed_error(data, fit, delay)).sum() else fit
+
+
+def _low_passed_error(data: Data, fit: Refined, time_constant: float) -> np.ndarray:
+    """Compute the error of a fit with a delay behind a low pass, which removes as much of the angle's noise as another."""
+    found = predict(data.rows, fit.values, fit.terms)
+    return np.concatenate(
+        [
+            rows.low_passed(torque - np.interp(rows.time + fit.values["delay"], rows.even.time, rows.torque), time_constant)[
+                rows.fitted
+            ]
+            for torque, rows in zip(found, data.rows, strict=True)
+        ]
+    )
 
 
 def _widened(data: Data, fit: Refined) -> Refined:
