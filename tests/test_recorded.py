@@ -11,7 +11,7 @@ import pytest
 
 from tests.support import recorded, subjects
 
-ELSEWHERE = "figures", "commands", "fits", "joints", "surfaces"
+ELSEWHERE = "figures", "commands", "fits", "surfaces"
 """Results of which a folder has a test of its own."""
 
 

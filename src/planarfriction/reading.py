@@ -31,6 +31,9 @@ MOST_TABLE = 4_000_000_000
 AT_ONCE = 50_000
 """Number of lines of a CSV file that are parsed together."""
 
+TRUTH = {"true": 1.0, "false": 0.0}
+"""Numbers of truth values, in small letters."""
+
 SEPARATORS = (";", ",", "\t")
 """Separators of cells; the first that a file has is taken."""
 
@@ -173,11 +176,14 @@ class Table:
         else:
             self._lines = itertools.chain(second, self._lines)
 
-    def numbers(self, names: Sequence[str], spare: Sequence[str] = ()) -> np.ndarray:
+    def numbers(
+        self, names: Sequence[str], spare: Sequence[str] = (), flags: Sequence[str] = ()
+    ) -> np.ndarray:
         """Return the columns `names`, finite, `[rows, len(names)]`; raises FileError with the line and the column.
 
-        Columns that are `spare` too hold NaN where a cell is no finite number.
+        Columns that are `spare` too hold NaN where a cell is no finite number, `flags` may hold true and false.
         """
+        self._flags = flags
         for name in names:
             if not (isinstance(name, str) and name in self.names):
                 hint = validation.hint(name, self.names) or f" (valid: {shown(', '.join(self.names))})"
@@ -216,6 +222,8 @@ class Table:
                 return
 
     def _number(self, line: int, name: str, cell: str, spare: bool) -> float:
+        if name in self._flags and cell.lower() in TRUTH:
+            return TRUTH[cell.lower()]
         try:
             return number(self._path, line, f"column {name!r}", cell)
         except FileError:

@@ -125,8 +125,9 @@ def _roll(model: Any) -> None:
 
 
 def _joints() -> None:
-    time, plant = np.linspace(0.0, 0.1, 20), joints.Plant(inertia=1.0)
-    q, push = np.sin(20.0 * time), np.cos(time)
+    time, plant = np.linspace(0.0, 4.0, 400), joints.Plant(inertia=0.1)
+    q = np.sin(2.0 * time) + 0.3 * np.sin(5.0 * time)
+    push = joints.JointFriction(1.0).along(time, np.gradient(q, time))
     for log in (joints.JointLog(time, q, torque=push), joints.JointLog(time, q, voltage=push)):
         joints.identify_joint([log] * 4, plant, terms=())
 

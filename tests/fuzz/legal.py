@@ -237,11 +237,17 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "joints.Drive": {"kp": 100.0, "supply": 7.0, "gain": 0.003, "sag": 0.2},
     "joints.Drive.duty": {"error": 0.1 * TIMES},
     "joints.Drive.voltage": {"duty": 0.1 * TIMES},
-    "joints.JointFriction": {"load_motor": 0.1, "load_external": 0.1, "sigma_2": 0.1},
+    "joints.JointFriction": {
+        "load_motor": 0.1, "load_external": 0.1, "sigma_2": 0.1, "asymmetry": 0.1, "viscous_asymmetry": 0.05,
+    },
+    "joints.JointFriction.along": {
+        "time": TIMES, "speed": 0.1 * TIMES, "tau_motor": 0.1 * TIMES, "tau_external": 0.1 * TIMES,
+    },
     "joints.JointLog": {
         **{name: np.sin(20.0 * TIMES) for name in ("q", "torque", "dq", "goal", "voltage", "external")},
         "enabled": np.ones(len(TIMES)),
         "drive": pf.joints.Drive(100.0, 7.0),
+        "turns": 0,
     },
     "joints.JointLog.from_csv": {"path": Fresh(lambda: _joint_file("joint.csv")), "drive": None},
     "joints.Plant": {"inertia": 0.05, "length": 0.1, "arm_mass": 0.02, "offset": 0.1},

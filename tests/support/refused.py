@@ -27,7 +27,6 @@ from planarfriction.identify import (
     identify_lugre,
     identify_motion,
 )
-from planarfriction.joints import Drive, JointFriction, JointLog, Plant, identify_joint
 from planarfriction.online import FrictionObserver, Hinge, Hold, Measurement, Sensors, SlideBy, TurnBy
 from planarfriction.planning import (
     Pusher,
@@ -40,7 +39,6 @@ from planarfriction.planning import (
     push,
 )
 from planarfriction.sweeps.settings import Settable
-from tests.joints.test_joint_fit import PENDULUM, SERVO, servo_logs, torque_log
 from tests.support.rate_laws import BoucWen
 
 PATCH, LAW = pf.ContactPatch.disc(0.01, cells=7), pf.LuGre(mu_c=0.5, mu_s=0.6, elasto_plastic=0.9)
@@ -179,14 +177,6 @@ CALLS: dict[str, list[Callable[[], Any]]] = {
             {"normal_force": []},
         )),
     ],
-    "joints": [
-        lambda: identify_joint(dataclasses.replace(servo()[0], time=1e3 * servo()[0].time), PENDULUM),
-        lambda: identify_joint(dataclasses.replace(servo()[0], q=np.degrees(servo()[0].q)), PENDULUM),
-        lambda: identify_joint(servo(), Plant()), lambda: identify_joint(servo(), PENDULUM, terms=("directional",)),
-        lambda: Plant(mass=1.0), lambda: Drive(1.0, 5.0, sag=5.0), lambda: JointFriction(1.0, mu_s=0.5),
-        lambda: identify_joint([*servo(), torque_log()], PENDULUM), lambda: identify_joint([], PENDULUM),
-        lambda: identify_joint(servo(), PENDULUM, progress=3),
-    ],
     "grips": [
         lambda: gripped({"angle": HALF}, knots=4), lambda: gripped({"angle": 1.0, "slide": (0, 1)}),
         lambda: gripped({"turn": 1.0}), lambda: gripped({"angle": 0.0}),
@@ -263,11 +253,6 @@ CALLS: dict[str, list[Callable[[], Any]]] = {
     ],
 }  # fmt: skip
 """Bad calls by their subject."""
-
-
-def servo() -> list[JointLog]:
-    """Return a log of a servo."""
-    return servo_logs(SERVO, 1)
 
 
 def refused() -> dict[str, list[str]]:

@@ -17,13 +17,9 @@ import planarfriction as pf
 from planarfriction import plots
 from planarfriction.cli import console, main
 from planarfriction.identify import FitOptions, Identification, Log, identify_lugre
-from planarfriction.joints import Plant
-from planarfriction.joints.problem import Problem
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.planning import Push, Pusher, Slider, push
 from planarfriction.sweeps import running
-from tests.joints import golden as joint_records
-from tests.joints.test_joint_fit import PENDULUM, SERVO, servo_logs, torque_log
 from tests.support import recorded, synthetic
 from tests.support.identification_logs import PATCH, clean_log, excitation, noisy
 
@@ -129,7 +125,6 @@ def figures() -> dict[str, Any]:
         "identification of a line": identified(line=True).plot(),
         "push": pushed().plot(),
         "wide push": pushed(Pusher(0.3, 0.02)).plot(),
-        **{f"joint {name}": fit.plot() for name, fit in joints().items()},
     }
 
 
@@ -146,19 +141,6 @@ def identified(logs: int = 1, line: bool = False) -> Identification:
         ]
     options = FitOptions(nuisance=(), starts=1, refine=4, elasto_plastic=0.9)
     return identify_lugre(given, PATCH, model="reduced-published", parameters=("mu_c", "mu_s"), options=options)
-
-
-def joints() -> dict[str, Any]:
-    """Make fits of joints at fixed values: of goals and of a torque."""
-    logs = tuple(joint_records.shortened(each, 1, 200) for each in servo_logs(SERVO | {"load": 0.1}))
-    torques = (joint_records.shortened(torque_log(), 4, 500),)
-    servo = Problem(logs, PENDULUM, None, ("load",), 2)
-    torque = Problem(torques, Plant(inertia=0.05), None, (), 4)
-    values = {"mu_c": 0.8, "sigma_2": 2.0, "v_s": 0.7, "rise": 0.01}
-    return {
-        "servo": joint_records.made(servo, SERVO | {"load": 0.1}, servo),
-        "torque": joint_records.made(torque.with_terms(("stribeck",)), values, torque),
-    }
 
 
 def pushed(pusher: Pusher = Pusher(0.3)) -> Push:  # noqa: B008

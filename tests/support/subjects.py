@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from tests.identify import golden as fits
-from tests.joints import golden as joints
 from tests.limit_surface import golden as surfaces
 from tests.support import bridged, computed, recorded, refused, replies, shown
 
@@ -29,7 +28,6 @@ SUBJECTS: dict[str, Callable[[], Any]] = {
     "figures": shown.figures,
     "commands": shown.printed,
     "fits": each_of(fits.SOURCES),
-    "joints": each_of(joints.SOURCES),
     "surfaces": each_of(surfaces.SOURCES),
     **{each.__name__: each for each in (
         computed.patches, computed.pushes, computed.grips, computed.online, computed.scenes, computed.films,

@@ -253,13 +253,14 @@ def _known(
 @click.option("--mass", type=float, default=0.0, help="Mass at the end of a pendulum in kg.")
 @click.option("--length", type=float, default=0.0, help="Length of the pendulum in m.")
 @click.option("--arm-mass", type=float, help="Mass of its arm in kg.")
+@click.option("--offset", type=float, help="Angle in rad at which the pendulum hangs. Default: estimated.")
 @click.option("--inertia", type=float, help="Moment of inertia, without the pendulum, in kg m^2. Default: estimated.")
 @click.option("--torque-gain", type=float, help="kt/R in N m/V. Default: estimated.")
 @click.option("--kp", type=float, multiple=True, help="Gain of the servo; once for each log, or once for all.")
 @click.option("--gain", type=float, default=1.0, show_default=True, help="Duty per rad at a gain of 1.")
 @click.option("--supply", type=float, help="Voltage of the servo in V.")
 @click.option("--sag", type=float, default=0.0, show_default=True, help="Voltage lost at full duty in V.")
-@click.option("--terms", default="auto", show_default=True, help="load,stribeck,bristles,directional; none; or auto.")
+@click.option("--terms", default="auto", show_default=True, help="gravity,stribeck,load,bristles,asymmetry for torques; load,stribeck,bristles,directional for goals and voltages; none; or auto.")
 @click.option("--out", type=FILE, help="Folder for the estimates (JSON), the picture (PNG) and C source.")
 def joint(
     logs: tuple[Path, ...],
@@ -276,7 +277,7 @@ def joint(
 
     Each LOG is a CSV file with a heading and the columns t, q and one of torque, voltage (or duty and supply) and goal
     in s, rad, N m and V; enabled, dq and external are read too. A goal needs --kp and --supply. Terms of the friction
-    are kept only if they predict left-out logs better.
+    are kept only if they predict what was left out better.
 
     \b
     Examples:
@@ -306,8 +307,12 @@ def joint(
         stem = slug(read[0].name)
         write_text(out / f"{stem}-joint.json", json.dumps(fit.to_dict(), indent=2) + "\n")
         files = [out / f"{stem}-joint.json", write_picture(fit.plot(), out / f"{stem}-joint.png")]
-        for file in [*files, *export_joint_c(fit.friction, out, name="friction")]:
+        if not fit.unclear:
+            files += export_joint_c(fit.friction, out, name="friction")
+        for file in files:
             note(f"wrote {file}")
+        if fit.unclear:
+            note(f"no C source: leave out the terms that these logs do not show ({', '.join(fit.unclear)})")
     return 0
 
 

@@ -80,6 +80,9 @@ class Log(ByValue):
         twist, wrench = (validation.array(name, getattr(self, name), (len(time), 3)) for name in ("twist", "wrench"))
         load = validation.numbers("normal_force", self.normal_force)
         load = np.broadcast_to(load, len(time)) if load.ndim == 0 else load
+        if (load <= 0.0).all() and (load < 0.0).any():
+            rule = "be >= 0; negate it if the sensor counts pressure as negative"
+            raise InvalidValueError("normal_force", rule, f"{load.min():.3g} to {load.max():.3g} N")
         load = validation.non_negative_array("normal_force", load, (len(time),))
         self._set(time=time, twist=twist, wrench=wrench, normal_force=load)
         for value in (time, twist, wrench, load):

@@ -7,12 +7,14 @@ from typing import Any
 from xml.sax.saxutils import escape
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
-from planarfriction.joints.loops.runs import JointNumbers
+from planarfriction.identify.logs import increasing
+from planarfriction.joints.loops.runs import JointNumbers, run_measured
 from planarfriction.laws import LuGre
 
 RIGID = 1e-3
@@ -23,9 +25,11 @@ RIGID = 1e-3
 class JointFriction(Checked):
     """Friction torque of a joint: `g(v) + |b_m tau_m - b_e tau_e|` in steady sliding, and `sigma_2 v`.
 
-    `g(v) = mu_c + (mu_s - mu_c) exp(-(v/v_s)^2)`; bristles of stiffness `sigma_0` bend before it slips.
+    `g(v) = mu_c + (mu_s - mu_c) exp(-(v/v_s)^2) + asymmetry sign(v)`; bristles of stiffness `sigma_0` bend before it
+    slips.
 
-    Raises InvalidValueError for negative numbers and for `mu_s` below `mu_c`.
+    Raises InvalidValueError for negative numbers, for `mu_s` below `mu_c`, and for an asymmetry that reaches `mu_c`, or
+    `sigma_2`.
     """
 
     mu_c: float = checked(validation.positive)
@@ -44,6 +48,10 @@ class JointFriction(Checked):
     """Stiffness before slip [N m/rad]; None for rigid friction."""
     sigma_1: float = checked(validation.non_negative, default=0.0)
     """Damping of the bristles [N m s/rad]."""
+    asymmetry: float = checked(validation.number, default=0.0)
+    """Half the excess of the level at positive speeds over that at negative ones [N m]."""
+    viscous_asymmetry: float = checked(validation.number, default=0.0)
+    """Half the excess of viscous friction at positive speeds [N m s/rad]: it is `sigma_2 v + viscous_asymmetry |v|`."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -51,6 +59,11 @@ class JointFriction(Checked):
             self._set(mu_s=self.mu_c)
         if self.mu_s < self.mu_c:
             raise InvalidValueError("mu_s", f"be >= mu_c = {self.mu_c:g}", self.mu_s)
+        if abs(self.asymmetry) >= self.mu_c:
+            raise InvalidValueError("asymmetry", f"be within mu_c = {self.mu_c:g}, or friction drives", self.asymmetry)
+        if abs(self.viscous_asymmetry) > self.sigma_2:
+            rule = f"be within sigma_2 = {self.sigma_2:g}, or friction drives"
+            raise InvalidValueError("viscous_asymmetry", rule, self.viscous_asymmetry)
 
     @property
     def law(self) -> LuGre:
@@ -68,16 +81,48 @@ class JointFriction(Checked):
         motor, outside = validation.number("tau_motor", tau_motor), validation.number("tau_external", tau_external)
         return abs(self.load_motor * motor - self.load_external * outside)
 
+    def along(
+        self, time: ArrayLike, speed: ArrayLike, tau_motor: ArrayLike = 0.0, tau_external: ArrayLike = 0.0
+    ) -> np.ndarray:
+        """Compute the torque that friction takes along a motion, positive along the speed, `[T]` [N m].
+
+        Bristles begin straight; between two of the times `[T]` [s] the speed `[T]` [rad/s] is the mean of both.
+        `tau_motor` and `tau_external` [N m] are the torques of the motor and of all else, `[T]` or one number.
+
+        Raises InvalidValueError for times that do not increase, wrong shapes, and numbers that are not finite.
+        """
+        time = increasing(time)
+        given = {"speed": speed, "tau_motor": tau_motor, "tau_external": tau_external}
+        columns = [validation.filled(name, value, (len(time),)) for name, value in given.items()]
+        taken = np.empty(len(time))
+        run_measured(self.numbers, time, *columns, taken)
+        return taken
+
     @property
     def numbers(self) -> JointNumbers:
         """Numbers with bristles, as a step reads them."""
-        return JointNumbers(self.law.numbers, self.load_motor, self.load_external)
+        return JointNumbers(
+            self.law.numbers, self.load_motor, self.load_external, self.asymmetry, self.viscous_asymmetry
+        )
 
     @property
     def rigid_numbers(self) -> JointNumbers:
         """Numbers as a simulated run reads them: rigid friction without bristles."""
         law = self.law.numbers
         return self.numbers._replace(law=LawNumbers(*law)._replace(sigma_0=self.sigma_0 or 0.0))
+
+
+def _representable(friction: JointFriction) -> JointFriction:
+    """Return a friction that MuJoCo's joint or dcmotor can hold, or raise InvalidValueError."""
+    friction = validation.instance("friction", friction, JointFriction, "a JointFriction")
+    if friction.mu_s > friction.mu_c and not friction.sigma_0:
+        rule = "be mu_c for rigid friction, as frictionloss has one level: set mu_s=None, or give sigma_0 for a dcmotor"
+        raise InvalidValueError("mu_s", rule, friction.mu_s)
+    if friction.asymmetry or friction.viscous_asymmetry:
+        found = friction.asymmetry or friction.viscous_asymmetry
+        rule = "be 0: friction in MuJoCo is the same in both directions; apply the difference as a torque of your own"
+        raise InvalidValueError("asymmetry", rule, found)
+    return friction
 
 
 WEAK = 1e-6
@@ -103,9 +148,10 @@ def to_mjcf(
     `torque_gain` is kt/R [N m/V], `back_emf` kt^2/R [N m s/rad]. Friction with bristles is the motor's `lugre`, rigid
     friction the joint's `frictionloss`. A motor whose wires are open has no back-EMF: set its gain and bias to 0 then.
 
-    Raises InvalidValueError for a name that is no text, and numbers below zero.
+    Raises InvalidValueError for a name that is no text, numbers below zero, and friction that MuJoCo cannot hold: rigid
+    friction with `mu_s` above `mu_c`, and an asymmetry.
     """
-    friction = validation.instance("friction", friction, JointFriction, "a JointFriction")
+    friction = _representable(friction)
     joint = escape(validation.text("joint", joint), {'"': "&quot;"})
     armature, back_emf = validation.non_negative("armature", armature), validation.non_negative("back_emf", back_emf)
     torque_gain = None if torque_gain is None else validation.positive("torque_gain", torque_gain)
@@ -126,9 +172,11 @@ def to_mjcf(
 def apply_to_spec(friction: JointFriction, spec: Any, joint: str, *, armature: float | None = None) -> None:
     """Set the friction of a joint of a `mujoco.MjSpec`: damping and frictionloss, or the `lugre` of its dcmotor.
 
-    Raises InvalidValueError for a joint that is not there, and for bristles without a dcmotor on the joint.
+    Raises InvalidValueError for a joint that is not there, for bristles without a dcmotor on the joint, and for friction
+    that MuJoCo cannot hold, as `to_mjcf`.
     """
-    found = spec.joint(joint)
+    friction = _representable(friction)
+    found = spec.joint(validation.text("joint", joint))
     if found is None:
         raise InvalidValueError("joint", "be the name of a joint of the model", joint)
     found.damping = np.array([friction.sigma_2, 0.0, 0.0]) if np.ndim(found.damping) else friction.sigma_2
@@ -148,7 +196,8 @@ def apply_to_spec(friction: JointFriction, spec: Any, joint: str, *, armature: f
 def set_level(friction: JointFriction, model: Any, data: Any, dof: int, motor: int | None = None) -> None:
     """Set the level of a MuJoCo model to the load of the step before; call it in front of each `mj_step`.
 
-    `dof` is that of the joint, `motor` the number of its dcmotor, of gear 1, if the friction has bristles.
+    `dof` is that of the joint, `motor` the number of its dcmotor, of gear 1, if the friction has bristles. Bristles that
+    a falling level has left beyond their limit, `mu_s/sigma_0`, come back onto it.
     """
     outside = data.qfrc_applied[dof] - data.qfrc_bias[dof]
     if motor is None:
@@ -156,4 +205,8 @@ def set_level(friction: JointFriction, model: Any, data: Any, dof: int, motor: i
     else:  # the force of a dcmotor is what its friction leaves
         resistance, kt = model.actuator_gainprm[motor, :2]
         load = friction.load(kt * (data.ctrl[motor] - kt * data.qvel[dof]) / resistance, outside)
-        model.actuator_biasprm[motor, 3:5] = motor_lugre(friction, load)[2:4]
+        level = motor_lugre(friction, load)[2:4]
+        model.actuator_biasprm[motor, 3:5] = level
+        bristles = model.actuator_actadr[motor] + model.actuator_actnum[motor] - 1
+        limit = level[1] / friction.law.sigma_0
+        data.act[bristles] = np.clip(data.act[bristles], -limit, limit)

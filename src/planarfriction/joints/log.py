@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.equality import ByValue, Checked, checked
-from planarfriction.errors import FileError, InvalidValueError
-from planarfriction.identify.logs import LEAST_SAMPLES, as_tuple, increasing, slopes
+from planarfriction.errors import FileError, InvalidValueError, shown
+from planarfriction.identify.logs import LEAST_SAMPLES, as_tuple, increasing, slopes, unwrapped
 from planarfriction.reading import Table
 
 GRAVITY = 9.81
@@ -23,7 +23,8 @@ GRAVITY = 9.81
 
 ALIASES = {
     **{"time": "t", "position": "q", "angle": "q", "theta": "q", "tau": "torque", "speed": "dq", "velocity": "dq"},
-    **{"omega": "dq", "tau_external": "external"},
+    **{"omega": "dq", "tau_external": "external", "effort": "torque"},
+    **{"__time": "t", "time_s": "t", "t_s": "t", "timestamp": "t"},
 }
 """Other names of columns, in small letters."""
 
@@ -36,8 +37,26 @@ COLUMNS = {
 UNITS = {"t": "s", "q": "rad", **COLUMNS}
 """Units of all columns."""
 
-SLOW, TURNS = 0.1, 2.0
-"""Time between samples [s] from which on it is taken for ms, and turns of a pendulum for degrees."""
+SLOW = 0.1
+"""Time between samples [s] from which on it is taken for ms."""
+
+TURNS = 2.0
+"""Turns of a pendulum from which on its angle is taken for degrees."""
+
+DEGREES = 20.0
+"""Ratio of the swings of goal and angle from which on one of them is taken for degrees."""
+
+OPPOSED = -0.5
+"""Correlation of goal and angle below which one of them has the wrong sign."""
+
+FROZEN = 0.3
+"""Time [s] for which a sensor that does not change while the joint moves is taken for dead."""
+
+MOVED = 0.05
+"""Share of its swing that a joint has moved while its torque froze."""
+
+SUDDEN = 0.2
+"""Share of the largest speed at which a joint cannot come to rest between two samples."""
 
 
 @dataclass(frozen=True)
@@ -133,13 +152,23 @@ class JointLog(ByValue):
     """Servo that follows the goal."""
     name: str = "joint"
     """Name for messages and plots."""
+    turns: int = 0
+    """Number of whole-turn jumps that were removed from the measured angle."""
 
     def __post_init__(self) -> None:
         validation.instance("name", self.name, str, "a text")
+        validation.count("turns", self.turns, at_least=0)
         time = increasing(self.time, f"time of {self.name}", LEAST_SAMPLES)
         given = {each: getattr(self, each, None) for each in ("q", *COLUMNS)}
         columns = {each: value for each, value in given.items() if value is not None}
+        if np.asarray(self.enabled).dtype == bool:
+            columns["enabled"] = np.asarray(self.enabled, dtype=float)
         self._set(time=time, **{each: validation.array(each, columns[each], (len(time),)) for each in columns})
+        q, turns = unwrapped(time, self.q, f"q of {self.name}")
+        if turns and self.goal is not None:
+            rule = "be unwrapped beside a goal: add whole turns so that it does not jump"
+            raise InvalidValueError(f"q of {self.name}", rule, f"{turns} jumps by a whole turn")
+        self._set(q=q, turns=self.turns + turns)
         if self.drive is not None:
             validation.instance("drive", self.drive, Drive, "a Drive")
         if self.torque is None and self.voltage is None and (self.goal is None or self.drive is None):
@@ -198,14 +227,20 @@ class JointLog(ByValue):
         for heading in table.names:
             word, *unit = re.split(r"[\[(]", heading.lower())
             name = ALIASES.get(word.strip(), word.strip())
-            headings.setdefault(name, heading)
+            if name in UNITS and name in headings:
+                raise FileError(f"{path}: columns {headings[name]!r} and {heading!r} are both {name}: keep one of them")
+            headings[name] = heading
             wanted = UNITS.get(name, "")
             if unit and wanted and re.sub(r"[^a-z/]", "", unit[0]) != wanted.lower():
                 raise FileError(f"{path}: {name} must be in {wanted}, got the column {heading!r}")
         if missing := [each for each in ("t", "q") if each not in headings]:
-            raise FileError(f"{path}: no column {missing[0]} (t, q, and torque, voltage or goal)")
+            spaced = " (cells must be separated by commas)" if len(table.names) == 1 else ""
+            found = f"found {shown(', '.join(table.names))}{spaced}"
+            raise FileError(f"{path}: no column {missing[0]}; {found}; needed t, q, and torque, voltage or goal")
         names = ["t", "q", *(each for each in COLUMNS if each in headings)]
-        read: dict[str, Any] = dict(zip(names, table.numbers([headings[each] for each in names]).T, strict=True))
+        flags = [headings["enabled"]] if "enabled" in headings else []
+        columns = table.numbers([headings[each] for each in names], flags=flags).T
+        read: dict[str, Any] = dict(zip(names, columns, strict=True))
         duty, supply = read.pop("duty", None), read.pop("supply", None)
         if duty is not None and supply is not None and "voltage" not in read:
             read["voltage"] = duty * supply
@@ -218,7 +253,7 @@ class JointLog(ByValue):
 
 
 def as_joint_logs(logs: JointLog | Sequence[JointLog], plant: Plant) -> tuple[JointLog, ...]:
-    """Return one log or several as a tuple, or raise InvalidValueError, for other units than s and rad too."""
+    """Return one log or several as a tuple, or raise InvalidValueError, for other units and dead sensors too."""
     result = as_tuple("logs", logs, JointLog)
     if len({each.torque is None for each in result}) > 1:
         raise InvalidValueError("logs", "all hold a torque, or none", "some do")
@@ -227,4 +262,53 @@ def as_joint_logs(logs: JointLog | Sequence[JointLog], plant: Plant) -> tuple[Jo
             raise InvalidValueError(f"time of {log.name}", "be in s", f"steps of {step:.3g}: is it in ms?")
         if plant.mass and (swing := float(np.ptp(log.q))) > TURNS * 2.0 * np.pi:
             raise InvalidValueError(f"q of {log.name}", "be in rad", f"a swing of {swing:.3g}: is it in degrees?")
+        if log.torque is not None:
+            _check_sensors(log)
+        elif log.voltage is None:
+            _check_goal(log)
     return result
+
+
+def _check_sensors(log: JointLog) -> None:
+    """Raise InvalidValueError for a torque or an angle that does not change while the joint moves."""
+    assert log.torque is not None
+    if not np.ptp(log.torque) > 0.0:
+        raise InvalidValueError(f"torque of {log.name}", "vary", f"{log.torque[0]:.3g} N m throughout")
+    first, last = _longest_run(log.torque)
+    seconds = log.time[last] - log.time[first]
+    if seconds > FROZEN and np.ptp(log.q[first : last + 1]) > MOVED * np.ptp(log.q):
+        found = f"{log.torque[first]:.3g} N m for {seconds:.2g} s from t = {log.time[first]:g} s on"
+        raise InvalidValueError(f"torque of {log.name}", "change while the joint moves (a dead sensor?)", found)
+    first, last = _longest_run(log.q)
+    seconds = log.time[last] - log.time[first]
+    speed = np.abs(log.speed)
+    before = speed[max(first - 5, 0)]
+    if first > 5 and seconds > FROZEN and before > SUDDEN * speed.max():
+        found = f"still for {seconds:.2g} s from t = {log.time[first]:g} s on, right after {before:.2g} rad/s"
+        raise InvalidValueError(f"q of {log.name}", "come to rest gradually (a dead sensor, or a stop: cut it out)", found)
+
+
+def _longest_run(values: np.ndarray) -> tuple[int, int]:
+    """Return the first and the last index of the longest run of equal values."""
+    ends = np.concatenate([[-1], np.flatnonzero(np.diff(values)), [len(values) - 1]])
+    longest = int(np.argmax(np.diff(ends)))
+    return int(ends[longest]) + 1, int(ends[longest + 1])
+
+
+def _check_goal(log: JointLog) -> None:
+    """Raise InvalidValueError for a goal in degrees or of the other sign."""
+    assert log.goal is not None
+    driven = log.on > 0.0
+    if driven.sum() < LEAST_SAMPLES:
+        return
+    goal, q = log.goal[driven], log.q[driven]
+    wide, narrow = np.ptp(goal), np.ptp(q)
+    if not (wide > 0.0 and narrow > 0.0):
+        return
+    if max(wide / narrow, narrow / wide) > DEGREES:
+        found = f"{wide:.3g} beside {narrow:.3g} of q: is one of them in degrees?"
+        raise InvalidValueError(f"goal of {log.name}", "swing as q does, in rad", found)
+    correlation = float(np.corrcoef(goal, q)[0, 1])
+    if correlation < OPPOSED:
+        found = f"a correlation of {correlation:.2f}: flip the sign of one of them"
+        raise InvalidValueError(f"goal of {log.name}", "lead q in its own direction", found)

@@ -1,4 +1,4 @@
-"""Least-squares problem of a joint: what is unknown, where the search starts, and the errors of a choice of values."""
+"""Least-squares problem of simulated runs of a joint: its unknowns, the start of a search, the errors of values."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from planarfriction.joints.friction import JointFriction
 from planarfriction.joints.log import GRAVITY, JointLog, Plant
-from planarfriction.joints.loops.runs import PlantNumbers, run_measured, run_plant
+from planarfriction.joints.loops.runs import PlantNumbers, run_plant
 
 
 class Parameter(NamedTuple):
@@ -27,7 +27,7 @@ class Parameter(NamedTuple):
 PARAMETERS = {
     "inertia": Parameter("kg m^2", 0.0, np.inf, 1e-4),
     "arm_mass": Parameter("kg", 0.0, np.inf, 0.01),
-    "offset": Parameter("rad", -0.5, 0.5, 0.02),
+    "offset": Parameter("rad", -2.0 * np.pi, 2.0 * np.pi, 0.02),
     "torque_gain": Parameter("N m/V", 1e-9, np.inf, 1e-3),
     "back_emf": Parameter("N m s/rad", 0.0, np.inf, 1e-3),
     "mu_c": Parameter("N m", 1e-9, np.inf, 1e-4),
@@ -67,6 +67,9 @@ SHORT = 0.2
 DIFFERENCE = 1e-5
 """Step of differences, over the size of a parameter."""
 
+OFFSETS = np.pi * np.array([0.0, 0.25, -0.25, 0.5, -0.5, 0.75, -0.75, 1.0])
+"""Angles at which a pendulum may hang, from which a search begins [rad]."""
+
 MOVING = 0.05
 """Share of the largest speed above which the torque balance counts a joint as moving."""
 
@@ -84,21 +87,11 @@ class Problem:
     """Parts of each log that count as groups."""
 
     @property
-    def by_torque(self) -> bool:
-        """True if torques were measured."""
-        return self.logs[0].torque is not None
-
-    @property
     def names(self) -> tuple[str, ...]:
-        """Names of the parameters that are estimated, `[P]`.
-
-        Without a torque, the mass of an arm would only scale all torques: it is then none.
-        """
-        names = [each for each in UNKNOWN if getattr(self.plant, each) is None]
-        if not self.by_torque:
-            names = [each for each in names if each != "arm_mass"]
-            names += ["torque_gain"] if self.torque_gain is None else []
-            names += ["back_emf"] if any((moving(log) & (log.on == 0.0)).any() for log in self.logs) else []
+        """Names of the parameters that are estimated, `[P]`; the mass of an arm would only scale all torques."""
+        names = [each for each in UNKNOWN if getattr(self.plant, each) is None and each != "arm_mass"]
+        names += ["torque_gain"] if self.torque_gain is None else []
+        names += ["back_emf"] if any((moving(log) & (log.on == 0.0)).any() for log in self.logs) else []
         return (*names, "mu_c", "sigma_2", *self._more)
 
     @property
@@ -108,15 +101,6 @@ class Problem:
     def with_terms(self, terms: Sequence[str]) -> Problem:
         """Return the problem with other terms."""
         return replace(self, terms=tuple(each for each in TERMS if each in terms))
-
-    def friction(self, values: Mapping[str, float]) -> JointFriction:
-        """Make the friction of parameters by name."""
-        load = values.get("load", 0.0)
-        return JointFriction(
-            values["mu_c"], values["sigma_2"], load, values.get("load_external", load),
-            values["mu_c"] + values.get("rise", 0.0), values.get("v_s", 1.0),
-            values.get("sigma_0"), values.get("sigma_1", 0.0),
-        )  # fmt: skip
 
     def settled(self, values: Mapping[str, float]) -> Plant:
         """Make the plant of parameters by name."""
@@ -141,29 +125,20 @@ class Problem:
 
         Runs begin again at the measured motion every `span` [s].
         """
-        motions, joint = [np.empty((len(log.time), 2)) for log in logs], self.friction(values).rigid_numbers
+        motions, joint = [np.empty((len(log.time), 2)) for log in logs], friction_of(values).rigid_numbers
         for log, motion in zip(logs, motions, strict=True):
             plant, given = self.plant_numbers(values, log), log.goal if log.voltage is None else log.voltage
             again = int(min(max(2.0, span * len(log.time) / (log.time[-1] - log.time[0])), 1e9))
             run_plant(joint, plant, log.time, given, log.on, log.outside, log.motion, again, STEP, motion)
         return motions
 
-    def torque(self, values: Mapping[str, float], log: JointLog) -> np.ndarray:
-        """Compute the torque [N m] that the measured motion of a log takes, `[T]`."""
-        plant, taken = self.plant_numbers(values, log), np.empty(len(log.time))
-        outside = log.outside - plant.moment * np.sin(log.q - plant.offset)
-        run_measured(self.friction(values).numbers, log.time, log.speed, log.torque, outside, taken)
-        return plant.inertia * log.acceleration - outside + taken
-
     def errors(self, values: Mapping[str, float], span: float = np.inf) -> list[np.ndarray]:
-        """Compute the errors of each group of samples [rad], or [N m]."""
-        if self.by_torque:
-            return self._groups([self.torque(values, log) - log.torque for log in self.logs])
+        """Compute the errors of each group of samples [rad]."""
         runs = zip(self.simulated(values, self.logs, span), self.logs, strict=True)
         return self._groups([motion[:, 0] - log.q for motion, log in runs])
 
     def costs(self, values: Mapping[str, float], span: float = np.inf) -> np.ndarray:
-        """Compute the mean absolute error of each group, [rad] or [N m]."""
+        """Compute the mean absolute error of each group [rad]."""
         return np.array([np.abs(each).mean() for each in self.errors(values, span)])
 
     def slopes(self, values: Mapping[str, float], span: float = np.inf) -> list[np.ndarray]:
@@ -190,28 +165,45 @@ class Problem:
     def start(self) -> dict[str, float]:
         """Compute the least squares of the torque balance, where the joint moves, of the linear parameters.
 
-        `I a - tau_e + mu_c sign(v) + sigma_2 v = kt/R V - back_emf v`, or a measured torque.
+        `I a - tau_e + mu_c sign(v) + sigma_2 v = kt/R V - back_emf v`. The angle at which a pendulum hangs is not
+        linear: it is searched from several.
         """
+        angles = OFFSETS if "offset" in self.names else OFFSETS[:1]
+        return min((self._start(float(each)) for each in angles), key=lambda found: found[1])[0]
+
+    def _start(self, offset: float) -> tuple[dict[str, float], float]:
+        """Return the least squares near an offset [rad], and their squared error."""
         names = [each for each in self.names if each not in self._more]
-        zero, rows, right = dict.fromkeys(names, 0.0), [], []
+        zero = dict.fromkeys(names, 0.0)
+        if "offset" in zero:
+            zero["offset"] = offset
+        rows, right = [], []
         for log in self.logs:
             here, moves = self._balance(zero, log), moving(log)
-            columns = [(self._balance({**zero, name: PARAMETERS[name].scale}, log) - here) for name in names]
-            rows.append(np.column_stack(columns)[moves] / [PARAMETERS[name].scale for name in names])
+            scales = [PARAMETERS[name].scale for name in names]
+            columns = [
+                self._balance({**zero, name: zero[name] + scale}, log) - here
+                for name, scale in zip(names, scales, strict=True)
+            ]
+            rows.append(np.column_stack(columns)[moves] / scales)
             right.append(-here[moves])
         table = np.concatenate(rows)
+        forces = np.concatenate(right)
         size = np.maximum(np.abs(table).max(axis=0), 1e-300)
-        found = np.linalg.lstsq(table / size, np.concatenate(right), rcond=1e-8)[0] / size
+        steps = np.linalg.lstsq(table / size, forces, rcond=1e-8)[0] / size
+        found = dict(zip(names, (steps + list(zero.values())).tolist(), strict=True))
         fast = max(np.abs(log.speed).max() for log in self.logs)
-        forces = np.abs(np.concatenate(right))
-        least = {"mu_c": 0.05 * np.median(forces) + 1e-6, "sigma_2": 0.01 * forces.max() / max(fast, 1e-9)}
-        bounds = ((each, least.get(each, PARAMETERS[each].low), PARAMETERS[each].high) for each in names)
-        return {each: float(np.clip(value, low, high)) for value, (each, low, high) in zip(found, bounds, strict=True)}
+        strong = np.abs(forces)
+        least = {"mu_c": 0.05 * np.median(strong) + 1e-6, "sigma_2": 0.01 * strong.max() / max(fast, 1e-9)}
+        for name in names:
+            found[name] = float(np.clip(found[name], least.get(name, PARAMETERS[name].low), PARAMETERS[name].high))
+        rest = [self._balance(found, log)[moving(log)] for log in self.logs]
+        return found, float(np.square(np.concatenate(rest)).sum())
 
     def _balance(self, values: Mapping[str, float], log: JointLog) -> np.ndarray:
         """Compute the torque that is missing in the balance of rigid friction [N m], `[T]`."""
         plant, v = self.plant_numbers(values, log), log.speed
-        driven = log.torque if self.by_torque else plant.torque_gain * log.volts - plant.back_emf * log.on * v
+        driven = plant.torque_gain * log.volts - plant.back_emf * log.on * v
         outside = log.outside - plant.moment * np.sin(log.q - plant.offset)
         return plant.inertia * log.acceleration - outside + values["mu_c"] * np.sign(v) + values["sigma_2"] * v - driven
 
@@ -235,6 +227,23 @@ class Problem:
         most = mu_c + values.get("rise", 0.0)
         bent = ((most / angle, time) for angle in (1e-4, 1e-3, 3e-3, 1e-2, 0.1) for time in (1e-3, 1e-2))
         return [{"sigma_0": stiffness, "sigma_1": time * stiffness} for stiffness, time in bent]
+
+
+def friction_of(values: Mapping[str, float]) -> JointFriction:
+    """Make the friction of parameters by name."""
+    load = values.get("load", 0.0)
+    return JointFriction(
+        values["mu_c"],
+        values["sigma_2"],
+        load,
+        values.get("load_external", load),
+        values["mu_c"] + values.get("rise", 0.0),
+        values.get("v_s", 1.0),
+        values.get("sigma_0"),
+        values.get("sigma_1", 0.0),
+        values.get("asymmetry", 0.0),
+        values.get("viscous_asymmetry", 0.0),
+    )
 
 
 def moving(log: JointLog) -> np.ndarray:

@@ -25,13 +25,38 @@ class JointNumbers(NamedTuple):
     """Growth of the level with the torque of the motor, b_m [-]."""
     load_external: Any
     """Growth of the level with the torque of all else, b_e [-]."""
+    asymmetry: Any = 0.0
+    """Half the excess of the level at positive speeds [N m]."""
+    viscous_asymmetry: Any = 0.0
+    """Half the excess of viscous friction at positive speeds [N m s/rad]."""
+
+
+@kernel
+def load_level(joint, tau_motor, tau_external):
+    """Compute the growth of the level with the torque through the gears [N m], `|b_m tau_m - b_e tau_e|`."""
+    load = joint.load_motor * tau_motor - joint.load_external * tau_external
+    return xp.maximum(load, -load)
 
 
 @kernel
 def level(joint, speed, tau_motor, tau_external):
     """Compute the friction in steady sliding [N m], `g(v) + |b_m tau_m - b_e tau_e|`."""
-    load = joint.load_motor * tau_motor - joint.load_external * tau_external
-    return formulas.stribeck(xp, xp.maximum(speed, -speed), joint.law) + xp.maximum(load, -load)
+    uneven = xp.where(speed < 0.0, -joint.asymmetry, joint.asymmetry)
+    sliding = formulas.stribeck(xp, xp.maximum(speed, -speed), joint.law) + uneven
+    return sliding + load_level(joint, tau_motor, tau_external)
+
+
+@kernel
+def viscous(joint, speed):
+    """Compute the viscous torque [N m]."""
+    return joint.law.sigma_2 * speed + joint.viscous_asymmetry * xp.maximum(speed, -speed)
+
+
+@kernel
+def within(torque, side, joint, load):
+    """Return the torque of the bristles brought back onto the static level of its side [N m]."""
+    most = joint.law.mu_s + load + xp.where(side < 0.0, -joint.asymmetry, joint.asymmetry)
+    return xp.minimum(xp.maximum(torque, -most), most)
 
 
 @kernel
@@ -43,18 +68,41 @@ def advance(joint, z, speed, dt, most):
 
 
 @kernel
-def friction(joint, z, speed, most):
-    """Compute the torque that friction takes [N m], positive along the speed."""
-    zdot = speed - xp.maximum(speed, -speed) * joint.law.sigma_0 / most * z
-    return -formulas.traction(z, zdot, speed, joint.law)
+def friction(joint, z, speed, tau_motor, tau_external):
+    """Compute the torque that friction takes [N m], positive along the speed; within the static level and viscous part.
+
+    The damping of bristles that bend back fast would exceed the level.
+    """
+    law, most = joint.law, level(joint, speed, tau_motor, tau_external)
+    zdot = speed - xp.maximum(speed, -speed) * law.sigma_0 / most * z
+    bristles = law.sigma_0 * z + law.sigma_1 * zdot
+    return within(bristles, bristles, joint, load_level(joint, tau_motor, tau_external)) + viscous(joint, speed)
 
 
 @kernel
 def joint_step(joint, z, speed, tau_motor, tau_external, dt):
-    """Return the deflection [rad] after dt, and the torque that friction takes [N m]."""
-    most = level(joint, speed, tau_motor, tau_external)
-    new = advance(joint, z, speed, dt, most)
-    return new, friction(joint, new, speed, most)
+    """Return the deflection [rad] after dt, and the torque that friction takes [N m].
+
+    Bristles that a falling level has left beyond their limit come back onto it first, as those of a patch do.
+    """
+    stiffness = joint.law.sigma_0
+    start = within(stiffness * z, z, joint, load_level(joint, tau_motor, tau_external)) / stiffness
+    new = advance(joint, start, speed, dt, level(joint, speed, tau_motor, tau_external))
+    return new, friction(joint, new, speed, tau_motor, tau_external)
+
+
+@jit
+def follow_path(columns, travelled, lagged):
+    """Write what follows each column `[R, C]` by a lag of first order over a path, `dz/du = x - z`, from 0.
+
+    `travelled` `[R]` is the path from the row before, in lengths of the lag.
+    """
+    for j in range(columns.shape[1]):
+        z = 0.0
+        for i in range(len(columns)):
+            keep = math.exp(-travelled[i])
+            z = keep * z + (1.0 - keep) * columns[i, j]
+            lagged[i, j] = z
 
 
 @jit
@@ -64,9 +112,8 @@ def run_measured(joint, time, speed, tau_motor, tau_external, taken):
     for i in range(len(time)):
         if i > 0:
             middle = 0.5 * (speed[i] + speed[i - 1])
-            most = level(joint, middle, tau_motor[i], tau_external[i])
-            z = advance(joint, z, middle, time[i] - time[i - 1], most)
-        taken[i] = friction(joint, z, speed[i], level(joint, speed[i], tau_motor[i], tau_external[i]))
+            z = joint_step(joint, z, middle, tau_motor[i], tau_external[i], time[i] - time[i - 1])[0]
+        taken[i] = friction(joint, z, speed[i], tau_motor[i], tau_external[i])
 
 
 class PlantNumbers(NamedTuple):
@@ -129,7 +176,7 @@ def run_plant(joint, plant, time, given, enabled, external, measured, again, ste
     goal [rad] of a servo, held until the next, or the voltage [V], linear between samples; steps are `step` [s] at
     most.
 
-    A step solves `I dv/dt = driven + outside - viscous v - friction` at the level of its start, torques half-way.
+    A step solves `I dv/dt = driven + outside - damping v - friction` at the level of its start, torques half-way.
     Viscous terms decay exactly (`formulas.relaxation`), dry friction is implicit.
     """
     law = joint.law
@@ -142,9 +189,9 @@ def run_plant(joint, plant, time, given, enabled, external, measured, again, ste
         count = max(1, math.ceil((time[i] - time[i - 1]) / step - 1e-9))
         dt = (time[i] - time[i - 1]) / count
         on = enabled[i - 1]
-        # k v' = (k - viscous) v + push - friction
-        viscous = law.sigma_2 + on * plant.back_emf
-        k = plant.inertia / (dt * formulas.relaxation(xp, viscous * dt / plant.inertia)[1])
+        # k v' = (k - damping) v + push - friction
+        damping = law.sigma_2 + on * plant.back_emf
+        k = plant.inertia / (dt * formulas.relaxation(xp, damping * dt / plant.inertia)[1])
         for j in range(count):
             middle, share = q + 0.5 * dt * v, (j + 0.5) / count
             outside = external[i - 1] + share * (external[i] - external[i - 1])
@@ -154,8 +201,8 @@ def run_plant(joint, plant, time, given, enabled, external, measured, again, ste
                 duty = min(max(plant.kp * (given[i - 1] - middle), -1.0), 1.0)
                 volts = duty * (plant.supply - plant.sag * abs(duty))
             driven = on * plant.torque_gain * volts
-            push = driven + outside
-            pushed = (k - viscous) * v + push
+            push = driven + outside - joint.viscous_asymmetry * abs(v)
+            pushed = (k - damping) * v + push
             most = level(joint, v, driven - on * plant.back_emf * v, outside)
             if law.sigma_0 > 0.0:
                 v, z, mean = bent_step(law, v, z, dt, k, pushed, most)

@@ -1,0 +1,273 @@
+"""Friction of a joint from goals or voltages, by simulated runs; terms are chosen by logs that were left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planarfriction.errors import InvalidValueError
+from planarfriction.identify.verdicts import Verdict
+from planarfriction.joints.goal_verdicts import judge
+from planarfriction.joints.problem import NEEDS, PARAMETERS, SHORT, TERMS, Problem
+from planarfriction.joints.result import JointFit, Series
+
+SPANS = (SHORT, 0.6, np.inf)
+"""Times [s] after which a simulated run begins again at the measured motion: short runs have one minimum, the last is
+the whole log."""
+
+GROUPS = 4
+"""Least number of groups that are left out in turn; fewer logs are cut into parts."""
+
+LEAST = 0.15
+"""Least fall of the logarithm of left-out errors that a term must make: on synthetic joints whose friction and voltage
+differ between logs, terms that are not there take up some of that and gain less than this in 95 % of them."""
+
+FINE = 1e-5
+"""Share of the squared errors that a step of the search must gain, far below what one log more or less changes."""
+
+MOST = 40
+"""Most steps of a search."""
+
+UNRELATED = 0.5
+"""Mean error over the mean deviation of the angle from its mean from which on a run has nothing to do with the log."""
+
+AT_BOUND = 1e-3
+"""Distance from a bound, over the parameter's size or in its logarithm, within which an estimate ended there."""
+
+BEST = 2
+"""Number of starts of a term that are followed to the end."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Fit of one choice of terms, with a fit for each group of samples that was left out."""
+
+    problem: Problem
+    """Logs, plant, and the terms that were fitted."""
+    values: dict[str, float]
+    """Estimates by name."""
+    folds: tuple[dict[str, float], ...]
+    """Estimates without each group."""
+    again: dict[str, float]
+    """Estimates by runs that begin again every `SHORT`."""
+    errors: np.ndarray
+    """Mean absolute error of each left-out group [rad]."""
+    short: np.ndarray
+    """Errors of simulated runs that begin again at the measured motion every `SHORT` [rad].
+
+    A whole run that once stands where the joint went on says little about the rest: terms are judged by short ones.
+    """
+    halves: tuple[np.ndarray, ...]
+    """Such errors of the groups of either half, when that half was left out."""
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Terms beside Coulomb and viscous friction."""
+        return self.problem.terms
+
+    def gains(self, less: Trial) -> tuple[float, float, list[float]]:
+        """Compute the mean logarithm of another trial's errors over this one's, its scatter, and that of either half.
+
+        The scatter is that of a one-sided t-test, 95 %.
+        """
+        from scipy.stats import t
+
+        pairs = zip((less.short, *less.halves), (self.short, *self.halves), strict=True)
+        falls, *halves = (np.log(np.maximum(one, 1e-300) / np.maximum(other, 1e-300)) for one, other in pairs)
+        scatter = t.ppf(0.95, len(falls) - 1) * falls.std(ddof=1) / np.sqrt(len(falls))
+        return float(falls.mean()), float(scatter), [float(each.mean()) for each in halves]
+
+    def shifts(self, others: Sequence[Mapping[str, float]]) -> dict[str, float]:
+        """Compute the largest shift of each estimate to those of other fits, which missing terms move by other amounts."""
+        return {name: max(abs(each[name] - value) for each in others) for name, value in self.values.items()}
+
+    @property
+    def jackknife(self) -> dict[str, float]:
+        """Standard error of each estimate by leaving out groups."""
+        count = len(self.folds)
+        table = np.array([[each[name] for name in self.values] for each in self.folds])
+        errors = np.sqrt((count - 1) / count * ((table - table.mean(axis=0)) ** 2).sum(axis=0))
+        return dict(zip(self.values, errors.tolist(), strict=True))
+
+    def interval(self, name: str, shift: float) -> tuple[float, float] | None:
+        """Compute the 95 % interval of an estimate from its standard error and its shift between fits.
+
+        Those searched by logarithm have factors; an estimate at the bound of its search has none.
+        """
+        from scipy.stats import t
+
+        value, kind = self.values[name], PARAMETERS[name]
+        reach = float(np.hypot(t.ppf(0.975, len(self.folds) - 1) * self.jackknife[name], shift))
+        if kind.logarithmic:
+            if min(np.log(value / kind.low), np.log(kind.high / value)) < AT_BOUND:
+                return None
+            factor = float(np.exp(min(reach / value, 700.0)))
+            return value / factor, value * factor
+        near = AT_BOUND * max(abs(value), kind.scale)
+        if kind.high - value < near or (kind.low < 0.0 and value - kind.low < near):
+            return None
+        return max(value - reach, kind.low), min(value + reach, kind.high)
+
+
+def minimise(
+    problem: Problem, start: Mapping[str, float], spans: Sequence[float] = SPANS, without: Sequence[int] = ()
+) -> dict[str, float]:
+    """Return the values of least squared errors, then of least softened ones, which large errors sway less.
+
+    Runs begin again after each of the `spans` in turn; softened errors are those of whole runs. Groups `without` do not
+    count.
+    """
+    values = dict(start)
+    for span in spans:
+        values = _least(problem, values, span, without)
+    width = float(np.median(np.abs(_rest(problem.errors(values), without))))
+    return _least(problem, values, np.inf, without, loss="soft_l1", f_scale=max(width, 1e-12))
+
+
+def _rest(groups: list[np.ndarray], without: Sequence[int]) -> np.ndarray:
+    return np.concatenate([each for i, each in enumerate(groups) if i not in without])
+
+
+def _least(
+    problem: Problem, values: Mapping[str, float], span: float, without: Sequence[int], **loss: Any
+) -> dict[str, float]:
+    from scipy.optimize import least_squares
+
+    kinds = [PARAMETERS[each] for each in problem.names]
+    log = np.array([each.logarithmic for each in kinds])
+
+    def factor(x: np.ndarray) -> np.ndarray:
+        return np.exp(np.where(log, x, 0.0))
+
+    def by_name(x: np.ndarray) -> dict[str, float]:
+        return dict(zip(problem.names, np.where(log, factor(x), x).tolist(), strict=True))
+
+    def coordinates(numbers: Sequence[float]) -> np.ndarray:
+        return np.where(log, np.log(np.where(log, numbers, 1.0)), numbers)
+
+    low, high = (coordinates([getattr(each, end) for each in kinds]) for end in ("low", "high"))
+    slopes: Any = lambda x: _rest(problem.slopes(by_name(x), span), without) * factor(x)  # noqa: E731
+    settings: Any = {"x_scale": "jac", "ftol": FINE, "max_nfev": MOST, **loss}
+    found = least_squares(
+        lambda x: _rest(problem.errors(by_name(x), span), without),
+        np.clip(coordinates([values[each] for each in problem.names]), low, high),
+        slopes,
+        (low, high),
+        **settings,
+    )
+    return by_name(found.x)
+
+
+def with_term(problem: Problem, values: Mapping[str, float], term: str) -> tuple[Problem, dict[str, float]]:
+    """Return a problem with one term more than that of `values`, and its best values from the best of its starts."""
+    problem = problem.with_terms([*problem.terms, term])
+    starts = [{**values, **guess} for guess in problem.guesses(term, values)]
+    ranked = [starts[0], *sorted(starts[1:], key=lambda each: problem.costs(each, SHORT).mean())[: BEST - 1]]
+    return problem, min((minimise(problem, each) for each in ranked), key=lambda each: problem.costs(each).mean())
+
+
+def attempt(problem: Problem, values: dict[str, float], progress: Callable[[str], None]) -> Trial:
+    """Fit a problem with each group left out, then with each half, and measure the errors of what was left out."""
+    folds, errors, short, halves = [], [], [], []
+    words = " and ".join(problem.terms) or "Coulomb and viscous friction"
+    for i, name in enumerate(problem.groups):
+        progress(f"{words}; left out: {name}")
+        folds.append(minimise(problem, values, (), [i]))
+        errors.append(problem.costs(folds[i])[i])
+        short.append(problem.costs(folds[i], SHORT)[i])
+    for half in (each.tolist() for each in np.array_split(np.arange(len(folds)), 2)):
+        progress(f"{words}; left out: {len(half)} of {len(folds)}")
+        halves.append(problem.costs(minimise(problem, values, (), half), SHORT)[half])
+    again = _least(problem, values, SHORT, ())
+    return Trial(problem, values, tuple(folds), again, np.array(errors), np.array(short), tuple(halves))
+
+
+def improves(more: Trial, less: Trial) -> bool:
+    """Return True if left-out errors fall by more than their scatter and `LEAST`, and by `LEAST` in either half too."""
+    gain, scatter, halves = more.gains(less)
+    return gain > scatter and min(gain, *halves) > LEAST
+
+VAGUE = 0.5
+"""Standard error over the value from which on the number of a term is not known."""
+
+
+def _check_related(problem: Problem, kept: Trial) -> None:
+    """Raise InvalidValueError if runs from the goals resemble none of the logs."""
+    deviation = float(np.mean([np.abs(log.q - log.q.mean()).mean() for log in problem.logs]))
+    error = float(problem.costs(kept.values).mean())
+    if error > UNRELATED * deviation:
+        rule = "follow from goal or voltage: check units, signs, gains, and that all belong to one joint"
+        found = f"{error:.2g} rad left of a mean swing of {deviation:.2g} rad about its mean"
+        raise InvalidValueError("q of the logs", rule, found)
+
+
+def _is_vague(
+    name: str, values: Mapping[str, float], spread: Mapping[str, float], intervals: Mapping[str, Any]
+) -> bool:
+    """Return True if the number of a term has no interval, or one of its own size."""
+    return intervals[name] is None or not spread[name] < VAGUE * values[name]
+
+
+def fit_goals(
+    base: Problem, chosen: Sequence[str], auto: bool, progress: Callable[[str], None]
+) -> JointFit:
+    """Fit the positions that runs from goal or voltage give, with the `chosen` terms, or with those that they ask for.
+
+    Raises InvalidValueError for logs that no run from their goals resembles.
+    """
+    kept = first = attempt(base, minimise(base, base.start()), progress)
+    pairs: dict[str, tuple[Trial, Trial]] = {}
+    if chosen:
+        problem, values = base, first.values
+        for term in chosen:
+            problem, values = with_term(problem, values, term)
+        kept = attempt(problem, values, progress)
+    for term in (*TERMS, "stribeck") if auto else ():  # again, since bristles may hide a fall of friction
+        has = kept.problem.terms
+        if term in has or NEEDS.get(term, term) not in (*has, term) or (term in pairs and "bristles" not in has):
+            continue
+        more = attempt(*with_term(kept.problem, kept.values, term), progress)
+        pairs[term] = more, kept
+        if term == "load" and not improves(more, kept):  # motor and load may have different shares
+            both = attempt(*with_term(more.problem, more.values, "directional"), progress)
+            pairs[term] = (both, kept) if improves(both, kept) else pairs[term]
+        kept = more if improves(*pairs[term]) else kept
+    for term in kept.problem.terms[:-1] if auto else ():  # what came later may explain what came before
+        rest = base.with_terms([each for each in kept.problem.terms if each != term and NEEDS.get(each) != term])
+        less = attempt(rest, minimise(rest, {name: kept.values[name] for name in rest.names}), progress)
+        pairs[term] = kept, less
+        kept = kept if improves(kept, less) else less
+    return result_of(kept, first, pairs)
+
+
+def result_of(kept: Trial, first: Trial, pairs: Mapping[str, tuple[Trial, Trial]]) -> JointFit:
+    """Return the result of the trial that was kept: its intervals, and verdicts.
+
+    Estimates also move with each term that was tried besides: intervals count the largest shift.
+    """
+    problem, values = kept.problem, kept.values
+    _check_related(problem, kept)
+    more = [trial.values for trial, _ in pairs.values() if {*kept.terms} < {*trial.terms}]
+    shifts = kept.shifts([kept.again, *more])
+    jackknife = kept.jackknife
+    runs = (trial.problem.simulated(trial.values, problem.logs) for trial in (kept, first))
+    series = tuple(
+        Series(log.name, log.time, log.q, fitted[:, 0], rest[:, 0])
+        for log, fitted, rest in zip(problem.logs, *runs, strict=True)
+    )
+    spread = {name: float(np.hypot(jackknife[name], shifts[name])) for name in values}
+    intervals = {name: kept.interval(name, shifts[name]) for name in values}
+    unclear = {}
+    for term in kept.terms:
+        vague = [name for name in TERMS[term] if name != "sigma_1" and _is_vague(name, values, spread, intervals)]
+        if vague:
+            unclear[term] = f"{vague[0]} = {values[vague[0]]:.2g}, spread {spread[vague[0]]:.2g} between fits"
+    verdicts = judge(kept, pairs)
+    doubts = tuple(Verdict(term, False, f"not shown by these logs ({words})") for term, words in unclear.items())
+    return JointFit(
+        problem.logs, problem.settled(values), values.get("torque_gain", problem.torque_gain), kept.terms, values,
+        spread, intervals, tuple(problem.groups), kept.errors, first.errors, series, unclear, (*verdicts, *doubts),
+    )  # fmt: skip
