@@ -1,6 +1,6 @@
 """Make the pictures of the page on joints: `python docs/make_joint.py [FOLDER]`, by default in `docs/images`.
 
-`joint.png` is the fit of the servo's logs. `joint-holds.png` is a joint that should hold at half its Coulomb level,
+`joint-torque.png` is the fit of the page's first example, `joint.png` that of the servo's logs. `joint-holds.png` is a joint that should hold at half its Coulomb level,
 under a load that swings at 5 Hz: MuJoCo's `frictionloss` and the bristles of its dcmotor, and elasto-plastic bristles.
 Angles are taken once in each swing, so that what bends back does not count.
 """
@@ -16,6 +16,7 @@ import numpy as np
 from make_moving import check_size
 
 import planarfriction as pf
+from planarfriction.joints import JointFriction, JointLog, Plant, identify_joint
 from planarfriction.plots import style
 
 INERTIA, COULOMB, LOAD, SWING, FREQUENCY = 0.01, 0.8, 0.4, 0.1, 5.0
@@ -90,12 +91,25 @@ def holds() -> style.PlotFigure:
     return figure
 
 
+def from_torque() -> style.PlotFigure:
+    """Draw the fit of a noisy torque with six numbers of LuGre, the example of the page."""
+    t = 1e-3 * np.arange(12_000)
+    fast = np.clip((t - 8.0) / 2.0, 0.0, 1.0)
+    q = 0.08 * np.sin(1.57 * t) + 0.006 * np.sin(14.5 * t) + 0.8 * fast * np.sin(3.14 * t)
+    true = JointFriction(mu_c=0.8, mu_s=1.2, v_s=0.05, sigma_0=400.0, sigma_1=2.0, sigma_2=0.3)
+    speed = np.gradient(q, t)
+    torque = 0.05 * np.gradient(speed, t) + true.along(t, speed)
+    torque += np.random.default_rng(0).normal(0.0, 0.01, len(t))
+    return identify_joint(JointLog(t, q, torque=torque, name="ripples"), Plant(inertia=0.05)).plot()
+
+
 def main(folder: Path) -> None:
     """Write the pictures and say how large they are."""
     from planarfriction_studies.measured.joints import fit_joints
 
     folder.mkdir(parents=True, exist_ok=True)
-    for name, figure in {"joint-holds": holds(), "joint": fit_joints(progress=print).plot()}.items():
+    figures = {"joint-torque": from_torque(), "joint-holds": holds(), "joint": fit_joints(progress=print).plot()}
+    for name, figure in figures.items():
         figure.savefig(path := folder / f"{name}.png")
         check_size(path)
 
