@@ -58,7 +58,8 @@ class MapReading(Checked):
     they are 0, 1, 2 ... behind an empty cell."""
     index: bool | None = checked(validation.instance, bool, "True or False", default=None)
     """True: the first column of a table has labels or times, False: pressures; None: labels if the header is empty
-    there, if none of them is a number, or if only without it frames of `frame_shape` fill the rows."""
+    there, if none of them is a number, or if they ascend and frames of `frame_shape` fill the rows only without them.
+    """
     frame_shape: Any = None
     """Rows and columns of a frame, where a file has one frame per row, or frames one below another."""
     frame: int | None = checked(validation.count, 0, default=None)
@@ -92,13 +93,16 @@ class MapReading(Checked):
         place = self.place(what, len(values) if several else 1)
         return values[place] if several else values  # pyright: ignore[reportReturnType]
 
-    def labelled(self, columns: int) -> bool:
-        """Return True if the first of some columns holds no pressures, as `index` says, or else `frame_shape`."""
+    def labelled(self, columns: int, first: Any) -> bool:
+        """Return True if the `first` of some columns holds no pressures.
+
+        `index` says so, or else it ascends, or has names, and frames of `frame_shape` fill the rows only without it.
+        """
         if self.index is not None or self.frame_shape is None:
             return bool(self.index)
         cells = math.prod(self.frame_shape)
         fits = [count > 0 and (count % cells == 0 or count == self.frame_shape[1]) for count in (columns, columns - 1)]
-        return fits == [False, True]
+        return fits == [False, True] and _ascends(first)
 
     def place(self, what: str, count: int) -> int:
         """Return the index of the frame among `count`. Raises InvalidValueError if there is none, or several."""
@@ -160,7 +164,7 @@ def read_pressure_map(path: str | Path, **options: Any) -> np.ndarray:
     try:
         with np.errstate(all="ignore"):  # what is no number, or too large for a float, no patch takes
             values = readers[kind](path, reading)
-            if kind in ARRAYS and values.ndim == 2 and reading.labelled(values.shape[1]):
+            if kind in ARRAYS and values.ndim == 2 and reading.labelled(values.shape[1], values[:, 0]):
                 values = values[:, 1:]
             if kind not in IMAGE_SUFFIXES and reading.frame_shape is None and getattr(values, "ndim", 0) == 2:
                 refuse_other_tables(what, values, reading.index)
@@ -195,7 +199,7 @@ def _read_csv(path: Path, reading: MapReading) -> np.ndarray | list[np.ndarray]:
     rows = rows if header or not names else itertools.chain([(line, names)], rows)
     first, values, blocks, last = [], array("d"), [0], None
     for line, row in rows:
-        cells = row[: width(row)]
+        cells = row if len(row) == len(names) else row[: width(row)]
         if (header and cells == names) or (last is not None and line != last + 1):
             blocks.append(0)
         last = line
@@ -211,7 +215,7 @@ def _read_csv(path: Path, reading: MapReading) -> np.ndarray | list[np.ndarray]:
     if not first:
         raise FileError(f"{what}: the file holds no numbers")
     table, labels = np.array(values).reshape(len(first), -1), [cell for _, cell in first]
-    index = reading.labelled(len(names))
+    index = reading.labelled(len(names), labels)
     if reading.frame_shape is None and header and reading.index is None:
         refuse_named(what, names)
     if not index and reading.index is None:
@@ -252,6 +256,14 @@ def _is_name(cell: str) -> bool:
 def _are_labels(cells: Sequence[str]) -> bool:
     """Return True if cells are consecutive integers from 0 or 1."""
     return any(list(cells) == [str(first + i) for i in range(len(cells))] for first in (0, 1)) and len(cells) > 0
+
+
+def _ascends(cells: Any) -> bool:
+    """Return True if cells are numbers that ascend, as times do, or are no numbers."""
+    try:
+        return bool((np.diff(np.array(cells, float)) > 0.0).all())
+    except ValueError:
+        return True
 
 
 def _read_tekscan(path: Path, _: MapReading) -> np.ndarray:

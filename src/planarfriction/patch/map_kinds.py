@@ -48,7 +48,8 @@ def refuse_named(what: str, names: Sequence[str]) -> None:
     if {"x", "y"} <= set(known):
         raise FileError(_list_of_places(what))
     if known and known[0] in TIMES:
-        raise FileError(f"{what}: its first column is {names[0]}, so rows are frames: give frame_shape (rows, columns)")
+        text = "give frame_shape = [rows, columns] of the frames in its rows, or index = false if it holds pressures"
+        raise FileError(f"{what}: its first column is called {names[0]}: {text}")
 
 
 def refuse_other_tables(what: str, table: np.ndarray, index: bool | None) -> None:
@@ -68,7 +69,7 @@ def refuse_other_tables(what: str, table: np.ndarray, index: bool | None) -> Non
         others = steady[1:] | (np.ptp(table[:, 1:], axis=0) == 0.0)
         if index is None and steady[0] and (not others.all() or _are_frames(table[:, 1:])):
             shown = ", ".join(f"{value:g}" for value in table[:3, 0])
-            text = "labels (index = true), times of frames (frame_shape = [rows, columns]) or pressures (index = false)?"
+            text = "labels (index = true), times (frame_shape = [rows, columns]) or pressures (index = false)?"
             raise FileError(f"{what}: the first column is {shown}, ...: {text}")
         if _are_frames(table):
             text = "its rows are one pattern: frames (frame_shape = [rows, columns], frame) or one map"
@@ -95,7 +96,7 @@ def rim_of(values: np.ndarray) -> np.ndarray:
 
 
 def _list_of_places(what: str) -> str:
-    text = "this is a list of places x, y and pressures, not a map: make it a table with a row for each y, largest first"
+    text = "this is a list of places x, y and pressures, not a map: make it a table with a row for each y, top first"
     return f"{what}: {text}, or pass places and pressures to ContactPatch.points"
 
 
