@@ -12,7 +12,7 @@ import re
 import stat
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from operator import length_hint
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -21,6 +21,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import FileError, FrictionError, shown
+from planarfriction.formulas import LARGEST
 
 MOST_TEXT = 256_000_000
 """Largest text file that is read at once [bytes]."""
@@ -37,6 +38,10 @@ TRUTH = {"true": 1.0, "false": 0.0}
 SEPARATORS = (";", ",", "\t")
 """Separators of cells; the first that a file has is taken."""
 
+UTF_16 = b"\xff\xfe", b"\xfe\xff"
+"""First bytes of a text in UTF-16, as Excel and Windows write it."""
+
+_SEPARATOR_LINE = re.compile(r"sep=(.)\s*", re.IGNORECASE)
 _UNIT = re.compile(r"[\[(]?[A-Za-zµ°%1][\w\s/*^·.°µ%-]*[\])]?")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
@@ -79,11 +84,21 @@ def opened(path: str | Path, what: str, most: int | None) -> Iterator[BinaryIO]:
 
 
 def read_text(path: str | Path, what: str) -> str:
-    """Return the text of the UTF-8 file `path`, as `read_bytes` reads it, of at most `MOST_TEXT` bytes."""
+    """Return the text of the file `path` in UTF-8, or UTF-16 with its mark, of at most `MOST_TEXT` bytes."""
+    content = read_bytes(path, what, MOST_TEXT)
     try:
-        return read_bytes(path, what, MOST_TEXT).decode("utf-8-sig")
+        return content.decode(_encoding(content))
     except UnicodeDecodeError:
-        raise FileError(f"{path}: not a text file (expected {what})") from None
+        raise _no_text(path, what) from None
+
+
+def _encoding(start: bytes) -> str:
+    """Return the encoding of a text by its first bytes."""
+    return "utf-16" if start[:2] in UTF_16 and len(start) > 2 else "utf-8-sig"
+
+
+def _no_text(path: str | Path, what: str) -> FileError:
+    return FileError(f"{path}: not a text file (expected {what}); if it is one, save it as UTF-8")
 
 
 def read_rows(path: str | Path, what: str) -> Iterator[tuple[int, list[str]]]:
@@ -103,14 +118,17 @@ def _lines(path: str | Path, what: str, most: int) -> Iterator[tuple[int, str]]:
     size = 0
     try:
         with opened(path, what, most) as file:
-            text = io.TextIOWrapper(file, encoding="utf-8-sig", newline="")
+            encoding = _encoding(file.peek(3)[:3])  # pyright: ignore[reportAttributeAccessIssue]
+            text = io.TextIOWrapper(file, encoding=encoding, newline="")
             for number, line in enumerate(iter(lambda: text.readline(MOST_TEXT + 1), ""), 1):
                 size += len(line)
                 if size > most or len(line) > MOST_TEXT:
                     raise _too_large(path, what, most)
+                if "\0" in line:  # UTF-16 without its mark
+                    raise _no_text(path, what)
                 yield number, line
-    except UnicodeDecodeError:
-        raise FileError(f"{path}: not a text file (expected {what})") from None
+    except UnicodeError:  # UTF-16 may end within a sign
+        raise _no_text(path, what) from None
 
 
 def _rows(path: str | Path, lines: Iterator[tuple[int, str]], separator: str = "") -> Iterator[tuple[int, list[str]]]:
@@ -128,8 +146,13 @@ def _rows(path: str | Path, lines: Iterator[tuple[int, str]], separator: str = "
 
 
 def _holds_cells(line: str) -> bool:
-    """Return True if a line is neither empty nor a remark."""
-    return bool(line.strip()) and not line.lstrip().startswith("#")
+    """Return True if a line is neither empty nor a remark, nor `sep=;`, which tells Excel the separator."""
+    return bool(line.strip()) and not line.lstrip().startswith("#") and not _SEPARATOR_LINE.fullmatch(line)
+
+
+def width(cells: Sequence[str]) -> int:
+    """Return the number of cells without the empty one that a separator at the end of a line leaves."""
+    return len(cells) - (len(cells) > 1 and not cells[-1])
 
 
 def _separator(line: str) -> str:
@@ -144,10 +167,7 @@ def _with_point(cell: str) -> str:
 
 def _is_unit(cell: str) -> bool:
     """Return True if a cell below a name may be its unit, or is empty."""
-    with suppress(ValueError):
-        float(cell)
-        return False
-    return not cell or _UNIT.fullmatch(cell) is not None
+    return not _is_float(cell) and (not cell or _UNIT.fullmatch(cell) is not None)
 
 
 class Table:
@@ -210,12 +230,12 @@ class Table:
             found = np.loadtxt(lines, delimiter=self._separator, comments=None, usecols=columns, ndmin=2)
         except ValueError:
             return None
-        return found if np.isfinite(found).all() and len(found) == len(lines) else None
+        return found if (np.abs(found) <= LARGEST).all() and len(found) == len(lines) else None
 
     def _one_by_one(self, lines: Iterator[Any], columns: Sequence[Any], spare: Sequence[str], values: array) -> None:
         """Append the numbers of numbered lines row by row; a quoted cell may go on behind them."""
         for line, row in _rows(self._path, itertools.chain(lines, self._lines), self._separator):
-            if len(row) != len(self.names):
+            if len(row) != len(self.names) and width(row) != width(self.names):
                 raise FileError(f"{self._path}: line {line} has {len(row)} columns, the header has {len(self.names)}")
             values.extend(self._number(line, name, row[column], name in spare) for name, column in columns)
             if not length_hint(lines):
@@ -233,14 +253,41 @@ class Table:
 
 
 def number(path: str | Path, line: int, place: str, cell: str) -> float:
-    """Return the finite number in a cell of a table; raises FileError that says the line and the place in it."""
+    """Return the number in a cell of a table; raises FileError that says the line and the place in it.
+
+    The number is finite and at most `LARGEST`, in the digits 0 to 9, without a separator of thousands.
+    """
+    where = f"{path}: line {line}, {place}: {shown(repr(cell))}"
     try:
-        value = float(cell)
+        value = float(cell) if cell.isascii() and "_" not in cell else None
     except ValueError:
-        raise FileError(f"{path}: line {line}, {place}: {shown(repr(cell))} is not a number") from None
+        value = None
+    if value is None:
+        raise FileError(f"{where} is not a number{_remedy(cell)}")
     if not math.isfinite(value):
-        raise FileError(f"{path}: line {line}, {place}: {shown(repr(cell))} is not finite")
+        raise FileError(f"{where} is not finite")
+    if abs(value) > LARGEST:
+        raise FileError(f"{where} is beyond {LARGEST:g}, the largest that is read")
     return value
+
+
+def _remedy(cell: str) -> str:
+    """Return the remedy for a cell that is a number, or several, in another form."""
+    if len(cell.split()) > 1 and all(map(_is_float, cell.split())):
+        return ": part cells by commas, semicolons or tabs"
+    if cell and not cell.isascii() and _is_float(cell):
+        return ": write the digits 0 to 9"
+    if len(cell) > 1 and _is_float(cell.replace(",", "").replace("_", "")):
+        return ": write thousands without a separator"
+    return ""
+
+
+def _is_float(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _too_large(path: str | Path, what: str, most: int) -> FileError:

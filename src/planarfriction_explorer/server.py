@@ -50,8 +50,7 @@ def open_server(port: int) -> Any:
     panel.extension("plotly", raw_css=[looks.PAGE])
     heard = signal.getsignal(signal.SIGINT)
     try:
-        # No websocket_origin: pages of other sites, which a browser has open beside this one, are refused.
-        return panel.serve(
+        server = panel.serve(
             lambda: Page().layout(),  # pyright: ignore[reportArgumentType]
             port=port,
             address=LOOPBACK,
@@ -60,6 +59,9 @@ def open_server(port: int) -> Any:
             show=False,
             verbose=False,
         )
+        # Besides localhost, and no more: pages of other sites, which a browser has open beside this one, are refused.
+        server._tornado.websocket_origins.add(f"{LOOPBACK}:{server.port}")  # pyright: ignore
+        return server
     except OSError as error:
         if port == 0:
             raise FrictionError(f"no port can be opened: {error.strerror}") from None

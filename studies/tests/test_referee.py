@@ -6,6 +6,7 @@ import csv
 import json
 import math
 import os
+import platform
 import re
 import runpy
 import sys
@@ -605,6 +606,7 @@ def test_mujoco(tmp_path, capsys):
     assert "fails" in capsys.readouterr().out
     stored = json.loads((folder / "referee.json").read_text())
     assert stored["settings"].keys() == {"MuJoCo"} and stored["versions"]["mujoco"]
+    assert stored["date"] and platform.machine() in stored["machine"] and platform.python_version() in stored["machine"]
     page = (folder / "referee.html").read_text()
     assert page.count("<h2 id=") == len(names)
     assert all((folder / picture).exists() for picture in re.findall(r'src="(.*?)"', page))

@@ -369,6 +369,33 @@ def test_a_server_leaves_ctrl_c_as_it_was():
 def test_pages_of_other_sites_are_not_let_in():
     server = open_server(0)
     try:
-        assert server._tornado.websocket_origins == {f"localhost:{server.port}"}
+        assert server._tornado.websocket_origins == {f"{host}:{server.port}" for host in ("localhost", "127.0.0.1")}
     finally:
         server.stop()
+
+
+def test_both_names_of_this_computer_open_a_socket():
+    """The handshake of a browser at either address; a page of another site gets 403."""
+    from tornado.httpclient import HTTPClientError, HTTPRequest
+    from tornado.websocket import websocket_connect
+
+    server = open_server(0)
+    server.start()
+    answers = {}
+
+    async def knock():
+        for origin in (f"http://localhost:{server.port}", f"http://127.0.0.1:{server.port}", "http://example.org"):
+            # Of another host: from 6.6 on Tornado itself lets in an origin that is the host.
+            headers = {"Origin": origin, "Host": f"another:{server.port}"}
+            request = HTTPRequest(f"ws://127.0.0.1:{server.port}/ws", headers=headers)
+            try:
+                (await websocket_connect(request)).close()
+                answers[origin] = 101
+            except HTTPClientError as error:
+                answers[origin] = error.code
+
+    try:
+        server.io_loop.run_sync(knock, timeout=60)
+    finally:
+        server.stop()
+    assert list(answers.values()) == [101, 101, 403]

@@ -216,7 +216,7 @@ def test_the_reduced_model_takes_dahl_and_refuses_creep():
         same.step(same.rest(), twist, LOAD, 1e-2)[1], rel=1e-12
     )
     leaning = DISC.with_friction_metric(None, (0.1, 0.0))
-    with pytest.raises(InvalidValueError, match="no creep_speed for patches with an asymmetry"):
+    with pytest.raises(InvalidValueError, match="no creep_speed for patches with an asymmetry: take LuGre or Dahl"):
         pf.DistributedModel(leaning, CREEPING)
 
 

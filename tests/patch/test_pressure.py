@@ -36,6 +36,18 @@ def test_linear_gradient_moves_the_centre_of_pressure():
     assert disc.pressure_values(1.0) == pytest.approx(at_the_centre * p, rel=1e-12)
 
 
+def test_a_steep_gradient_errs_by_the_moment_within_cells():
+    """The continuous pressure `1 + g x` has its centre at `g w^2/12`, cells of one pressure at `g (w^2 - h^2)/12`."""
+    width, steep = 0.02, 1.9 / 0.02  # 1 to 39
+    for cells, parts in ((21, 1), (21, 2), (5, 3)):
+        patch = pf.ContactPatch.rectangle(width, cells=cells, pressure=LinearGradient((steep, 0.0))).refined(parts)
+        short = steep * width**2 / 12.0 - patch.centre_of_pressure()[0]
+        assert short == pytest.approx(steep * (width / cells / parts) ** 2 / 12.0, rel=1e-9)
+    steps = np.tile(np.arange(1.0, 40.0, 1.9), (21, 1))
+    mapped = pf.ContactPatch.from_pressure(steps, width=width)
+    assert mapped.refined(4).centre_of_pressure() == pytest.approx(mapped.centre_of_pressure(), rel=1e-12)
+
+
 def test_any_function_of_two_numbers_is_a_pressure():
     def one_sided(x, y):
         return math.exp(x / 0.01) if y > 0 else 0.0

@@ -632,11 +632,29 @@ def test_figures_draw_into_axes_of_a_users_own():
         ({"size": 3.0}, "size must have shape"),
         ({"axes": 3}, "axes must be axes of matplotlib"),
         ({"panels": ["z"]}, "panels"),
+        ({"panels": []}, "panels must name at least one of x, y, theta"),
+        ({"size": (1e9, 3.0)}, "size must be in inches, each side at most 100"),
     ],
 )
 def test_wrong_sizes_axes_and_panels_are_refused(options, message):
     with pytest.raises(pf.FrictionError, match=message):
         plots.plot_histories(synthetic.solution(), **options)
+
+
+def test_axes_of_three_dimensions_are_refused_in_the_plane():
+    space = style.new_figure(3.0, 3.0).add_subplot(projection="3d")
+    calls = [
+        lambda: plots.plot_histories(synthetic.solution(), panels=["x"], axes=space),
+        lambda: plots.plot_motion(synthetic.solution(), ax=space),
+        lambda: plots.plot_patch(pf.ContactPatch.disc(0.01), ax=space),
+    ]
+    for call in calls:
+        with pytest.raises(pf.FrictionError, match="must be those of a plane") as caught:
+            call()
+        assert "\n" not in str(caught.value)
+    flat = style.new_figure(3.0, 3.0).add_subplot()
+    with pytest.raises(pf.FrictionError, match="ax must have three dimensions"):
+        plots.plot_limit_surface(pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01)), ax=flat)
 
 
 def test_axes_are_as_many_as_panels():

@@ -57,6 +57,22 @@ def test_the_covered_part_of_a_disc_is_that_in_its_polygon(corners):
             assert (x + mx, y + my) == pytest.approx((part.centroid.x, part.centroid.y), abs=1e-4)
 
 
+@pytest.mark.parametrize("far", [1e2, 1e6, 1e12])
+def test_corners_may_be_far_away(far):
+    """A half-plane covers a segment of a disc; a triangle whose far corners lie on its lines covers what it does."""
+    for depth in (-0.9e-3, -1e-4, 0.0, 5e-4):
+        plane = np.array([(-far, -far), (depth, -far), (depth, far), (-far, far)])
+        share, mx, my = _covered(place_of(plane), 4, 0.0, 0.0, 1e-3)
+        half = np.arccos(-depth / 1e-3)
+        area = half - np.sin(half) * np.cos(half)
+        assert share == pytest.approx(area / np.pi, rel=1e-12)
+        assert mx == pytest.approx(-2e-3 / 3.0 * np.sin(half) ** 3 / area, rel=1e-10)
+        assert abs(my) < 1e-15
+    corner, along = np.array([2e-4, 1e-4]), np.array([[-0.6, -0.8], [-0.8, 0.6]])
+    found = [_covered(place_of(np.vstack([corner, corner + size * along])), 3, 0.0, 0.0, 1e-3) for size in (0.1, far)]
+    assert found[1] == pytest.approx(found[0], rel=1e-10)
+
+
 @pytest.mark.parametrize(("model", "late"), list(zip(PADS, (3e-4, 1.3e-4, 4e-4), strict=True)))
 def test_a_plate_pulled_off_brakes_with_all_of_the_load_to_the_end(model, late):
     """It leaves when it has moved 50 mm; a cell stands for a disc of its area, which reaches 0.064 cells further."""
@@ -81,6 +97,17 @@ def test_the_torque_is_that_of_the_covered_part(model, off):
         data = pf.simulate(pf.Scene(body, [pf.Contact(model, LOAD, edge=True)], 0.01)).data
         assert np.isfinite(data.tau).all()
         assert float(data.tau[-1, 0] / data.fy[-1, 0]) == pytest.approx(0.5 * (edge - 0.5 * WIDTH), abs=off)
+
+
+def test_a_plate_of_any_size_moves_as_a_large_one():
+    """Only its near edge is at the pad: the steps and the motion are the same."""
+    ends = {}
+    for far in (0.1, 1e6):
+        outline = [(-far, -0.05), (0.004, -0.05), (0.004, 0.05), (-far, 0.05)]
+        solution = pf.simulate(slide(PADS[0], (0.0, -0.1, 1.0), 0.05, outline=outline))
+        ends[far] = end_of(solution)
+        assert solution.statistics.steps < 500
+    assert ends[1e6] == pytest.approx(ends[0.1], rel=1e-7)
 
 
 def test_half_a_disc_spins_as_a_disc_of_half_the_area_about_its_centroid():

@@ -173,19 +173,26 @@ COMMANDS = (
 )  # fmt: skip
 
 
+MACHINE = {"date": "today", "machine": "a machine", "versions": {"a": "1"}}
+"""Facts of a run that differ from machine to machine, made up."""
+
+
 def commands() -> dict[str, Any]:
-    """Call the commands of the studies in an empty folder, with results of trials that are made up."""
+    """Call the commands of the studies in an empty folder, with results of trials and a machine that are made up."""
     from planarfriction_studies.commands.online import WORDS
+    from planarfriction_studies.referee import report, run
     from planarfriction_studies.rig import demo, trials
 
     own = "def predict(question):\n    return [0.0, 0.0, 0.0]\ndef held(question):\n    return question.wrenches\n"
     made = {name: 0.123 * i for i, name in enumerate(WORDS)}
-    hold = demo.record_hold
+    hold, stated = demo.record_hold, report.stated
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), ExitStack() as stack:
         Path("own.py").write_text(own, encoding="utf-8")
         told = lambda parts, seed, progress: {"parts": parts, "seed": seed} | made  # noqa: E731
         stack.enter_context(changed(trials, run_trials=told))
         stack.enter_context(changed(demo, record_hold=lambda seed: hold(seed, 100)))
+        stack.enter_context(changed(report, stated=lambda engines: stated(engines) | MACHINE))
+        stack.enter_context(changed(run, _fingerprint=lambda *_: "fingerprint"))
         found = shown.called(COMMANDS)
         return found | {path.name: recorded.text(path.read_text(encoding="utf-8")) for path in Path().rglob("*.json")}
 
@@ -291,7 +298,7 @@ def referee() -> dict[str, Any]:
             Verdict(each.name, engine, "fails", (20.0 + i) * truth.allowed, *about, 2e-4, None, path=path),
             Verdict(each.name, engine, "-", None, *about, None, None, "no words"),
         ][i % 4 : i % 4 + 1]
-    run = {"date": "today", "machine": "a machine", "versions": {"a": "1"}, "settings": {"A": "default"}}
+    run = MACHINE | {"settings": {"A": "default"}}
     places = np.random.default_rng(0).normal(size=(20, 3))
     with tempfile.TemporaryDirectory() as folder:
         for name in ("push", "ramp", "in_hand", "anisotropic"):

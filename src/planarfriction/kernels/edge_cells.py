@@ -109,20 +109,24 @@ def covered_part(outline: Doubles, corners: int, x: float, y: float, radius: flo
     ax, ay = outline[2 * corners - 2] - x, outline[2 * corners - 1] - y
     for k in range(corners):
         bx, by = outline[2 * k] - x, outline[2 * k + 1] - y
-        ex, ey = bx - ax, by - ay
-        along, length, enters, leaves = ax * ex + ay * ey, ex * ex + ey * ey, 1.0, 1.0
-        inside = along * along - length * (ax * ax + ay * ay - radius * radius)
+        length = math.hypot(bx - ax, by - ay)
+        ux, uy = (bx - ax) / length, (by - ay) / length
+        start, end = ax * ux + ay * uy, bx * ux + by * uy
+        # Places along the side count from its foot, and its distance from the nearer corner: corners may be far away.
+        distance = ax * uy - ay * ux if abs(start) < abs(end) else bx * uy - by * ux
+        enters, leaves, inside = end, end, radius * radius - distance * distance
         if inside > 0.0:
             root = math.sqrt(inside)
-            enters = xp.minimum(xp.maximum(-(along + root) / length, 0.0), 1.0)
-            leaves = xp.minimum(xp.maximum((root - along) / length, 0.0), 1.0)
-        px, py, qx, qy = ax + enters * ex, ay + enters * ey, ax + leaves * ex, ay + leaves * ey
-        if enters > 0.0:
+            enters = xp.minimum(xp.maximum(-root, start), end)
+            leaves = xp.minimum(xp.maximum(root, start), end)
+        px, py = distance * uy + enters * ux, enters * uy - distance * ux
+        qx, qy = distance * uy + leaves * ux, leaves * uy - distance * ux
+        if enters > start:
             part, sx, sy = _sector(ax, ay, px, py, radius)
             area, mx, my = area + part, mx + sx, my + sy
-        part = 0.5 * (px * qy - py * qx)
+        part = 0.5 * distance * (leaves - enters)
         area, mx, my = area + part, mx + part * (px + qx) / 3.0, my + part * (py + qy) / 3.0
-        if leaves < 1.0:
+        if leaves < end:
             part, sx, sy = _sector(qx, qy, bx, by, radius)
             area, mx, my = area + part, mx + sx, my + sy
         ax, ay = bx, by

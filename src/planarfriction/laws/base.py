@@ -139,7 +139,7 @@ def refuse_creep(law: Any, by: str) -> None:
     if not isinstance(law, FrictionLaw):
         raise InvalidValueError("law", "be a friction law of bristles, such as LuGre", law)
     if not law.holds_at_rest:
-        raise InvalidValueError("law", f"have no creep_speed for {by} (DistributedModel takes any law)", law)
+        raise InvalidValueError("law", f"have no creep_speed for {by}: take LuGre or Dahl", law)
 
 
 def is_rate_law(law: Any) -> bool:

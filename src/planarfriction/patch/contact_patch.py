@@ -39,7 +39,8 @@ class ContactPatch(Moments):
 
     Make patches with the class methods (`disc`, `rectangle`, `ring`, `line`, `polygon`, `points`, `from_pressure`).
     Their `pressure` is a law (`Uniform`, `LinearGradient`, `SoftFinger`), a function `p(x, y)` of two floats [m], one
-    number per cell, or None for uniform; it is evaluated at the positions of the cells.
+    number per cell, or None for uniform; it is evaluated at the positions of the cells, and constant in each. The
+    centre of a continuous pressure `1 + g x` is `g h^2/12` farther in x than that of its cells, of side h.
 
     `normal_force` [N] may be left out where the shape does not depend on it. Its shape `[...]` leads that of the
     result. A patch whose shape depends on the load has weights 0, and moments 0, at zero load.

@@ -19,7 +19,8 @@ from planarfriction import validation
 from planarfriction.equality import Checked, checked
 from planarfriction.errors import FileError, FrictionError, InvalidValueError, shown
 from planarfriction.patch.grid import MOST_CELLS
-from planarfriction.reading import number, read_bytes, read_rows, read_text
+from planarfriction.patch.map_kinds import refuse_named, refuse_other_tables, remark_offset, rim_of
+from planarfriction.reading import number, read_bytes, read_rows, read_text, width
 
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".pgm", ".jpg", ".jpeg")
 """Suffixes of the files that are read as grey images."""
@@ -38,6 +39,9 @@ BRIGHT, PAPER, INK = 0.75, 0.9, 0.5
 """Brightness over the largest from which a pixel may be paper, share of such pixels along the rim of an image from
 which it may be a print, and brightness below which a pixel inside is ink."""
 
+ARRAYS = (".npy", ".npz", ".mat")
+"""Suffixes of the files of arrays."""
+
 FEWEST_LABELS = 3
 """Number of consecutive integers from which a row or column may be labels in place of pressures."""
 
@@ -53,8 +57,9 @@ class MapReading(Checked):
     """True: the first row of a CSV file has names, False: pressures; None: names if none of them is a number, or if
     they are 0, 1, 2 ... behind an empty cell."""
     index: bool | None = checked(validation.instance, bool, "True or False", default=None)
-    """True: the first column of a CSV file has labels, False: pressures; None: labels if the header is empty there, or
-    if none of them is a number."""
+    """True: the first column of a table has labels or times, False: pressures; None: labels if the header is empty
+    there, if none of them is a number, or if they ascend and frames of `frame_shape` fill the rows only without them.
+    """
     frame_shape: Any = None
     """Rows and columns of a frame, where a file has one frame per row, or frames one below another."""
     frame: int | None = checked(validation.count, 0, default=None)
@@ -88,6 +93,17 @@ class MapReading(Checked):
         place = self.place(what, len(values) if several else 1)
         return values[place] if several else values  # pyright: ignore[reportReturnType]
 
+    def labelled(self, columns: int, first: Any) -> bool:
+        """Return True if the `first` of some columns holds no pressures.
+
+        `index` says so, or else it ascends, or has names, and frames of `frame_shape` fill the rows only without it.
+        """
+        if self.index is not None or self.frame_shape is None:
+            return bool(self.index)
+        cells = math.prod(self.frame_shape)
+        fits = [count > 0 and (count % cells == 0 or count == self.frame_shape[1]) for count in (columns, columns - 1)]
+        return fits == [False, True] and _ascends(first)
+
     def place(self, what: str, count: int) -> int:
         """Return the index of the frame among `count`. Raises InvalidValueError if there is none, or several."""
         if self.frame is None and count == 1:
@@ -107,7 +123,7 @@ class MapReading(Checked):
             text = "its rim is bright, its inside dark: ink on paper (invert = true) or pressure (invert = false)?"
             raise FileError(f"{what}: {text}")
         if self.invert:
-            paper = np.median(_rim(values)) if _is_print(values) else values.max()
+            paper = np.median(rim_of(values)) if _is_print(values) else values.max()
             values = np.maximum(paper - values, 0.0)
         lossy = kind in (".jpg", ".jpeg")
         share = self.threshold if self.threshold is not None else RINGING if lossy else 0.0
@@ -148,9 +164,16 @@ def read_pressure_map(path: str | Path, **options: Any) -> np.ndarray:
     try:
         with np.errstate(all="ignore"):  # what is no number, or too large for a float, no patch takes
             values = readers[kind](path, reading)
+            if kind in ARRAYS and values.ndim == 2 and reading.labelled(values.shape[1], values[:, 0]):
+                values = values[:, 1:]
+            if kind not in IMAGE_SUFFIXES and reading.frame_shape is None and getattr(values, "ndim", 0) == 2:
+                refuse_other_tables(what, values, reading.index)
             values = values if kind in IMAGE_SUFFIXES else reading.frame_of(what, values)
             _check_size(path, values.size)
-            return reading.pressures(what, values, kind)
+            values = reading.pressures(what, values, kind)
+            if reading.threshold is None and not reading.invert:
+                remark_offset(what, values)
+            return values
     except (FrictionError, UserWarning):
         raise
     # Pillow reports a broken PNG as SyntaxError, and other things as what they are in its own code.
@@ -166,6 +189,7 @@ def _read_csv(path: Path, reading: MapReading) -> np.ndarray | list[np.ndarray]:
     """Read a table, or as many frames as blank lines or repeated headers part."""
     what, rows = f"pressure map {path}", read_rows(path, "a pressure map")
     line, names = next(rows, (0, []))
+    names = names[: width(names)]
     if names and names[0].startswith("DATA_TYPE"):
         return _read_tekscan(path, reading)
     corner = bool(names) and _is_name(names[0]) and _are_labels(names[1:])
@@ -174,7 +198,8 @@ def _read_csv(path: Path, reading: MapReading) -> np.ndarray | list[np.ndarray]:
         raise FileError(_ambiguous(what, "row", names, "header"))
     rows = rows if header or not names else itertools.chain([(line, names)], rows)
     first, values, blocks, last = [], array("d"), [0], None
-    for line, cells in rows:
+    for line, row in rows:
+        cells = row if len(row) == len(names) else row[: width(row)]
         if (header and cells == names) or (last is not None and line != last + 1):
             blocks.append(0)
         last = line
@@ -190,8 +215,10 @@ def _read_csv(path: Path, reading: MapReading) -> np.ndarray | list[np.ndarray]:
     if not first:
         raise FileError(f"{what}: the file holds no numbers")
     table, labels = np.array(values).reshape(len(first), -1), [cell for _, cell in first]
-    index = reading.index
-    if index is None:
+    index = reading.labelled(len(names), labels)
+    if reading.frame_shape is None and header and reading.index is None:
+        refuse_named(what, names)
+    if not index and reading.index is None:
         index = corner or (header and names[0] in ("", "index", "Unnamed: 0")) or all(map(_is_name, labels))
         if not index and len(names) > 1 and len(labels) >= FEWEST_LABELS and _are_labels(labels):
             raise FileError(_ambiguous(what, "column", labels, "index"))
@@ -229,6 +256,14 @@ def _is_name(cell: str) -> bool:
 def _are_labels(cells: Sequence[str]) -> bool:
     """Return True if cells are consecutive integers from 0 or 1."""
     return any(list(cells) == [str(first + i) for i in range(len(cells))] for first in (0, 1)) and len(cells) > 0
+
+
+def _ascends(cells: Any) -> bool:
+    """Return True if cells are numbers that ascend, as times do, or are no numbers."""
+    try:
+        return bool((np.diff(np.array(cells, float)) > 0.0).all())
+    except ValueError:
+        return True
 
 
 def _read_tekscan(path: Path, _: MapReading) -> np.ndarray:
@@ -323,14 +358,10 @@ def _read_image(path: Path, reading: MapReading) -> np.ndarray:
     return red
 
 
-def _rim(values: np.ndarray) -> np.ndarray:
-    return np.concatenate([values[0], values[-1], values[:, 0], values[:, -1]])
-
-
 def _is_print(values: np.ndarray) -> bool:
     """Return True if the rim of an image is bright and some of its inside dark, as of dark on paper."""
     peak = values.max()
-    return bool(np.mean(_rim(values) >= BRIGHT * peak) >= PAPER and (values < INK * peak).any())
+    return bool(np.mean(rim_of(values) >= BRIGHT * peak) >= PAPER and (values < INK * peak).any())
 
 
 def _check_size(path: Path, cells: int) -> None:

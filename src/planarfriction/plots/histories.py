@@ -81,11 +81,13 @@ def plot_histories(
     Raises InvalidValueError for what is not a solution, and for unknown panels, a wrong size or wrong axes.
     """
     known = as_runs(solutions)
+    chosen = validation.choices("panels", [*_PANELS] if panels is None else panels, _PANELS)
+    if not chosen:
+        raise InvalidValueError("panels", f"name at least one of {', '.join(_PANELS)}", panels)
     if axes is not None:
         drawn = list(np.ravel(np.asarray(axes, dtype=object)))
         for each in drawn:
             style.check_axes("axes", each, size)
-        chosen = validation.choices("panels", [*_PANELS] if panels is None else panels, _PANELS)
         if len(drawn) != len(chosen):
             raise InvalidValueError("axes", f"be one for each of {len(chosen)} panels", f"{len(drawn)}")
         _draw_panels(drawn, chosen, known)
@@ -94,7 +96,6 @@ def plot_histories(
         figure = style.new_figure(9.6, 8.0, size)
         draw_histories(figure, known)
         return figure
-    chosen = validation.choices("panels", panels, _PANELS)
     figure = style.new_figure(5.6, 1.0 + 1.8 * len(chosen), size)
     column = list(figure.subplots(len(chosen), sharex=True, squeeze=False)[:, 0])
     _draw_panels(column, chosen, known)

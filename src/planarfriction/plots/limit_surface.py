@@ -9,7 +9,7 @@ from matplotlib import colormaps
 
 import planarfriction as pf
 from planarfriction import geometry, validation
-from planarfriction.errors import InvalidValueError, needing
+from planarfriction.errors import needing
 from planarfriction.families import SURFACES
 from planarfriction.plots import style
 
@@ -54,9 +54,7 @@ def plot_limit_surface(
     Raises InvalidValueError unless both are limit surfaces, and for a wrong size or axes.
     """
     if ax is not None:
-        style.check_axes("ax", ax, size)
-        if not hasattr(ax, "plot_surface"):
-            raise InvalidValueError("ax", 'have three dimensions (projection="3d")', ax)
+        style.check_axes("ax", ax, size, three=True)
         beside = None
     names, scaled, limit = _sampled(surface, beside)
     figure = ax.figure if ax is not None else style.new_figure(4.4 * len(names), 4.3, size)

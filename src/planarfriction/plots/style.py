@@ -51,6 +51,9 @@ NARROW = 4.5
 WITHOUT_WINDOW = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
 """Backends of matplotlib that draw to files alone."""
 
+LARGEST_SIDE = 100.0
+"""Largest side of a figure [inch]: 12,000 dots, of which a square takes 0.6 GB."""
+
 
 class PlotFigure(Figure):
     """A matplotlib figure without pyplot that notebooks show by themselves."""
@@ -87,12 +90,14 @@ def new_figure(width: float, height: float, size: Any = None) -> PlotFigure:
 
     Letters larger than 10 pt, as on slides, enlarge the figure unless it has a `size`.
 
-    Raises InvalidValueError unless `size` is two numbers > 0.
+    Raises InvalidValueError unless `size` is two numbers > 0 and at most `LARGEST_SIDE`.
     """
     if size is None:
         width, height = (max(1.0, rcParams["font.size"] / 10.0) * each for each in (width, height))
     else:
         width, height = validation.positive_array("size", size, (2,))
+        if max(width, height) > LARGEST_SIDE:
+            raise InvalidValueError("size", f"be in inches, each side at most {LARGEST_SIDE:g}", size)
     return PlotFigure(figsize=(width, height), layout="constrained", dpi=120)
 
 
@@ -108,10 +113,16 @@ def place(ax: Any, width: float, height: float, size: Any) -> tuple[Any, Any]:
     return ax.figure, ax
 
 
-def check_axes(name: str, ax: Any, size: Any) -> None:
-    """Raise InvalidValueError unless `ax` are axes of matplotlib, whose figure has its size already."""
+def check_axes(name: str, ax: Any, size: Any, *, three: bool = False) -> None:
+    """Raise InvalidValueError unless `ax` are axes of matplotlib, whose figure has its size already.
+
+    They are those of a plane, or have `three` dimensions.
+    """
     if not isinstance(ax, Axes):
         raise InvalidValueError(name, "be axes of matplotlib", ax)
+    if (ax.name == "3d") != three:
+        rule = 'have three dimensions (projection="3d")' if three else "be those of a plane"
+        raise InvalidValueError(name, rule, ax)
     if size is not None:
         raise InvalidValueError("size", f"be left out with {name}: the figure has a size", size)
 
