@@ -1,4 +1,13 @@
-"""Places of patches in contact in a MuJoCo model, and the Jacobian of their twists."""
+"""Places of patches in contact in a MuJoCo model, and the Jacobian of their twists.
+
+MuJoCo takes free bodies along the tangent and hinges along their arc. What is held on anything that turns keeps its
+*place* if the twist of a step is the mean over the step, of the points that coincide where it begins: to second order
+
+    V = J v + dt/2 (dJ/dt v + w x (u - v_n n))
+
+at the speeds of the joints where the step begins. Where the bodies turn by w on each other, and so roll or rock, the
+contact moves on their surfaces: along the contact by u (see `centres`), and from it at the speed v_n at which they part.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +17,7 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call_c
 from planarfriction.compiler.memory import at, doubles, integers, integers32
+from planarfriction.formulas import turning_mean
 from planarfriction.kernels.coupling_rows import ALONG, FLAT
 from planarfriction.kernels.vectors import clear, dot, norm, plus, square, three, times
 
@@ -72,6 +82,12 @@ def column(matrix, i):
 
 
 @kernel
+def column_of(matrix, count, i):
+    """Return column i of a matrix of three rows of `count` numbers."""
+    return matrix[i], matrix[count + i], matrix[2 * count + i]
+
+
+@kernel
 def axes(s, p):
     """Return the axes of patch p: x, y, normal."""
     frame, x = three(at(s.frames, 6 * p)), three(at(s.axes, 3 * p))
@@ -107,17 +123,38 @@ def _put_axis(own, d, s, p, before, axis):
 
 
 @kernel
-def _add_drift(own, m, d, s, p, geom, sign):
-    """Add to the drift of patch p the twist of the surface of a geom relative to it."""
-    surface = at(doubles(integers(m + own.model.geom_surfacevel)[0]), 6 * geom)
+def _add_drift(own, m, d, s, p, geom, body, sign):
+    """Add to the drift of patch p the mean twist of the surface of a geom relative to its body, which turns too."""
+    surface, dt = at(doubles(integers(m + own.model.geom_surfacevel)[0]), 6 * geom), doubles(m + own.model.timestep)[0]
     turned = at(doubles(integers(d + own.data.geom_xmat)[0]), 9 * geom)
     away = plus(three(at(s.frames, 6 * p + 3)), -1.0, three(at(doubles(integers(d + own.data.geom_xpos)[0]), 3 * geom)))
     turn = turned_by(turned, three(at(surface, 3)))
     move = plus(turned_by(turned, three(surface)), 1.0, cross(turn, away))
+    spin = three(at(doubles(integers(d + own.data.cvel)[0]), 6 * body))
+    first, second = turning_mean(xp, dt * norm(turn))
+    across = cross(turn, move)
+    mean = plus(plus(move, dt * first, across), dt * dt * second, cross(turn, across))
+    mean, turn = plus(mean, dt, cross(spin, move)), plus(turn, 0.5 * dt, cross(spin, turn))
     x, y, normal = axes(s, p)
-    s.drift[3 * p] += sign * dot(x, move)
-    s.drift[3 * p + 1] += sign * dot(y, move)
+    s.drift[3 * p] += sign * dot(x, mean)
+    s.drift[3 * p + 1] += sign * dot(y, mean)
     s.drift[3 * p + 2] += sign * dot(normal, turn)
+
+
+@kernel
+def _add_turning(own, m, d, s, p, body, half):
+    """Add to the drift of patch p what a body gains in half a step, of `half` seconds, as its joints keep their speeds.
+
+    The time is negative for the body of the other surface.
+    """
+    call_c(own.functions.mj_jacDot, (m, d, s.moves, s.turns, at(s.frames, 6 * p + 3), body))
+    velocity, (x, y, normal) = doubles(integers(d + own.data.qvel)[0]), axes(s, p)
+    for i in range(own.nv):
+        gained = half * velocity[i]
+        move, turn = column_of(s.moves, own.nv, i), column_of(s.turns, own.nv, i)
+        s.drift[3 * p] += gained * dot(x, move)
+        s.drift[3 * p + 1] += gained * dot(y, move)
+        s.drift[3 * p + 2] += gained * dot(normal, turn)
 
 
 @kernel
@@ -159,10 +196,11 @@ def _rows(own, m, d, s, nefc, p, kept):
     _put_origin(own, d, s, p, normal, at(kept.held, 3 * p))
     _put_places(own, d, s, nefc, p, centre, x, y)
     if own.model.geom_surfacevel >= 0:
-        _add_drift(own, m, d, s, p, integers(own.own)[p], 1.0)
-        _add_drift(own, m, d, s, p, integers(own.other)[p], -1.0)
+        _add_drift(own, m, d, s, p, integers(own.own)[p], integers(own.owner)[p], 1.0)
+        _add_drift(own, m, d, s, p, integers(own.other)[p], integers(own.support)[p], -1.0)
     clear(rows, 3 * nv)
-    moves, turns, velocity, roll, rock = s.moves, s.turns, doubles(integers(d + own.data.qvel)[0]), 0.0, 0.0
+    velocity, half = doubles(integers(d + own.data.qvel)[0]), 0.5 * doubles(m + own.model.timestep)[0]
+    roll, rock, part = 0.0, 0.0, 0.0
     for side in range(2):
         body = integers(own.owner)[p] if side == 0 else integers(own.support)[p]
         if body == 0:
@@ -170,12 +208,15 @@ def _rows(own, m, d, s, nefc, p, kept):
         sign = 1.0 if side == 0 else -1.0
         call_c(own.functions.mj_jac, (m, d, s.moves, s.turns, centre, body))
         for i in range(nv):
-            move = moves[i], moves[nv + i], moves[2 * nv + i]
+            move, turn = column_of(s.moves, nv, i), column_of(s.turns, nv, i)
             rows[i] += sign * dot(x, move)
             rows[nv + i] += sign * dot(y, move)
-            turn = turns[i], turns[nv + i], turns[2 * nv + i]
             rows[2 * nv + i] += sign * dot(normal, turn)
-            roll, rock = roll + sign * dot(x, turn) * velocity[i], rock + sign * dot(y, turn) * velocity[i]
+            speed = sign * velocity[i]
+            roll, rock, part = roll + dot(x, turn) * speed, rock + dot(y, turn) * speed, part + dot(normal, move) * speed
+        _add_turning(own, m, d, s, p, body, sign * half)
+    s.drift[3 * p] -= half * part * rock
+    s.drift[3 * p + 1] += half * part * roll
     s.tilts[p] = math.sqrt(roll * roll + rock * rock)
 
 

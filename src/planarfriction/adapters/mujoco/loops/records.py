@@ -25,7 +25,7 @@ ModelOffsets = _integers(
 DataOffsets = _integers(
     "DataOffsets",
     "time ncon nefc contact efc_type efc_J efc_J_rownnz efc_J_rowadr efc_J_colind efc_D efc_R efc_frictionloss "
-    "efc_aref efc_state efc_force qvel qacc qacc_warmstart qfrc_passive qDeriv userdata site_xpos site_xmat "
+    "efc_aref efc_state efc_force cvel qvel qacc qacc_warmstart qfrc_passive qDeriv userdata site_xpos site_xmat "
     "geom_xpos geom_xmat",
 )
 """Offsets of `mjData`."""
@@ -39,7 +39,7 @@ ContactOffsets = _integers("ContactOffsets", "size dist pos frame H dim geom efc
 Functions = _integers(
     "Functions",
     "mj_markStack mj_freeStack mj_stackAllocNum mj_fwdActuation mj_fwdAcceleration mj_fwdConstraint "
-    "mj_constraintUpdate mj_fullM mj_jac mj_isSparse mjd_smooth_vel mjd_freeMhat",
+    "mj_constraintUpdate mj_fullM mj_jac mj_jacDot mj_isSparse mjd_smooth_vel mjd_freeMhat",
 )
 """Addresses of MuJoCo's functions; 0 for `mjd_freeMhat` in versions without it."""
 
@@ -147,7 +147,8 @@ class Scratch(NamedTuple):
     carried: Doubles
     """Cosine and sine of the angles from the x axes of the last step, carried along, to these, [k, 2]."""
     drift: Doubles
-    """Twists of the surfaces relative to the bodies (`surfacevel`), of the own body less those of the other, [3k]."""
+    """Part of the twists that no wrench of the step changes, of the own body less that of the other, [3k]: those of
+    their surfaces (`surfacevel`), and of the turning of both (see `geometry`)."""
     tilts: Doubles
     """Speeds at which the bodies roll or rock on each other [rad/s], [k]."""
     depths: Doubles
