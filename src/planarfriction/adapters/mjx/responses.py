@@ -17,6 +17,7 @@ from mujoco import mjx
 
 from planarfriction.adapters.mjx.newton import HostResponse
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
+from planarfriction.formulas import turning_mean
 from planarfriction.jax.namespace import xp
 from planarfriction.kernels.coupling_rows import ALONG, FLAT
 from planarfriction.tensors.pressure import centre_of
@@ -159,7 +160,9 @@ class Geometry(NamedTuple):
     carried: jax.Array
     """Cosine and sine of the angles from the x axes of the last step, carried along, to these, `[k, 2]`."""
     drift: jax.Array
-    """Twists of the surfaces relative to the bodies, of the own one less those of the other, `[k, 3]`."""
+    """Part of the twists that no wrench changes: of the surfaces and of what turns, own less other, `[k, 3]`."""
+    spin: jax.Array
+    """Spins where the step begins [rad/s] of patches that follow the contact, `[k]`; 0 of new ones."""
 
     def carry(self, p: int, vectors: jax.Array) -> jax.Array:
         """Return vectors of patch p, x and y in front, in its axes of this step instead of the last ones."""
@@ -169,6 +172,11 @@ class Geometry(NamedTuple):
     def centres(self, force: jax.Array) -> jax.Array:
         """Return the centres of pressure `[k, 2]` [m] of forces of constraints `[nefc]`."""
         return centre_of(xp, self.levers @ force, self.rows @ force)
+
+    def halfway(self, host: HostResponse, shift: jax.Array) -> HostResponse:
+        """Return the response where origins go on as they went, by `shift` `[k, 2]` [m], until the middle of the step."""
+        x, y = 0.5 * self.spin[:, None].T * shift.T
+        return host._replace(twist=host.twist + jnp.stack([-y, x, 0.0 * x], axis=1).ravel())
 
     def moved(self, shift: jax.Array) -> jax.Array:
         """Return origins `[k, 3]` that move by `[k, 2]` [m] in the patches, in the frames of the sites."""
@@ -204,33 +212,56 @@ def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Ar
         last, new = site + turned @ held, (held == 0.0).all()
         last = jnp.where(new, middle, last + normal * (normal @ (middle - last)))
         centre = jnp.where(place.at_contact, last, site)
-        moves, turns = (
-            own - other
-            for own, other in zip(mjx.jac(m, d, centre, place.owner), mjx.jac(m, d, centre, place.support), strict=True)
-        )
         y = jnp.cross(normal, x)
         carried = jnp.where(kept, jnp.stack([along @ x, -along @ y]), jnp.array([1.0, 0.0]))
-        drift = jnp.zeros(3)
-        for geom, surface, sign in zip((place.own, place.other), place.surface, (1.0, -1.0), strict=True):
-            frame = d.geom_xmat[geom].reshape(3, 3)
-            turn = frame @ surface[3:]
-            move = frame @ surface[:3] + jnp.cross(turn, centre - d.geom_xpos[geom])
-            drift += sign * jnp.stack([x @ move, y @ move, normal @ turn])
-        drift = jnp.where(touching, drift, 0.0)
+        sides = zip((place.owner, place.support), (place.own, place.other), place.surface, strict=True)
+        own, other = (_side(m, d, centre, *side) for side in sides)
+        moves, turns, mean, spin = jax.tree.map(jnp.subtract, own, other)
         jacobian, away = jnp.stack([moves @ x, moves @ y, turns @ normal]), contact.pos - centre
         own = jnp.where(chosen, jnp.stack([jnp.ones(len(away)), away @ y, -away @ x]), 0.0)
-        tilt, slip = (turns @ jnp.stack([x, y]).T).T @ d.qvel, jacobian[:2] @ d.qvel + drift[:2]
-        rolled, slid = xp.norm(tilt, -1)[0], xp.norm(slip, -1)[0]
+        tilt, part = (turns @ jnp.stack([x, y]).T).T @ d.qvel, (moves @ normal) @ d.qvel
+        rock = 0.5 * m.opt.timestep * part * jnp.stack([-tilt[1], tilt[0]])
+        drift = jnp.stack([x @ mean + rock[0], y @ mean + rock[1], normal @ spin])
+        twist = jacobian @ d.qvel + drift
+        rolled, slid = xp.norm(tilt, -1)[0], xp.norm(twist[:2], -1)[0]
         rolled += jnp.where(place.radius > 0.0, slid / place.radius, 0.0)
         share = jnp.where(new, 1.0, jnp.minimum(1.0, m.opt.timestep * rolled / FOLLOWS))
         share = jnp.where(touching & place.at_contact, share, 0.0)
         axes = jnp.where(touching, jnp.stack([x, y, normal]) @ turned, before)
         place_of = turned.T @ (centre - site)
-        return jnp.where(touching, jacobian, 0.0), own, touching, place_of, axes, share, carried, drift
+        drift, spin = jnp.where(touching, drift, 0.0), jnp.where(new | ~touching, 0.0, twist[2])
+        return jnp.where(touching, jacobian, 0.0), own, touching, place_of, axes, share, carried, drift, spin
 
     jacobian, own, *others = jax.vmap(one)(jax.tree.map(jnp.asarray, where), held, before)
     rows = jnp.zeros((len(where.site), 3, d._impl.efc_J.shape[0])).at[:, :, contact.efc_address].set(own)
     return Geometry(jacobian.reshape(-1, m.nv), rows[:, 0], rows[:, 1:], *others)
+
+
+class _Side(NamedTuple):
+    """Motion of the surface of a body at a point."""
+
+    moves: jax.Array
+    """Jacobians of the point and of the body `[nv, 3]`."""
+    turns: jax.Array
+    drift: jax.Array
+    """Mean twist over the step less what Jacobians tell: velocity and spin `[3]` each (see `loops.geometry`)."""
+    drift_spin: jax.Array
+
+
+def _side(m: Any, d: Any, point: jax.Array, body: Any, geom: Any, surface: jax.Array) -> _Side:
+    """Return the motion of the surface of a geom, which has a velocity [6] of its own in its frame."""
+    dt, frame = m.opt.timestep, d.geom_xmat[geom].reshape(3, 3)
+    moves, turns = mjx.jac(m, d, point, body)
+    # by the axes that are turned, in place of the axes: the accelerations of joints that keep their speeds
+    gains = mjx.jac(m, d.replace(cdof=d.cdof_dot), point, body)
+    velocity, spin, gained, gained_spin = (d.qvel @ each for each in (moves, turns, *gains))
+    turn = frame @ surface[3:]
+    move = frame @ surface[:3] + jnp.cross(turn, point - d.geom_xpos[geom])
+    first, second = turning_mean(jnp, dt * xp.norm(surface[3:], -1)[0])
+    across = jnp.cross(turn, move)
+    drift = move + dt * first * across + dt**2 * second * jnp.cross(turn, across) + dt * jnp.cross(spin, move)
+    drift += 0.5 * dt * (gained + jnp.cross(spin, velocity))
+    return _Side(moves, turns, drift, turn + 0.5 * dt * (gained_spin + jnp.cross(spin, turn)))
 
 
 def _unit(vector: jax.Array, given: jax.Array) -> jax.Array:
