@@ -235,9 +235,8 @@ class Friction:
         centre = where.centres(answer.forces(d, guess))  # that of the search, with its derivatives
         shift, pressed = self._pressed(own, where, found.centre + centre - jax.lax.stop_gradient(centre))
         unit = self._unit(own, pressed, shift, states, dt)
-        host = where.halfway(answer.host, shift)
-        wrench = newton.fitting(unit, host, found.wrench)
-        twist, load = host.twists(wrench), host.loads(wrench)
+        wrench = newton.fitting(unit, answer.host, found.wrench)
+        twist, load = answer.host.twists(wrench), answer.host.loads(wrench)
         new, _ = self._evaluate(own, pressed, shift, states, twist, load, dt)
         d = self._integrated(m, d, where.jacobian, wrench, answer)
         kept = {"state": begun, "after": new, "guess": guess, "load": load, "held": held, "centre": where.moved(shift)}
@@ -285,7 +284,7 @@ class Friction:
             centre = jnp.where(last.passes == 0, where.centres(answer.forces(d, last.wrench)), last.centre)
             shift, pressed = self._pressed(own, where, centre)
             unit = self._unit(own, pressed, shift, states, dt)
-            solved = newton.solve(unit, where.halfway(answer.host, shift), last.wrench, radius, TOLERANCE, ITERATIONS)
+            solved = newton.solve(unit, answer.host, last.wrench, radius, TOLERANCE, ITERATIONS)
             acceleration = answer.acceleration(solved.wrench)
             slack = responses.slack(d, active, responses.active_at(d, acceleration), acceleration, dt)
             iterations, passes = last.iterations + solved.iterations, last.passes + 1

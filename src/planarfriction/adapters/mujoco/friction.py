@@ -282,7 +282,7 @@ class Friction:
         return row_of(host)
 
 
-_COLUMNS = "site", "own", "other", "owner", "support", "pair", "at_contact", "has_faces", "on_box"
+_COLUMNS = "site", "own", "other", "owner", "support", "pair", "at_contact", "has_faces", "carrier", "on_box"
 """Attributes of `Placed` that compiled steps read, and fields of `Host` with their addresses."""
 
 _ALONE = "mj_step has none by itself; call friction.step(d) instead, or mj_step within friction.install()"

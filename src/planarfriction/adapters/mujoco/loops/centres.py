@@ -43,17 +43,13 @@ def _centre(d, own, s, nefc, p):
 
 @kernel
 def _share(own, d, s, p, radius, dt):
-    """Return the share of the displacement to the centre that patch p, of a lever arm `radius`, takes in this step.
-
-    Return the spin of its bodies on each other too.
-    """
+    """Return the share of the displacement to the centre that patch p, of a lever arm `radius`, takes in this step."""
     velocity, rows = doubles(integers(d + own.data.qvel)[0]), at(s.jacobian, 3 * own.nv * p)
-    vx, vy, spin = s.drift[3 * p], s.drift[3 * p + 1], s.drift[3 * p + 2]
+    vx, vy = s.drift[3 * p], s.drift[3 * p + 1]
     for i in range(own.nv):
         vx, vy = vx + rows[i] * velocity[i], vy + rows[own.nv + i] * velocity[i]
-        spin += rows[2 * own.nv + i] * velocity[i]
     slid = math.sqrt(vx * vx + vy * vy) / radius if radius > 0.0 else 0.0
-    return xp.minimum(1.0, dt * (s.tilts[p] + slid) / FOLLOWS), spin
+    return xp.minimum(1.0, dt * (s.tilts[p] + slid) / FOLLOWS)
 
 
 @kernel
@@ -155,11 +151,8 @@ def follow_centres(own, m, d, s, nefc, radius, problem, kept):
         guess = at(problem.guess, 3 * p)
         if integers(own.at_contact)[p] != 0:
             lever = scale_of(own, m, p) * radius[p]
-            share, spin = (1.0, 0.0) if square(three(held)) == 0.0 else _share(own, d, s, p, lever, dt)
+            share = 1.0 if square(three(held)) == 0.0 else _share(own, d, s, p, lever, dt)
             _move(own, s, nefc, p, guess, share * x, share * y)
-            # it goes on as it went, and by half of that until the middle of the step
-            s.drift[3 * p] -= 0.5 * spin * share * y
-            s.drift[3 * p + 1] += 0.5 * spin * share * x
             turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
             place = three(at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site))
             away = plus(three(at(s.frames, 6 * p + 3)), -1.0, place)

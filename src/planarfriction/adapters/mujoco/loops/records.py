@@ -25,7 +25,7 @@ ModelOffsets = _integers(
 DataOffsets = _integers(
     "DataOffsets",
     "time ncon nefc contact efc_type efc_J efc_J_rownnz efc_J_rowadr efc_J_colind efc_D efc_R efc_frictionloss "
-    "efc_aref efc_state efc_force cvel qvel qacc qacc_warmstart qfrc_passive qDeriv userdata site_xpos site_xmat "
+    "efc_aref efc_state efc_force qvel qacc qacc_warmstart qfrc_passive qDeriv userdata site_xpos site_xmat "
     "geom_xpos geom_xmat",
 )
 """Offsets of `mjData`."""
@@ -39,14 +39,14 @@ ContactOffsets = _integers("ContactOffsets", "size dist pos frame H dim geom efc
 Functions = _integers(
     "Functions",
     "mj_markStack mj_freeStack mj_stackAllocNum mj_fwdActuation mj_fwdAcceleration mj_fwdConstraint "
-    "mj_constraintUpdate mj_fullM mj_jac mj_jacDot mj_isSparse mjd_smooth_vel mjd_freeMhat",
+    "mj_constraintUpdate mj_fullM mj_jac mj_jacDot mj_objectVelocity mj_isSparse mjd_smooth_vel mjd_freeMhat",
 )
 """Addresses of MuJoCo's functions; 0 for `mjd_freeMhat` in versions without it."""
 
 Constants = _integers(
     "Constants",
     "SATISFIED QUADRATIC LINEARNEG LINEARPOS CONE EQUALITY FRICTION_DOF FRICTION_TENDON ELLIPTIC EULER IMPLICIT "
-    "IMPLICITFAST NO_EULERDAMP NO_REFSAFE SLEEP",
+    "IMPLICITFAST NO_EULERDAMP NO_REFSAFE SLEEP GEOM",
 )
 """Values of MuJoCo's enumerations."""
 
@@ -213,6 +213,8 @@ class Host(NamedTuple):
     """Address of flags: 1 where the origin is at the centre of the contact forces."""
     has_faces: int
     """Address of flags: 1 where a side of the geom on the site's body, and an axis on it, can be told from others."""
+    carrier: int
+    """Address of the geoms along with which the patches go over the others."""
     on_box: int
     """Address of flags: 1 where the other geom is a box, whose faces bear patches as far as they go."""
     extents: int
