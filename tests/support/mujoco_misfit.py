@@ -19,25 +19,30 @@ def twists_and_loads(friction, d, before) -> tuple[np.ndarray, np.ndarray]:
             continue
         centre, axes = friction.frame(d, p)
         loads[p] = d.efc_force[d.contact.efc_address[chosen]].sum()
-        # origins that follow the contact go on as they went in the plane of the contact, until the middle of the step
+        # origins that follow the contact moved in its plane after velocities were known
         held, now = (d.userdata[first + 3 * p :][:3] for first in (at.held, at.centre))
         went = d.site_xmat[placed.site].reshape(3, 3) @ (now - held) if held.any() else np.zeros(3)
+        shift = friction.parameters(m)
+        went += shift["centre_x"][p] * axes[0] + shift["centre_y"][p] * axes[1]
         went -= (axes[2] @ went) * axes[2]
-        begin, velocity, spin, gain = centre - went, np.zeros(3), np.zeros(3), np.zeros(3)
-        for side, body in zip((-1.0, 1.0), (placed.support, placed.owner), strict=True):
+        begin, velocities, spins, gain = centre - went, [], [], np.zeros(3)
+        for side, body in zip((1.0, -1.0), (placed.owner, placed.support), strict=True):
             moves, turns, gains, gained = np.zeros((4, 3, m.nv))
             mujoco.mj_jac(m, d, moves, turns, centre, body)
             twists[p] += side * np.array([*(axes[:2] @ moves @ d.qvel), axes[2] @ turns @ d.qvel])
             mujoco.mj_jac(m, d, moves, None, begin, body)
             mujoco.mj_jacDot(m, d, gains, gained, begin, body)
-            velocity, spin = velocity + side * moves @ before, spin + side * turns @ before
-            gain[:2] += side * axes[:2] @ gains @ before
-            gain[2] += side * axes[2] @ gained @ before
-        tilt = spin - (axes[2] @ spin) * axes[2]
-        gain[:2] -= axes[:2] @ np.cross(tilt, (axes[2] @ velocity) * axes[2])
-        gain[:2] += axes[:2] @ np.cross(gain[2] * axes[2], went)
+            velocities.append(moves @ before)
+            spins.append(turns @ before)
+            gain += side * np.array([*(axes[:2] @ gains @ before), axes[2] @ gained @ before])
+        # the contact goes along with the smaller geom: over its surface, and away from it
+        goes = 0 if placed.carrier == placed.own else 1
+        body, spin = (placed.owner, placed.support)[goes], spins[0] - spins[1]
+        mujoco.mj_jac(m, d, moves, None, d.geom_xpos[placed.carrier], body)
+        over = velocities[goes] - moves @ before
+        over += (axes[2] @ (velocities[goes] - velocities[1 - goes] - over)) * axes[2]
+        gain[:2] += axes[:2] @ (np.cross(gain[2] * axes[2], went) - np.cross(spin, over))
         twists[p] += 0.5 * dt * gain
-        twists[p, :2] += 0.5 * (axes[2] @ spin) * (axes[:2] @ np.cross(axes[2], went))
     return twists, loads
 
 

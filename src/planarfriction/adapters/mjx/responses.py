@@ -134,6 +134,8 @@ class PatchPlaces(NamedTuple):
     support: Any
     at_contact: Any
     """True where the origin follows the contact forces."""
+    carrier: Any
+    """The geom along with which the patch goes over the other."""
     radius: Any
     """Lever arms of the patches [m]."""
     surface: Any
@@ -161,8 +163,6 @@ class Geometry(NamedTuple):
     """Cosine and sine of the angles from the x axes of the last step, carried along, to these, `[k, 2]`."""
     drift: jax.Array
     """Part of the twists that no wrench changes: of the surfaces and of what turns, own less other, `[k, 3]`."""
-    spin: jax.Array
-    """Spins where the step begins [rad/s] of patches that follow the contact, `[k]`; 0 of new ones."""
 
     def carry(self, p: int, vectors: jax.Array) -> jax.Array:
         """Return vectors of patch p, x and y in front, in its axes of this step instead of the last ones."""
@@ -172,11 +172,6 @@ class Geometry(NamedTuple):
     def centres(self, force: jax.Array) -> jax.Array:
         """Return the centres of pressure `[k, 2]` [m] of forces of constraints `[nefc]`."""
         return centre_of(xp, self.levers @ force, self.rows @ force)
-
-    def halfway(self, host: HostResponse, shift: jax.Array) -> HostResponse:
-        """Return the response where origins go on as they went, by `shift` `[k, 2]` [m], until the middle of the step."""
-        x, y = 0.5 * self.spin[:, None].T * shift.T
-        return host._replace(twist=host.twist + jnp.stack([-y, x, 0.0 * x], axis=1).ravel())
 
     def moved(self, shift: jax.Array) -> jax.Array:
         """Return origins `[k, 3]` that move by `[k, 2]` [m] in the patches, in the frames of the sites."""
@@ -216,21 +211,21 @@ def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Ar
         carried = jnp.where(kept, jnp.stack([along @ x, -along @ y]), jnp.array([1.0, 0.0]))
         sides = zip((place.owner, place.support), (place.own, place.other), place.surface, strict=True)
         own, other = (_side(m, d, centre, *side) for side in sides)
-        moves, turns, mean, spin = jax.tree.map(jnp.subtract, own, other)
+        moves, turns, drift, drift_spin, part, spin, _ = jax.tree.map(jnp.subtract, own, other)
+        goes, across = place.carrier == place.own, jnp.where(touching, jnp.stack([x, y]), 0.0)
+        over = jnp.where(goes, own.over, other.over)
+        over += (jnp.where(goes, 1.0, -1.0) * (part @ normal) - over @ normal) * normal
+        drift += 0.5 * m.opt.timestep * jnp.cross(over, spin)
+        drift = jnp.append(across @ drift, jnp.where(touching, normal @ drift_spin, 0.0))
         jacobian, away = jnp.stack([moves @ x, moves @ y, turns @ normal]), contact.pos - centre
         own = jnp.where(chosen, jnp.stack([jnp.ones(len(away)), away @ y, -away @ x]), 0.0)
-        tilt, part = (turns @ jnp.stack([x, y]).T).T @ d.qvel, (moves @ normal) @ d.qvel
-        rock = 0.5 * m.opt.timestep * part * jnp.stack([-tilt[1], tilt[0]])
-        drift = jnp.stack([x @ mean + rock[0], y @ mean + rock[1], normal @ spin])
-        twist = jacobian @ d.qvel + drift
-        rolled, slid = xp.norm(tilt, -1)[0], xp.norm(twist[:2], -1)[0]
+        rolled, slid = xp.norm(across @ spin, -1)[0], xp.norm(jacobian[:2] @ d.qvel + drift[:2], -1)[0]
         rolled += jnp.where(place.radius > 0.0, slid / place.radius, 0.0)
         share = jnp.where(new, 1.0, jnp.minimum(1.0, m.opt.timestep * rolled / FOLLOWS))
         share = jnp.where(touching & place.at_contact, share, 0.0)
         axes = jnp.where(touching, jnp.stack([x, y, normal]) @ turned, before)
         place_of = turned.T @ (centre - site)
-        drift, spin = jnp.where(touching, drift, 0.0), jnp.where(new | ~touching, 0.0, twist[2])
-        return jnp.where(touching, jacobian, 0.0), own, touching, place_of, axes, share, carried, drift, spin
+        return jnp.where(touching, jacobian, 0.0), own, touching, place_of, axes, share, carried, drift
 
     jacobian, own, *others = jax.vmap(one)(jax.tree.map(jnp.asarray, where), held, before)
     rows = jnp.zeros((len(where.site), 3, d._impl.efc_J.shape[0])).at[:, :, contact.efc_address].set(own)
@@ -244,24 +239,30 @@ class _Side(NamedTuple):
     """Jacobians of the point and of the body `[nv, 3]`."""
     turns: jax.Array
     drift: jax.Array
-    """Mean twist over the step less what Jacobians tell: velocity and spin `[3]` each (see `loops.geometry`)."""
+    """Velocity and spin `[3]` that no wrench changes: of the surface on the body, and half of what both gain."""
     drift_spin: jax.Array
+    velocity: jax.Array
+    """Velocity and spin `[3]` of the surface where the step begins."""
+    spin: jax.Array
+    over: jax.Array
+    """This velocity less that of the centre of the geom `[3]`."""
 
 
 def _side(m: Any, d: Any, point: jax.Array, body: Any, geom: Any, surface: jax.Array) -> _Side:
-    """Return the motion of the surface of a geom, which has a velocity [6] of its own in its frame."""
-    dt, frame = m.opt.timestep, d.geom_xmat[geom].reshape(3, 3)
+    """Return the motion of the surface of a geom, which has a velocity [6] of its own (see `loops.geometry`)."""
+    dt, frame, away = m.opt.timestep, d.geom_xmat[geom].reshape(3, 3), point - d.geom_xpos[geom]
     moves, turns = mjx.jac(m, d, point, body)
-    # by the axes that are turned, in place of the axes: the accelerations of joints that keep their speeds
+    # by changes of the axes in place of the axes: spatial accelerations of joints that keep their speeds
     gains = mjx.jac(m, d.replace(cdof=d.cdof_dot), point, body)
-    velocity, spin, gained, gained_spin = (d.qvel @ each for each in (moves, turns, *gains))
+    velocity, spin, gain, gained = (d.qvel @ each for each in (moves, turns, *gains))
     turn = frame @ surface[3:]
-    move = frame @ surface[:3] + jnp.cross(turn, point - d.geom_xpos[geom])
+    move = frame @ surface[:3] + jnp.cross(turn, away)
     first, second = turning_mean(jnp, dt * xp.norm(surface[3:], -1)[0])
     across = jnp.cross(turn, move)
-    drift = move + dt * first * across + dt**2 * second * jnp.cross(turn, across) + dt * jnp.cross(spin, move)
-    drift += 0.5 * dt * (gained + jnp.cross(spin, velocity))
-    return _Side(moves, turns, drift, turn + 0.5 * dt * (gained_spin + jnp.cross(spin, turn)))
+    mean = move + dt * first * across + dt**2 * second * jnp.cross(turn, across) + dt * jnp.cross(spin, move)
+    drift = mean + 0.5 * dt * (gain + jnp.cross(spin, velocity))
+    drift_spin = turn + 0.5 * dt * (gained + jnp.cross(spin, turn))
+    return _Side(moves, turns, drift, drift_spin, velocity + move, spin + turn, move + jnp.cross(spin, away))
 
 
 def _unit(vector: jax.Array, given: jax.Array) -> jax.Array:
