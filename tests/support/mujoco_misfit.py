@@ -22,7 +22,7 @@ def twists_and_loads(friction, d, before) -> tuple[np.ndarray, np.ndarray]:
         # origins that follow the contact moved in its plane after velocities were known
         held, now = (d.userdata[first + 3 * p :][:3] for first in (at.held, at.centre))
         went = d.site_xmat[placed.site].reshape(3, 3) @ (now - held) if held.any() else np.zeros(3)
-        shift = friction.parameters(m)
+        shift = friction.parameters(d.model)
         went += shift["centre_x"][p] * axes[0] + shift["centre_y"][p] * axes[1]
         went -= (axes[2] @ went) * axes[2]
         begin, velocities, spins, gain = centre - went, [], [], np.zeros(3)

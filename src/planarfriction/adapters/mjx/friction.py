@@ -181,7 +181,7 @@ class Friction:
         return self._each(d, self._fixed.memory.wrench, 3)
 
     def twists(self, d: Any) -> jax.Array:
-        """Return the last twists `[k, 3]` [m/s, m/s, rad/s] of the sites' bodies relative to the others."""
+        """Return the last mean twists `[k, 3]` [m/s, m/s, rad/s] of the sites' bodies relative to the others."""
         return self._each(d, self._fixed.memory.twist, 3)
 
     def loads(self, d: Any) -> jax.Array:
