@@ -1,4 +1,4 @@
-"""Boxes held on what turns: on a surface, a table, in the gripper of an arm, on a car; and how far they stay in place."""
+"""Boxes held on what turns: on a surface, a table, in the gripper of an arm, on a car; and how well they stay."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def in_mujoco(scene: Turning, time: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def in_mjx(scene: Turning, time: float, compiled: dict[str, Callable] | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return times and positions every 50 steps; scenes on the same support share what is `compiled`, but for surfaces."""
+    """Return times and positions every 50 steps; scenes on one support share what is `compiled`, but for surfaces."""
     import jax
     import jax.numpy as jnp
     from mujoco import mjx

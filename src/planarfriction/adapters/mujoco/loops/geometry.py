@@ -219,9 +219,11 @@ def _rows(own, m, d, s, nefc, p, kept):
     move, turn = _add_side(own, m, d, s, p, integers(own.owner)[p], integers(own.own)[p], 1.0)
     below, spin = _add_side(own, m, d, s, p, integers(own.support)[p], integers(own.other)[p], -1.0)
     call_c(own.functions.mj_objectVelocity, (m, d, own.constants.GEOM, integers(own.carrier)[p], s.block, 0))
-    tilt, part, own_goes = plus(turn, -1.0, spin), plus(move, -1.0, below), integers(own.carrier)[p] == integers(own.own)[p]
-    over = plus(move if own_goes else below, -1.0, three(at(s.block, 3)))
-    over = plus(over, (1.0 if own_goes else -1.0) * dot(normal, part) - dot(normal, over), normal)
+    tilt = plus(turn, -1.0, spin)
+    apart = dot(normal, plus(move, -1.0, below))
+    goes = integers(own.carrier)[p] == integers(own.own)[p]
+    over = plus(move if goes else below, -1.0, three(at(s.block, 3)))
+    over = plus(over, (apart if goes else -apart) - dot(normal, over), normal)
     _add_drift(s, p, 0.5 * doubles(m + own.model.timestep)[0], cross(over, tilt), zeros(tilt))
     s.tilts[p] = math.sqrt(dot(x, tilt) ** 2 + dot(y, tilt) ** 2)
 
