@@ -122,7 +122,7 @@ class Friction:
         made = zip(numbers, np.array([defaults(patch.model.law) for patch in patches]).T, strict=True)
         changed = {name: jnp.asarray(numbers[name]) for name, own in made if (numbers[name] != own).any()}
         self.parameters: dict[str, jax.Array] = changed
-        columns = (np.array([getattr(each, name) for each in placed]) for name in responses.PatchPlaces._fields[:6])
+        columns = (np.array([getattr(each, name) for each in placed]) for name in responses.PatchPlaces._fields[:7])
         places = responses.PatchPlaces(*columns, radius=radius, surface=surface_velocities(m, placed))
         self._fixed = _Fixed(places, which, follows, shapes, at, m.nuserdata, check(numbers))
 
@@ -181,7 +181,7 @@ class Friction:
         return self._each(d, self._fixed.memory.wrench, 3)
 
     def twists(self, d: Any) -> jax.Array:
-        """Return the last twists `[k, 3]` [m/s, m/s, rad/s] of the sites' bodies relative to the others."""
+        """Return the last mean twists `[k, 3]` [m/s, m/s, rad/s] of the sites' bodies relative to the others."""
         return self._each(d, self._fixed.memory.twist, 3)
 
     def loads(self, d: Any) -> jax.Array:

@@ -17,6 +17,7 @@ from mujoco import mjx
 
 from planarfriction.adapters.mjx.newton import HostResponse
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
+from planarfriction.formulas import turning_mean
 from planarfriction.jax.namespace import xp
 from planarfriction.kernels.coupling_rows import ALONG, FLAT
 from planarfriction.tensors.pressure import centre_of
@@ -133,6 +134,8 @@ class PatchPlaces(NamedTuple):
     support: Any
     at_contact: Any
     """True where the origin follows the contact forces."""
+    carrier: Any
+    """The geom along with which the patch goes over the other."""
     radius: Any
     """Lever arms of the patches [m]."""
     surface: Any
@@ -159,7 +162,7 @@ class Geometry(NamedTuple):
     carried: jax.Array
     """Cosine and sine of the angles from the x axes of the last step, carried along, to these, `[k, 2]`."""
     drift: jax.Array
-    """Twists of the surfaces relative to the bodies, of the own one less those of the other, `[k, 3]`."""
+    """Part of the twists that no wrench changes: of the surfaces and of what turns, own less other, `[k, 3]`."""
 
     def carry(self, p: int, vectors: jax.Array) -> jax.Array:
         """Return vectors of patch p, x and y in front, in its axes of this step instead of the last ones."""
@@ -204,23 +207,19 @@ def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Ar
         last, new = site + turned @ held, (held == 0.0).all()
         last = jnp.where(new, middle, last + normal * (normal @ (middle - last)))
         centre = jnp.where(place.at_contact, last, site)
-        moves, turns = (
-            own - other
-            for own, other in zip(mjx.jac(m, d, centre, place.owner), mjx.jac(m, d, centre, place.support), strict=True)
-        )
         y = jnp.cross(normal, x)
         carried = jnp.where(kept, jnp.stack([along @ x, -along @ y]), jnp.array([1.0, 0.0]))
-        drift = jnp.zeros(3)
-        for geom, surface, sign in zip((place.own, place.other), place.surface, (1.0, -1.0), strict=True):
-            frame = d.geom_xmat[geom].reshape(3, 3)
-            turn = frame @ surface[3:]
-            move = frame @ surface[:3] + jnp.cross(turn, centre - d.geom_xpos[geom])
-            drift += sign * jnp.stack([x @ move, y @ move, normal @ turn])
-        drift = jnp.where(touching, drift, 0.0)
+        sides = zip((place.owner, place.support), (place.own, place.other), place.surface, strict=True)
+        own, other = (_side(m, d, centre, *side) for side in sides)
+        moves, turns, drift, drift_spin, part, spin, _ = jax.tree.map(jnp.subtract, own, other)
+        goes, across = place.carrier == place.own, jnp.where(touching, jnp.stack([x, y]), 0.0)
+        over = jnp.where(goes, own.over, other.over)
+        over += (jnp.where(goes, 1.0, -1.0) * (part @ normal) - over @ normal) * normal
+        drift += 0.5 * m.opt.timestep * jnp.cross(over, spin)
+        drift = jnp.append(across @ drift, jnp.where(touching, normal @ drift_spin, 0.0))
         jacobian, away = jnp.stack([moves @ x, moves @ y, turns @ normal]), contact.pos - centre
         own = jnp.where(chosen, jnp.stack([jnp.ones(len(away)), away @ y, -away @ x]), 0.0)
-        tilt, slip = (turns @ jnp.stack([x, y]).T).T @ d.qvel, jacobian[:2] @ d.qvel + drift[:2]
-        rolled, slid = xp.norm(tilt, -1)[0], xp.norm(slip, -1)[0]
+        rolled, slid = xp.norm(across @ spin, -1)[0], xp.norm(jacobian[:2] @ d.qvel + drift[:2], -1)[0]
         rolled += jnp.where(place.radius > 0.0, slid / place.radius, 0.0)
         share = jnp.where(new, 1.0, jnp.minimum(1.0, m.opt.timestep * rolled / FOLLOWS))
         share = jnp.where(touching & place.at_contact, share, 0.0)
@@ -231,6 +230,39 @@ def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Ar
     jacobian, own, *others = jax.vmap(one)(jax.tree.map(jnp.asarray, where), held, before)
     rows = jnp.zeros((len(where.site), 3, d._impl.efc_J.shape[0])).at[:, :, contact.efc_address].set(own)
     return Geometry(jacobian.reshape(-1, m.nv), rows[:, 0], rows[:, 1:], *others)
+
+
+class _Side(NamedTuple):
+    """Motion of the surface of a body at a point."""
+
+    moves: jax.Array
+    """Jacobians of the point and of the body `[nv, 3]`."""
+    turns: jax.Array
+    drift: jax.Array
+    """Velocity and spin `[3]` that no wrench changes: of the surface on the body, and half of what both gain."""
+    drift_spin: jax.Array
+    velocity: jax.Array
+    """Velocity and spin `[3]` of the surface where the step begins."""
+    spin: jax.Array
+    over: jax.Array
+    """This velocity less that of the centre of the geom `[3]`."""
+
+
+def _side(m: Any, d: Any, point: jax.Array, body: Any, geom: Any, surface: jax.Array) -> _Side:
+    """Return the motion of the surface of a geom, which has a velocity [6] of its own (see `loops.geometry`)."""
+    dt, frame, away = m.opt.timestep, d.geom_xmat[geom].reshape(3, 3), point - d.geom_xpos[geom]
+    moves, turns = mjx.jac(m, d, point, body)
+    # by changes of the axes in place of the axes: spatial accelerations of joints that keep their speeds
+    gains = mjx.jac(m, d.replace(cdof=d.cdof_dot), point, body)
+    velocity, spin, gain, gained = (d.qvel @ each for each in (moves, turns, *gains))
+    turn = frame @ surface[3:]
+    move = frame @ surface[:3] + jnp.cross(turn, away)
+    first, second = turning_mean(jnp, dt * xp.norm(surface[3:], -1)[0])
+    across = jnp.cross(turn, move)
+    mean = move + dt * first * across + dt**2 * second * jnp.cross(turn, across) + dt * jnp.cross(spin, move)
+    drift = mean + 0.5 * dt * (gain + jnp.cross(spin, velocity))
+    drift_spin = turn + 0.5 * dt * (gained + jnp.cross(spin, turn))
+    return _Side(moves, turns, drift, drift_spin, velocity + move, spin + turn, move + jnp.cross(spin, away))
 
 
 def _unit(vector: jax.Array, given: jax.Array) -> jax.Array:

@@ -147,7 +147,7 @@ class Friction:
         return self._own(d, self._memory.wrench, 3 * len(self.patches)).reshape(-1, 3)
 
     def twists(self, d: Any) -> np.ndarray:
-        """Return the last twists `[k, 3]` [m/s, m/s, rad/s] of the sites' surfaces relative to the others."""
+        """Return the last mean twists `[k, 3]` [m/s, m/s, rad/s] of the sites' surfaces relative to the others."""
         return self._own(d, self._memory.twist, 3 * len(self.patches)).reshape(-1, 3)
 
     def loads(self, d: Any) -> np.ndarray:
@@ -282,7 +282,7 @@ class Friction:
         return row_of(host)
 
 
-_COLUMNS = "site", "own", "other", "owner", "support", "pair", "at_contact", "has_faces", "on_box"
+_COLUMNS = "site", "own", "other", "owner", "support", "pair", "at_contact", "has_faces", "carrier", "on_box"
 """Attributes of `Placed` that compiled steps read, and fields of `Host` with their addresses."""
 
 _ALONE = "mj_step has none by itself; call friction.step(d) instead, or mj_step within friction.install()"

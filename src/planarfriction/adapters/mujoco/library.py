@@ -113,6 +113,7 @@ def _constants() -> Any:
         **{name: getattr(integrator, f"mjINT_{name}") for name in ("EULER", "IMPLICIT", "IMPLICITFAST")},
         "NO_EULERDAMP": mujoco.mjtDisableBit.mjDSBL_EULERDAMP,
         "NO_REFSAFE": mujoco.mjtDisableBit.mjDSBL_REFSAFE,
+        "GEOM": mujoco.mjtObj.mjOBJ_GEOM,
         "SLEEP": getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0),
     }
     return records.Constants(**{name: int(value) for name, value in found.items()})

@@ -242,6 +242,9 @@ class Placed:
         curved = bool(_ROUND.intersection(kinds)) or self._on_curved_side(m)
         self.at_contact = patch.centre == "contact" or (patch.centre == "auto" and curved)
         """True if the origin follows the contact forces."""
+        reach = [math.inf if m.geom_type[geom] == _PLANE else m.geom_rbound[geom] for geom in (self.own, self.other)]
+        self.carrier = self.own if reach[0] <= reach[1] else self.other
+        """The smaller geom, along with which the patch goes over the other."""
         self.on_box = int(m.geom_type[self.other]) == _BOX
         own = int(m.geom_type[self.own])
         self.has_faces = own != _PLANE and own not in _ROUND and not self._on_curved_side(m)

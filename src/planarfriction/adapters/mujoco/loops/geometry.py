@@ -1,4 +1,15 @@
-"""Places of patches in contact in a MuJoCo model, and the Jacobian of their twists."""
+"""Places of patches in contact in a MuJoCo model, and the Jacobian of their twists.
+
+MuJoCo takes free bodies along the tangent and hinges along their arc. What is held on anything that turns keeps its
+*place* if the twist of a step is its mean over the step: what V is where the step begins, at the velocities of its end,
+and half of what it gains while all joints keep their speeds. That is, for surfaces at the origin of the patch,
+
+    V = J v + dt/2 (dJ/dt v - w x u)
+
+where w is the spin of their bodies on each other, 0 of those that hold each other. The contact goes along with the
+smaller geom: u is the velocity of this one's surface at the origin, less that of its centre in the plane of the
+contact, and that of the other surface across it. Wheels roll straight by it, and boxes rock about their edges.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +19,9 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call_c
 from planarfriction.compiler.memory import at, doubles, integers, integers32
+from planarfriction.formulas import turning_mean
 from planarfriction.kernels.coupling_rows import ALONG, FLAT
-from planarfriction.kernels.vectors import clear, dot, norm, plus, square, three, times
+from planarfriction.kernels.vectors import clear, dot, norm, plus, square, three, times, zeros
 
 
 @kernel
@@ -72,6 +84,12 @@ def column(matrix, i):
 
 
 @kernel
+def column_of(matrix, count, i):
+    """Return column i of a matrix of three rows of `count` numbers."""
+    return matrix[i], matrix[count + i], matrix[2 * count + i]
+
+
+@kernel
 def axes(s, p):
     """Return the axes of patch p: x, y, normal."""
     frame, x = three(at(s.frames, 6 * p)), three(at(s.axes, 3 * p))
@@ -107,17 +125,56 @@ def _put_axis(own, d, s, p, before, axis):
 
 
 @kernel
-def _add_drift(own, m, d, s, p, geom, sign):
-    """Add to the drift of patch p the twist of the surface of a geom relative to it."""
-    surface = at(doubles(integers(m + own.model.geom_surfacevel)[0]), 6 * geom)
+def _add_surface(own, m, d, s, p, geom, spin, sign):
+    """Add to the drift of patch p the mean twist of the surface of a geom relative to its body, which turns by `spin`.
+
+    Return velocity and spin of the surface where the step begins.
+    """
+    surface, dt = at(doubles(integers(m + own.model.geom_surfacevel)[0]), 6 * geom), doubles(m + own.model.timestep)[0]
     turned = at(doubles(integers(d + own.data.geom_xmat)[0]), 9 * geom)
     away = plus(three(at(s.frames, 6 * p + 3)), -1.0, three(at(doubles(integers(d + own.data.geom_xpos)[0]), 3 * geom)))
     turn = turned_by(turned, three(at(surface, 3)))
     move = plus(turned_by(turned, three(surface)), 1.0, cross(turn, away))
+    first, second = turning_mean(xp, dt * norm(turn))
+    across = cross(turn, move)
+    mean = plus(plus(move, dt * first, across), dt * dt * second, cross(turn, across))
+    _add_drift(s, p, sign, plus(mean, dt, cross(spin, move)), plus(turn, 0.5 * dt, cross(spin, turn)))
+    return move, turn
+
+
+@kernel
+def _add_drift(s, p, factor, move, turn):
+    """Add a factor times a velocity and a spin to the drift of patch p."""
     x, y, normal = axes(s, p)
-    s.drift[3 * p] += sign * dot(x, move)
-    s.drift[3 * p + 1] += sign * dot(y, move)
-    s.drift[3 * p + 2] += sign * dot(normal, turn)
+    s.drift[3 * p] += factor * dot(x, move)
+    s.drift[3 * p + 1] += factor * dot(y, move)
+    s.drift[3 * p + 2] += factor * dot(normal, turn)
+
+
+@kernel
+def _add_side(own, m, d, s, p, body, geom, sign):
+    """Add the surface of a geom on a body to rows and drift of patch p; return its velocity, and its spin."""
+    nv, rows, point = own.nv, at(s.jacobian, 3 * own.nv * p), at(s.frames, 6 * p + 3)
+    half, velocity = 0.5 * doubles(m + own.model.timestep)[0], doubles(integers(d + own.data.qvel)[0])
+    x, y, normal = axes(s, p)
+    move, turn, gain, gained = zeros(x), zeros(x), zeros(x), zeros(x)
+    if body != 0:
+        call_c(own.functions.mj_jac, (m, d, s.moves, s.turns, point, body))
+        for i in range(nv):
+            moves, turns = column_of(s.moves, nv, i), column_of(s.turns, nv, i)
+            rows[i] += sign * dot(x, moves)
+            rows[nv + i] += sign * dot(y, moves)
+            rows[2 * nv + i] += sign * dot(normal, turns)
+            move, turn = plus(move, velocity[i], moves), plus(turn, velocity[i], turns)
+        call_c(own.functions.mj_jacDot, (m, d, s.moves, s.turns, point, body))
+        for i in range(nv):
+            gain = plus(gain, velocity[i], column_of(s.moves, nv, i))
+            gained = plus(gained, velocity[i], column_of(s.turns, nv, i))
+        _add_drift(s, p, sign * half, gain, gained)
+    if own.model.geom_surfacevel >= 0:
+        slide, spin = _add_surface(own, m, d, s, p, geom, turn, sign)
+        move, turn = plus(move, 1.0, slide), plus(turn, 1.0, spin)
+    return move, turn
 
 
 @kernel
@@ -152,31 +209,23 @@ def _put_origin(own, d, s, p, normal, held):
 @kernel
 def _rows(own, m, d, s, nefc, p, kept):
     """Write the three rows of patch p into the Jacobian, the places of its contacts, and how fast its bodies roll."""
-    nv, frame = own.nv, at(s.frames, 6 * p)
+    frame = at(s.frames, 6 * p)
     _put_axis(own, d, s, p, at(kept.before, 3 * p), at(kept.axis, 3 * p))
     x, y, normal = axes(s, p)
-    centre, rows = at(frame, 3), at(s.jacobian, 3 * nv * p)
+    centre, rows = at(frame, 3), at(s.jacobian, 3 * own.nv * p)
     _put_origin(own, d, s, p, normal, at(kept.held, 3 * p))
     _put_places(own, d, s, nefc, p, centre, x, y)
-    if own.model.geom_surfacevel >= 0:
-        _add_drift(own, m, d, s, p, integers(own.own)[p], 1.0)
-        _add_drift(own, m, d, s, p, integers(own.other)[p], -1.0)
-    clear(rows, 3 * nv)
-    moves, turns, velocity, roll, rock = s.moves, s.turns, doubles(integers(d + own.data.qvel)[0]), 0.0, 0.0
-    for side in range(2):
-        body = integers(own.owner)[p] if side == 0 else integers(own.support)[p]
-        if body == 0:
-            continue
-        sign = 1.0 if side == 0 else -1.0
-        call_c(own.functions.mj_jac, (m, d, s.moves, s.turns, centre, body))
-        for i in range(nv):
-            move = moves[i], moves[nv + i], moves[2 * nv + i]
-            rows[i] += sign * dot(x, move)
-            rows[nv + i] += sign * dot(y, move)
-            turn = turns[i], turns[nv + i], turns[2 * nv + i]
-            rows[2 * nv + i] += sign * dot(normal, turn)
-            roll, rock = roll + sign * dot(x, turn) * velocity[i], rock + sign * dot(y, turn) * velocity[i]
-    s.tilts[p] = math.sqrt(roll * roll + rock * rock)
+    clear(rows, 3 * own.nv)
+    move, turn = _add_side(own, m, d, s, p, integers(own.owner)[p], integers(own.own)[p], 1.0)
+    below, spin = _add_side(own, m, d, s, p, integers(own.support)[p], integers(own.other)[p], -1.0)
+    call_c(own.functions.mj_objectVelocity, (m, d, own.constants.GEOM, integers(own.carrier)[p], s.block, 0))
+    tilt = plus(turn, -1.0, spin)
+    apart = dot(normal, plus(move, -1.0, below))
+    goes = integers(own.carrier)[p] == integers(own.own)[p]
+    over = plus(move if goes else below, -1.0, three(at(s.block, 3)))
+    over = plus(over, (apart if goes else -apart) - dot(normal, over), normal)
+    _add_drift(s, p, 0.5 * doubles(m + own.model.timestep)[0], cross(over, tilt), zeros(tilt))
+    s.tilts[p] = math.sqrt(dot(x, tilt) ** 2 + dot(y, tilt) ** 2)
 
 
 @kernel

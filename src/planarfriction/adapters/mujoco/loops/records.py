@@ -39,14 +39,14 @@ ContactOffsets = _integers("ContactOffsets", "size dist pos frame H dim geom efc
 Functions = _integers(
     "Functions",
     "mj_markStack mj_freeStack mj_stackAllocNum mj_fwdActuation mj_fwdAcceleration mj_fwdConstraint "
-    "mj_constraintUpdate mj_fullM mj_jac mj_isSparse mjd_smooth_vel mjd_freeMhat",
+    "mj_constraintUpdate mj_fullM mj_jac mj_jacDot mj_objectVelocity mj_isSparse mjd_smooth_vel mjd_freeMhat",
 )
 """Addresses of MuJoCo's functions; 0 for `mjd_freeMhat` in versions without it."""
 
 Constants = _integers(
     "Constants",
     "SATISFIED QUADRATIC LINEARNEG LINEARPOS CONE EQUALITY FRICTION_DOF FRICTION_TENDON ELLIPTIC EULER IMPLICIT "
-    "IMPLICITFAST NO_EULERDAMP NO_REFSAFE SLEEP",
+    "IMPLICITFAST NO_EULERDAMP NO_REFSAFE SLEEP GEOM",
 )
 """Values of MuJoCo's enumerations."""
 
@@ -147,7 +147,8 @@ class Scratch(NamedTuple):
     carried: Doubles
     """Cosine and sine of the angles from the x axes of the last step, carried along, to these, [k, 2]."""
     drift: Doubles
-    """Twists of the surfaces relative to the bodies (`surfacevel`), of the own body less those of the other, [3k]."""
+    """Part of the twists that no wrench of the step changes, of the own body less that of the other, [3k]: those of
+    their surfaces (`surfacevel`), and of the turning of both (see `geometry`)."""
     tilts: Doubles
     """Speeds at which the bodies roll or rock on each other [rad/s], [k]."""
     depths: Doubles
@@ -212,6 +213,8 @@ class Host(NamedTuple):
     """Address of flags: 1 where the origin is at the centre of the contact forces."""
     has_faces: int
     """Address of flags: 1 where a side of the geom on the site's body, and an axis on it, can be told from others."""
+    carrier: int
+    """Address of the geoms along with which the patches go over the others."""
     on_box: int
     """Address of flags: 1 where the other geom is a box, whose faces bear patches as far as they go."""
     extents: int

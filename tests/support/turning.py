@@ -1,0 +1,142 @@
+"""Boxes held on what turns: on a surface, a table, in the gripper of an arm, on a car; and how well they stay."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+import planarfriction as pf
+from planarfriction.adapters.mujoco import PatchContact, prepare
+
+G = 9.81
+
+SPEEDS, STEPS = (1.0, 2.0, 3.0, 10.0), (2e-3, 4e-3)
+
+SURFACE = """<geom name="support" type="plane" size="5 5 1" surfacevel="0 0 0 0 0 {w}"/>"""
+
+TABLE = """<body><joint axis="0 0 1" armature="1e4"/><geom name="support" type="box" size="0.4 0.4 0.02" pos="0 0 -0.02"
+ mass="1"/></body>"""
+
+CAR = """<body name="car" gravcomp="1"><freejoint/><inertial pos="0 0 0" mass="1e3" diaginertia="1e3 1e3 1e3"/>
+<geom name="support" type="box" size="0.4 0.4 0.02" pos="0 0 -0.02" mass="0"/></body>"""
+
+ON_TOP = """<body pos="{x} {y} 0.03"><freejoint/><geom name="box" type="box" size="0.03 0.03 0.03" mass="0.2"/>
+<site name="support" pos="0 0 -0.03"/></body>"""
+
+ARM = """<body><joint axis="0 0 1" armature="1e4"/><geom type="capsule" size="0.01" fromto="0 0 0 0.4 0 0" mass="1"
+ contype="0" conaffinity="0"/><geom name="support" type="box" size="0.02 0.005 0.02" pos="{x} 0.015 0" mass="0.1"/>
+<body pos="{x} -0.015 0"><joint name="press" type="slide" axis="0 1 0"/>
+<geom name="pad" type="box" size="0.02 0.005 0.02" mass="0.1"/></body></body>
+<body pos="{x} 0 0"><freejoint/><geom name="box" type="box" size="0.02 0.01 0.02" mass="0.2"/>
+<site name="support" pos="0 0.01 0" zaxis="0 -1 0"/><site name="pad" pos="0 -0.01 0" zaxis="0 1 0"/></body>"""
+
+
+class Turning(NamedTuple):
+    """A box that is held on what turns."""
+
+    m: Any
+    patches: list[PatchContact]
+    qpos: np.ndarray
+    qvel: np.ndarray
+    ctrl: float
+    """Force of the gripper [N]."""
+    w: float
+    support: str
+
+    def driven(self, xp: Any, qpos: Any, qvel: Any, w: Any, dt: Any) -> Any:
+        """Return the velocities where a step begins: a car goes on by chords of its circle."""
+        if self.support != "car":
+            return qvel
+        back, along, (x, y) = -2.0 * xp.sin(0.5 * w * dt) ** 2 / dt, xp.sin(w * dt) / dt, qpos[:2]
+        none = 0.0 * x
+        own = xp.stack([back * x - along * y, along * x + back * y, none, none, none, w + none])
+        return xp.concatenate([own, qvel[6:]])
+
+    def places(self, times: np.ndarray, qpos: np.ndarray) -> np.ndarray:
+        """Return distance [m] from the axis of the support, angle about it, and yaw, both relative to it, `[n, 3]`."""
+        pose = qpos[:, -7:].astype(float)
+        at, turned = np.zeros((len(qpos), 2)), self.w * times
+        if self.support in ("table", "arm"):
+            turned = qpos[:, 0].astype(float)
+        if self.support == "car":
+            at, turned = qpos[:, :2].astype(float), _yaw(qpos[:, 3:7].astype(float))
+        away = pose[:, :2] - at
+        angle, yaw = np.arctan2(away[:, 1], away[:, 0]) - turned, _yaw(pose[:, 3:]) - turned
+        return np.stack([np.hypot(*away.T), np.unwrap(angle), np.unwrap(yaw)], axis=1)
+
+    def bounds(self, time: float) -> tuple[float, float]:
+        """Return by which share the radius may change after a time [s], and the angle [rad], without the bristles."""
+        w, dt = self.w, self.m.opt.timestep
+        return 1.5 * w**4 * dt**3 * time / 8.0, 1.5 * w**3 * dt**2 * time / 6.0
+
+
+def _yaw(quaternions: np.ndarray) -> np.ndarray:
+    return 2.0 * np.arctan2(quaternions[:, 3], quaternions[:, 0])
+
+
+def turning(support: str, w: float, dt: float, integrator: str = "Euler") -> Turning:
+    """Return a box on a "surface" or a "table", in the gripper of an "arm", or on a "car", that turn by w [rad/s]."""
+    grip, mu = support == "arm", 0.3 if support in ("surface", "table") else 1.0
+    x, y = (0.5, 0.0) if grip else (min(0.25, 0.7 * mu * G / w**2), 0.0)
+    middle = np.zeros(2)
+    if support == "car":  # on a circle of its own, about the axis from which the box is that far
+        middle, (x, y) = np.array([0.0, -0.6 * x]), (0.8 * x, 0.0)
+    body = {"surface": SURFACE, "table": TABLE, "car": CAR}.get(support, "") + ON_TOP
+    text = (ARM if grip else body).format(w=w, x=x, y=middle[1])
+    motor = '<actuator><motor joint="press"/></actuator>' if grip else ""
+    spec = mujoco.MjSpec.from_string(f"<mujoco><worldbody>{text}</worldbody>{motor}</mujoco>")
+    spec.option.timestep, spec.option.integrator = dt, getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
+    law = pf.LuGre(mu_c=mu, sigma_2=0.0, elasto_plastic=0.9)
+    model = pf.ReducedModel(pf.ContactPatch.rectangle(0.04 if grip else 0.06), law)
+    names = ("support", "pad") if grip else ("support",)
+    patches = [PatchContact(model, name, (name, "box")) for name in names]
+    m = prepare(spec, patches).compile()
+    qpos, qvel = m.qpos0.copy(), np.zeros(m.nv)
+    if support == "car":
+        qpos[:2] = middle
+    if support in ("table", "arm"):
+        qvel[0] = w
+    qvel[-6:-3] = -w * (middle[1]), w * x, 0.0
+    qvel[-1] = w
+    return Turning(m, patches, qpos, qvel, 30.0 * grip, w, support)
+
+
+def in_mujoco(scene: Turning, time: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and positions after each step."""
+    from planarfriction.adapters.mujoco import Friction
+
+    d, friction, path = mujoco.MjData(scene.m), Friction(scene.m, scene.patches), []
+    d.qpos[:], d.qvel[:], d.ctrl[:] = scene.qpos, scene.qvel, scene.ctrl
+    for _ in range(round(time / scene.m.opt.timestep)):
+        d.qvel[:] = scene.driven(np, d.qpos, d.qvel, scene.w, scene.m.opt.timestep)
+        friction.step(d)
+        path.append(d.qpos.copy())
+    return scene.m.opt.timestep * np.arange(1, len(path) + 1), np.array(path)
+
+
+def in_mjx(scene: Turning, time: float, compiled: dict[str, Callable] | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and positions every 50 steps; scenes on one support share what is `compiled`, but for surfaces."""
+    import jax
+    import jax.numpy as jnp
+    from mujoco import mjx
+
+    from planarfriction.adapters.mjx import Friction
+
+    def many(mx, w, d):
+        def step(d, _):
+            return friction.step(mx, d.replace(qvel=scene.driven(jnp, d.qpos, d.qvel, w, mx.opt.timestep))), None
+
+        return jax.lax.scan(step, d, None, length=50)[0]
+
+    friction, compiled = Friction(scene.m, scene.patches), {} if compiled is None else compiled
+    run = compiled.setdefault(f"{scene.support} {scene.w if scene.support == 'surface' else ''}", jax.jit(many))
+    mx, start = mjx.put_model(scene.m), mujoco.MjData(scene.m)
+    start.qpos[:], start.qvel[:], start.ctrl[:] = scene.qpos, scene.qvel, scene.ctrl
+    d, path, dt = mjx.put_data(scene.m, start), [], scene.m.opt.timestep
+    for _ in range(round(time / (50 * dt))):
+        d = run(mx, scene.w, d)
+        path.append(np.asarray(d.qpos))
+    return 50 * dt * np.arange(1, len(path) + 1), np.array(path)
