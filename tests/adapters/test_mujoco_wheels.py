@@ -13,7 +13,21 @@ mujoco = pytest.importorskip("mujoco", reason="needs the extra [mujoco]")
 
 from planarfriction.adapters.mujoco import Friction, PatchContact, prepare  # noqa: E402
 from planarfriction.errors import InvalidValueError  # noqa: E402
-from tests.support.wheels import DT, HALF, LAW, MASS, POINT, RADIUS, SHAPES, SITES, TREAD, box, wheel  # noqa: E402
+from tests.support.wheels import (  # noqa: E402
+    DT,
+    HALF,
+    LAW,
+    MASS,
+    POINT,
+    RADIUS,
+    SHAPES,
+    SITES,
+    TREAD,
+    box,
+    face,
+    on_the_floor,
+    wheel,
+)
 
 pytestmark = pytest.mark.mujoco
 
@@ -27,7 +41,7 @@ def made(text: str, *patches: PatchContact):
 def thrown(shape: str, site: str, speed: float = 1.0, spin: float = 0.0, centre: str = "auto"):
     """Return data and friction of a wheel that was thrown along x or set spinning a while ago."""
     patch = PatchContact(SHAPES[shape][1], site="wheel", geoms=("floor", "wheel"), centre=centre)
-    d, friction = made(wheel(shape, site), patch)
+    d, friction = made(on_the_floor(wheel(shape, site)), patch)
     for _ in range(50):
         friction.step(d)
     d.qvel[:] = speed, 0.0, 0.0, 0.0, 0.0, -spin  # its z axis is -y of the world
@@ -73,8 +87,8 @@ def test_a_box_topples_where_friction_is_beyond_its_half_width_over_its_height(s
     Then it slides v0^2/(2 mu g), less the stepper's own v0 dt/2.
     """
     for mu in (0.15, 0.6):
-        text, model = box(site, mu)
-        d, friction = made(text, PatchContact(model, site="box", geoms=("floor", "box")))
+        text = on_the_floor(box(f'pos="0 0 {site}"'))
+        d, friction = made(text, PatchContact(face(mu), site="box", geoms=("floor", "box")))
         for _ in range(50):
             friction.step(d)
         start = d.qpos[0]
@@ -94,8 +108,8 @@ def test_a_puck_with_its_site_in_the_middle_slides_and_a_coin_on_its_rim_rolls()
     """The origin follows the contact of the curved side alone, whatever side the site is on."""
     puck = wheel("cylinder", "centre").replace('euler="90 0 0"', "").replace('xyaxes="0 0 1 1 0 0"', "")
     puck = puck.replace(f"{RADIUS - 1e-5}", f"{HALF - 1e-5}")
-    face = pf.ReducedModel(pf.ContactPatch.disc(radius=RADIUS, cells=21), LAW)
-    d, friction = made(puck, PatchContact(face, site="wheel", geoms=("floor", "wheel")))
+    end = pf.ReducedModel(pf.ContactPatch.disc(radius=RADIUS, cells=21), LAW)
+    d, friction = made(on_the_floor(puck), PatchContact(end, site="wheel", geoms=("floor", "wheel")))
     for _ in range(50):
         friction.step(d)
     start = d.qpos[0]
@@ -107,7 +121,7 @@ def test_a_puck_with_its_site_in_the_middle_slides_and_a_coin_on_its_rim_rolls()
     np.testing.assert_allclose(origin, [*d.qpos[:2], 0.0], atol=1e-4)
     assert friction.misplaced(d) is None
     on_its_end = wheel("cylinder", "centre").replace('name="wheel" pos="0.0 0.0 0"', f'name="wheel" pos="0 0 {HALF}"')
-    d, friction = made(on_its_end, PatchContact(TREAD, site="wheel", geoms=("floor", "wheel")))
+    d, friction = made(on_the_floor(on_its_end), PatchContact(TREAD, site="wheel", geoms=("floor", "wheel")))
     d.qvel[0] = 1.0
     for _ in range(400):
         friction.step(d)

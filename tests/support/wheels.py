@@ -34,22 +34,29 @@ SITES = {"centre": (0.0, 0.0), "hair": (1e-6, 0.0), "tread": (-0.5, math.sqrt(0.
 """Sites in radii from the axle: on it, beside it, on the tread at 120 degrees from the floor, where it touches."""
 
 
-def wheel(shape: str, site: str, *, options: str = "") -> str:
-    """Return a model of a wheel on a floor with its axle along y and its site's x axis along the axle."""
-    geom, _, share = SHAPES[shape]
-    x, y = SITES[site]
+def wheel(shape: str, site: str, *, name: str = "wheel", y: float = 0.0) -> str:
+    """Return the body of a wheel with its axle along y and the x axis of its site along the axle."""
+    share = SHAPES[shape][2]
+    at_x, at_y = SITES[site]
     i = share * MASS * RADIUS**2
-    return f"""<mujoco><option timestep="{DT}" {options}/><asset><mesh name="wheel" vertex="{MESH}"/></asset><worldbody>
-    <geom name="floor" type="plane" size="9 9 .1"/><body pos="0 0 {RADIUS - 1e-5}" euler="90 0 0"><freejoint/>
-    <inertial pos="0 0 0" mass="{MASS}" diaginertia="{i} {i} {i}"/><geom name="wheel" {geom}/>
-    <site name="wheel" pos="{x * RADIUS} {y * RADIUS} 0" xyaxes="0 0 1 1 0 0"/></body></worldbody></mujoco>"""
+    return f"""<body name="{name}" pos="0 {y} {RADIUS - 1e-5}" euler="90 0 0"><freejoint/>
+    <inertial pos="0 0 0" mass="{MASS}" diaginertia="{i} {i} {i}"/><geom name="{name}" {SHAPES[shape][0]}/>
+    <site name="{name}" pos="{at_x * RADIUS} {at_y * RADIUS} 0" xyaxes="0 0 1 1 0 0"/></body>"""
 
 
-def box(site: float, mu: float, *, options: str = "") -> tuple[str, pf.ReducedModel]:
-    """Return a model of a box of 40 x 40 x 200 mm with a site `site` [m] above its middle, and a patch for it."""
-    text = f"""<mujoco><option timestep="{DT}" {options}/><worldbody>
-    <geom name="floor" type="plane" size="9 9 .1"/><body pos="0 0 0.0999"><freejoint/>
-    <geom name="box" type="box" size="0.02 0.02 0.1" mass="1"/><site name="box" pos="0 0 {site}"/></body>
-    </worldbody></mujoco>"""
+def box(site: str = "", *, name: str = "box", y: float = 0.0) -> str:
+    """Return a box of 40 x 40 x 200 mm."""
+    return f"""<body name="{name}" pos="0 {y} 0.0999"><freejoint/>
+    <geom name="{name}" type="box" size="0.02 0.02 0.1" mass="1"/><site name="{name}" {site}/></body>"""
+
+
+def face(mu: float) -> pf.ReducedModel:
+    """Return a patch for the end of this box."""
     law = pf.LuGre(mu_c=mu, mu_s=mu, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
-    return text, pf.ReducedModel(pf.ContactPatch.rectangle(0.04, cells=9), law)
+    return pf.ReducedModel(pf.ContactPatch.rectangle(2.0 * HALF, cells=9), law)
+
+
+def on_the_floor(*bodies: str, options: str = "") -> str:
+    """Return a model of bodies on a floor."""
+    return f"""<mujoco><option timestep="{DT}" {options}/><asset><mesh name="wheel" vertex="{MESH}"/></asset>
+    <worldbody><geom name="floor" type="plane" size="9 9 .1"/>{"".join(bodies)}</worldbody></mujoco>"""
