@@ -30,6 +30,9 @@ SHAPES = {
 }
 """Geom with its axle along z, patch, and moment of inertia about the axle in m r^2."""
 
+ALONE = 'contype="0" conaffinity="0"'
+"""Geoms that touch nothing but what they have a pair with."""
+
 SITES = {"centre": (0.0, 0.0), "hair": (1e-6, 0.0), "tread": (-0.5, math.sqrt(0.75)), "contact": (0.0, -1.0)}
 """Sites in radii from the axle: on it, beside it, on the tread at 120 degrees from the floor, where it touches."""
 
@@ -40,14 +43,14 @@ def wheel(shape: str, site: str, *, name: str = "wheel", y: float = 0.0) -> str:
     at_x, at_y = SITES[site]
     i = share * MASS * RADIUS**2
     return f"""<body name="{name}" pos="0 {y} {RADIUS - 1e-5}" euler="90 0 0"><freejoint/>
-    <inertial pos="0 0 0" mass="{MASS}" diaginertia="{i} {i} {i}"/><geom name="{name}" {SHAPES[shape][0]}/>
+    <inertial pos="0 0 0" mass="{MASS}" diaginertia="{i} {i} {i}"/><geom name="{name}" {SHAPES[shape][0]} {ALONE}/>
     <site name="{name}" pos="{at_x * RADIUS} {at_y * RADIUS} 0" xyaxes="0 0 1 1 0 0"/></body>"""
 
 
 def box(site: str = "", *, name: str = "box", y: float = 0.0) -> str:
     """Return a box of 40 x 40 x 200 mm."""
     return f"""<body name="{name}" pos="0 {y} 0.0999"><freejoint/>
-    <geom name="{name}" type="box" size="0.02 0.02 0.1" mass="1"/><site name="{name}" {site}/></body>"""
+    <geom name="{name}" type="box" size="0.02 0.02 0.1" mass="1" {ALONE}/><site name="{name}" {site}/></body>"""
 
 
 def face(mu: float) -> pf.ReducedModel:
