@@ -61,5 +61,6 @@ def face(mu: float) -> pf.ReducedModel:
 
 def on_the_floor(*bodies: str, options: str = "") -> str:
     """Return a model of bodies on a floor."""
-    return f"""<mujoco><option timestep="{DT}" {options}/><asset><mesh name="wheel" vertex="{MESH}"/></asset>
+    mesh = f'<asset><mesh name="wheel" vertex="{MESH}"/></asset>' if "mesh=" in "".join(bodies) else ""
+    return f"""<mujoco><option timestep="{DT}" {options}/>{mesh}
     <worldbody><geom name="floor" type="plane" size="9 9 .1"/>{"".join(bodies)}</worldbody></mujoco>"""
