@@ -25,9 +25,7 @@ kept: Any = part("planarfriction.compiler.machine_code", "kept", lambda dispatch
 missing: Any = part("planarfriction.compiler.machine_code", "missing", lambda dispatcher, signature: False)
 """Function that tells if something has yet to be compiled that can be kept on disk."""
 
-FOLDERS = (
-    "compiler", "kernels", "limit_surface/loops", "online/loops", "joints/loops", "adapters", "adapters/mujoco/loops",
-)  # fmt: skip
+FOLDERS = ("compiler", "kernels", "limit_surface/loops", "online/loops", "joints/loops", "adapters/mujoco/loops")
 """Folders of the package with compiled code; a compiled function of the package stands in one of them."""
 
 

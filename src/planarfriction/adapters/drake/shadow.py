@@ -14,9 +14,9 @@ import numpy as np
 from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.framework import DiagramBuilder
 
-from planarfriction.adapters import placing
 from planarfriction.adapters.drake.patches import Placed
 from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import placing
 from planarfriction.kernels.coupling_rows import ALONG, FLAT
 
 

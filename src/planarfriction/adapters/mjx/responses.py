@@ -15,10 +15,10 @@ import jax
 import jax.numpy as jnp
 from mujoco import mjx
 
-from planarfriction.adapters import placing
 from planarfriction.adapters.mjx.newton import HostResponse
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
 from planarfriction.jax.namespace import xp
+from planarfriction.kernels import placing
 from planarfriction.kernels.coupling_rows import ALONG, FLAT
 from planarfriction.tensors.pressure import centre_of
 

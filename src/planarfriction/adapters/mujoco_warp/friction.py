@@ -15,7 +15,6 @@ import numpy as np
 import warp as wp
 
 from planarfriction import validation
-from planarfriction.adapters import placing
 from planarfriction.adapters.mujoco.friction import Report
 from planarfriction.adapters.mujoco.patches import (
     PatchContact,
@@ -29,9 +28,10 @@ from planarfriction.adapters.mujoco.patches import (
     place_of_parameters,
     surface_velocities,
 )
-from planarfriction.adapters.mujoco_warp.loops import geometry, responses
+from planarfriction.adapters.mujoco_warp.loops import centres, geometry, responses
 from planarfriction.coupling import HostStep
 from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import placing
 from planarfriction.models.base import lever_of
 from planarfriction.warp import CoupledPatches
 
@@ -204,7 +204,7 @@ class Friction:
         mjw.fwd_actuation(m, d)
         mjw.fwd_acceleration(m, d, factorize=True)
         mjw.solve(m, d)
-        launch(geometry.follow_centres, patches, host, frames, problem, self.coupled.parameters)
+        launch(centres.follow_centres, patches, host, frames, problem, self.coupled.parameters)
         if host.implicit == 2:
             mjw.deriv_smooth_vel(m, d, self._metric)
         for i in range(PASSES):

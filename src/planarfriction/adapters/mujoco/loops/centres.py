@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 
-from planarfriction.adapters import placing
 from planarfriction.adapters.mujoco.loops.geometry import (
     across,
     axes,
@@ -23,6 +22,7 @@ from planarfriction.adapters.mujoco.loops.models import displacement_of, scale_o
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import at, doubles, integers
+from planarfriction.kernels import placing
 from planarfriction.kernels.vectors import dot, plus, square, three
 
 FOLLOWS = 1e-3

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from planarfriction.adapters import placing
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call_c
 from planarfriction.compiler.memory import at, doubles, integers, integers32
+from planarfriction.kernels import placing
 from planarfriction.kernels.coupling_rows import ALONG, FLAT
 from planarfriction.kernels.vectors import clear, dot, norm, plus, square, three, times
 

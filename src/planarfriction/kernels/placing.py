@@ -11,12 +11,23 @@ from typing import Any
 
 import numpy as np
 
-AUTO, AT_SITE, AT_CONTACT = 0, 1, 2
-"""Origins of a patch: at the contact forces where a curved side touches, else at the site; at the site; at these."""
+AUTO = 0
+"""Origin at the centre of the contact forces where a curved side touches, else at the site."""
 
-OWN, OTHER, ROUND = 1, 2, 4
-"""Bits of the curved sides in a contact: of a cylinder on the patch's body, of one on the other body, and of a shape
-that is curved all over, of either."""
+AT_SITE = 1
+"""Origin at the site or frame of the patch, moved into the plane of the contact."""
+
+AT_CONTACT = 2
+"""Origin at the centre of the contact forces."""
+
+OWN = 1
+"""Bit of a cylinder on the patch's own body, whose curved side may touch."""
+
+OTHER = 2
+"""Bit of a cylinder on the other body."""
+
+ROUND = 4
+"""Bit of a shape that is curved all over, on either body."""
 
 CURVED = 0.5
 """Square of the sine of the angle between a cylinder's axis and the normal above which its curved side touches."""
@@ -24,8 +35,11 @@ CURVED = 0.5
 MARGIN = 0.1
 """Share of its size by which a patch may lie beside its contact, and sine of the least angle of x to the normal."""
 
-BEYOND, ALONG_X = 1, 2
-"""Faults of a place: the contact forces act beyond the patch; the x axis of its site or frame lies along the normal."""
+BEYOND = 1
+"""Fault of a patch: the contact forces act beyond it."""
+
+ALONG_X = 2
+"""Fault of a patch: the x axis of its site or frame lies along the normal."""
 
 FAULTS = 3
 """Number of faults, none included: 0."""
