@@ -72,7 +72,8 @@ class Friction(LeafSystem):
         self.coupled = CoupledPatches([patch.model for patch in self.patches])
         self._shadow = Shadow(plant, scene_graph, self._placed)
         self._asking = Asking(self._shadow, self.coupled, plant.num_velocities())
-        self._size, self._said = plant.num_velocities(), set[Any]()
+        self._size = plant.num_velocities()
+        self._said: set[str] = set()
         self._declare_inputs(plant)
         k, states = len(self.patches), self.coupled.state_shape[0]
         sizes = {
