@@ -210,7 +210,8 @@ def test_a_caster_swings_behind_its_pivot():
 
 def test_a_flex_has_no_patches():
     flex = """<mujoco><worldbody><geom name="floor" type="plane" size="1 1 .1"/><site name="floor"/>
-    <flexcomp name="cloth" type="grid" count="3 3 1" spacing="0.1 0.1 0.1" pos="0 0 0.1" dim="2" mass="1"><edge equality="true"/></flexcomp>
+    <flexcomp name="cloth" type="grid" count="3 3 1" spacing="0.1 0.1 0.1" pos="0 0 0.1" dim="2" mass="1">
+    <edge equality="true"/></flexcomp>
     </worldbody></mujoco>"""
     patches = [PatchContact(POINT, site="floor", geoms=("floor", "cloth"))]
     with pytest.raises(InvalidValueError, match="geoms must be rigid: flexes cannot have patches, got cloth"):
