@@ -412,7 +412,7 @@ def test_names_that_are_not_there_and_patches_that_do_not_fit_are_refused():
     _refused(
         r"friction must be 0 on floor and box, on one of the two \(prepare does that\), got 0.5", [patch()], ready=False
     )
-    with pytest.raises(InvalidValueError, match="centre must be one of frame, contact"):
+    with pytest.raises(InvalidValueError, match="centre must be one of auto, frame, contact"):
         patch(centre="middle")
     with pytest.raises(InvalidValueError, match="geometries must be the names of two geometries or bodies, got floor"):
         patch(geometries="floor")

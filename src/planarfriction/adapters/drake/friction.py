@@ -25,8 +25,9 @@ from planarfriction.errors import InvalidValueError
 EXPECTED = 1e-5
 """Difference between predicted and actual velocities [m/s, rad/s] that is not noticed: rounding comes to 1e-7."""
 
-_SURPRISED = """the plant moves otherwise than predicted, by {:.3g}: parameters in its context are not those with which
-friction was added, or its solver has not converged""".replace("\n", " ")
+_SURPRISED = """the plant moves otherwise than predicted, by {:.3g}: one of its input ports was fixed after AddToBuilder
+(connect a source before it), parameters in its context are not those with which friction was added, or its solver has
+not converged""".replace("\n", " ")
 
 _GEOMETRY, _FORCE = "geometry_query", "applied_generalized_force"
 
@@ -71,7 +72,8 @@ class Friction(LeafSystem):
         self.coupled = CoupledPatches([patch.model for patch in self.patches])
         self._shadow = Shadow(plant, scene_graph, self._placed)
         self._asking = Asking(self._shadow, self.coupled, plant.num_velocities())
-        self._size, self._warned = plant.num_velocities(), False
+        self._size = plant.num_velocities()
+        self._said: set[str] = set()
         self._declare_inputs(plant)
         k, states = len(self.patches), self.coupled.state_shape[0]
         sizes = {
@@ -187,11 +189,19 @@ class Friction(LeafSystem):
         surprise, last = self._surprise(state, own), own[parts["report"]][-2]
         if min(surprise, last) > EXPECTED:
             converged = 0.0
-            if not self._warned:
-                warnings.warn(_SURPRISED.format(surprise), stacklevel=2)
-            self._warned = True
+            self._warn(_SURPRISED, _SURPRISED.format(surprise))
+        for placed, touching, fault in zip(self._placed, asked.touching, self._shadow.faults, strict=True):
+            if touching and fault:
+                line = placed.misplaced_line(fault)
+                self._warn(line, line)
         asked = asked._replace(report=(*report, surprise, converged))
         solution.set_value((applied + asked.force, np.concatenate(asked)))
+
+    def _warn(self, kind: str, line: str) -> None:
+        """Warn once of a kind."""
+        if kind not in self._said:
+            self._said.add(kind)
+            warnings.warn(line, stacklevel=3)
 
     def _surprise(self, state: np.ndarray, own: np.ndarray) -> float:
         """Return how far the plant's velocities are from those predicted in the last step; 0 in the first one."""

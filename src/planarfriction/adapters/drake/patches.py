@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pydrake.geometry import Capsule, Ellipsoid, GeometryId, ProximityProperties, Role, RoleAssign, Sphere
+from pydrake.geometry import Capsule, Cylinder, Ellipsoid, GeometryId, ProximityProperties, Role, RoleAssign, Sphere
 from pydrake.multibody.plant import CoulombFriction
 from pydrake.multibody.tree import BodyIndex, FrameIndex
 
@@ -16,9 +16,10 @@ from planarfriction import validation
 from planarfriction.coupling import follows
 from planarfriction.equality import Checked
 from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import placing
 from planarfriction.models import FrictionModel
 
-CENTRES, PRESSURES = ("frame", "contact"), ("auto", "follows", "fixed")
+CENTRES, PRESSURES = ("auto", "frame", "contact"), ("auto", "follows", "fixed")
 
 _ROUND = Sphere, Capsule, Ellipsoid
 """Shapes that touch in points, not faces."""
@@ -44,8 +45,10 @@ class PatchContact(Checked):
     """Name of a frame on the body that owns the patch."""
     geometries: tuple[str, str]
     """Names of the two collision geometries in contact, or of bodies, which stand for all their geometries."""
-    centre: str = "frame"
-    """Origin of the patch: that of the "frame", or the middle of Drake's points of "contact"."""
+    centre: str = "auto"
+    """Origin of the patch in the plane of the contact: below that of the "frame" along the normal, or the centre of the
+    forces of "contact"; "auto" follows the contact of a side that is a single sphere, capsule or ellipsoid, and of the
+    curved side of a single cylinder."""
     pressure: str = "auto"
     """Pressure that "follows" the moments of the contact forces (see `ContactPatch.weights`), or is "fixed" to the
     patch; "auto" is fixed if one side is a single sphere, capsule or ellipsoid."""
@@ -79,9 +82,23 @@ class Placed:
         """Pairs of ids of geometries, the owner's first."""
         inspector = scene_graph.model_inspector()
         self._check_friction(inspector, sides)
-        faces = not any(len(side) == 1 and isinstance(inspector.GetShape(side[0]), _ROUND) for side in sides)
+        shapes = [inspector.GetShape(side[0]) if len(side) == 1 else None for side in sides]
+        faces = not any(isinstance(shape, _ROUND) for shape in shapes)
         self.follows = patch.pressure == "follows" or (patch.pressure == "auto" and faces and follows(patch.model))
         """True if the pressure follows the contact forces."""
+        self.centre = CENTRES.index(patch.centre)
+        """Origin of the patch, one of those of `placing`."""
+        self.round = not faces
+        self.cylinders = [
+            (body.body_frame(), inspector.GetPoseInFrame(side[0]).rotation().matrix()[:, 2])
+            for body, side, shape in zip(bodies, sides, shapes, strict=True)
+            if isinstance(shape, Cylinder)
+        ]
+        """Frames of bodies that are single cylinders, and the axes of these in them."""
+
+    def misplaced_line(self, fault: int) -> str:
+        """Return a line about a patch that does not lie in its contact."""
+        return placing.fault_line("frame", self.patch.frame, self.patch.geometries, fault)
 
     def _check_friction(self, inspector: Any, sides: list[list[GeometryId]]) -> None:
         """Refuse pairs with friction of their own, and those that never touch."""

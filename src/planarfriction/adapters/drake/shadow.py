@@ -16,9 +16,8 @@ from pydrake.systems.framework import DiagramBuilder
 
 from planarfriction.adapters.drake.patches import Placed
 from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import placing
 from planarfriction.kernels.coupling_rows import ALONG, FLAT
-
-_ORIGIN = np.zeros(3)
 
 
 class Shadow:
@@ -44,7 +43,13 @@ class Shadow:
         self._damping = self.dt * _damping(self.plant)
         self._frames = [self.plant.get_frame(each.frame.index()) for each in placed]
         self._others = [self.plant.get_frame(each.other.index()) for each in placed]
-        self._centres, self.follows = [each.patch.centre for each in placed], [each.follows for each in placed]
+        self._placed, self.follows = placed, [each.follows for each in placed]
+        self._reaches = [placing.reach_of(each.patch.model.patch) for each in placed]
+        self._cylinders = [
+            [(self.plant.get_frame(frame.index()), axis) for frame, axis in each.cylinders] for each in placed
+        ]
+        self.faults = [0] * len(placed)
+        """Faults of the places of the patches in the step, as those of `placing`."""
         self._pairs = {}
         for p, each in enumerate(placed):
             for own, other in each.pairs:
@@ -102,15 +107,23 @@ class Shadow:
         the last step, carried along, to these.
         """
         pose = self._frames[p].CalcPoseInWorld(self._begin)
-        turned, place, origin = pose.rotation().matrix(), pose.translation(), _ORIGIN
-        if self._centres[p] == "contact":
-            centre = self._centre(p)
-            origin, place = turned.T @ (centre - place), centre
-        normal, place = _unit(force.tolist()), place.tolist()
+        turned, site, middle = pose.rotation().matrix(), pose.translation(), self._centre(p)
+        normal, centre = _unit(force.tolist()), self._placed[p].centre
+        curved = self._placed[p].round or any(
+            placing.across(frame.CalcRotationMatrixInWorld(self._begin).matrix() @ axis, normal) > placing.CURVED
+            for frame, axis in self._cylinders[p]
+        )
+        at_contact = centre == placing.AT_CONTACT or (centre == placing.AUTO and curved)
+        place = middle if at_contact else list(placing.onto_plane(site.tolist(), middle, normal))
+        origin = turned.T @ (place - site)
         last = _across((turned @ before).tolist(), normal)
         x, last = _axis(turned[:, 0].tolist(), turned[:, 1].tolist(), last, normal)
         y = _cross(normal, x)
         c, s = _dot(last, x), _dot(last, y)
+        away = list(map(operator.sub, middle, place))
+        beyond = max(placing.excess(_dot(x, away), _dot(y, away), 1.0, self._reaches[p])) > 0.0
+        upright = not curved and placing.across(turned[:, 0], normal) < placing.MARGIN**2
+        self.faults[p] = placing.BEYOND if beyond and not at_contact else placing.ALONG_X if upright else 0
         measured = JacobianWrtVariable.kV, self._frames[p], origin, self._others[p], self._world
         spatial = self.plant.CalcJacobianSpatialVelocity(self._begin, *measured)
         seen = np.array([[0.0, 0.0, 0.0, *x], [0.0, 0.0, 0.0, *y], [*normal, 0.0, 0.0, 0.0]])
@@ -146,10 +159,10 @@ class Shadow:
             if key is not None:
                 self._surfaces.append((i, *key))
 
-    def _centre(self, p: int) -> np.ndarray:
+    def _centre(self, p: int) -> list[float]:
         """Return the centre of the contacts of a patch, weighted by their forces."""
         total = sum(force for force, _ in self._pressed[p])
-        return np.array([sum(force * place[i] for force, place in self._pressed[p]) / total for i in range(3)])
+        return [sum(force * place[i] for force, place in self._pressed[p]) / total for i in range(3)]
 
 
 # NumPy's own functions of three numbers take as long as a contact.

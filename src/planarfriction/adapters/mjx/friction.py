@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
@@ -22,6 +23,7 @@ from planarfriction.adapters.mujoco.patches import (
     check_once,
     check_options,
     memory,
+    misplaced_line,
     parameters_in,
     place_of_parameters,
     surface_velocities,
@@ -33,6 +35,7 @@ from planarfriction.formulas import LIGHTEST
 from planarfriction.jax import DistributedModel, ReducedModelPublished
 from planarfriction.jax.base import FrictionPytree
 from planarfriction.jax.namespace import xp
+from planarfriction.kernels import placing
 from planarfriction.models.base import lever_of
 from planarfriction.tensors.pressure import twist_at, wrench_from
 from planarfriction.tensors.steps import LAW
@@ -76,6 +79,9 @@ class _Own(NamedTuple):
 class _Fixed:
     """Parts that do not change with parameters: compared by identity, as one function is compiled for them."""
 
+    placed: list[Placed]
+    said: set[str]
+    """Warnings that have been given."""
     places: responses.PatchPlaces
     which: tuple[int, ...]
     """The model of each patch."""
@@ -122,9 +128,10 @@ class Friction:
         made = zip(numbers, np.array([defaults(patch.model.law) for patch in patches]).T, strict=True)
         changed = {name: jnp.asarray(numbers[name]) for name, own in made if (numbers[name] != own).any()}
         self.parameters: dict[str, jax.Array] = changed
-        columns = (np.array([getattr(each, name) for each in placed]) for name in responses.PatchPlaces._fields[:7])
-        places = responses.PatchPlaces(*columns, radius=radius, surface=surface_velocities(m, placed))
-        self._fixed = _Fixed(places, which, follows, shapes, at, m.nuserdata, check(numbers))
+        columns = (np.array([getattr(each, name) for each in placed]) for name in responses.PatchPlaces._fields[:8])
+        reach = np.array([placing.reach_of(patch.model.patch) for patch in patches])
+        places = responses.PatchPlaces(*columns, reach, radius, surface_velocities(m, placed))
+        self._fixed = _Fixed(placed, set(), places, which, follows, shapes, at, m.nuserdata, check(numbers))
 
     def replace(self, models: Sequence[FrictionPytree]) -> Self:
         """Return the same patches with other models, which must be of the same kinds in the same order.
@@ -190,9 +197,25 @@ class Friction:
 
     def report(self, d: Any) -> Report:
         """Return the statistics of the last step."""
+        self._warn(d)
         at, u = self._fixed.memory, d.userdata
         converged = u[..., at.converged] > 0.0
         return Report(u[..., at.iterations], u[..., at.passes], u[..., at.residual], converged)
+
+    def misplaced(self, d: Any) -> str | None:
+        """Return a line about a patch that did not lie in its contact in the last step, None if all did.
+
+        It is that of any environment; see `planarfriction.adapters.mujoco`. What is read from data outside of compiled
+        functions, and steps outside of them, warn of it once.
+        """
+        return misplaced_line(self._fixed.placed, int(d.userdata[..., self._fixed.memory.misplaced].max()))
+
+    def _warn(self, d: Any) -> None:
+        """Warn, once, of a patch that did not lie in its contact, where data can be read."""
+        line = None if isinstance(d.userdata, jax.core.Tracer) else self.misplaced(d)
+        if line is not None and line not in self._fixed.said:
+            self._fixed.said.add(line)
+            warnings.warn(line, stacklevel=4)
 
     def reset(self, d: Any) -> Any:
         """Return the data with all bristles relaxed."""
@@ -200,6 +223,7 @@ class Friction:
         return d.replace(userdata=d.userdata.at[..., at.before : at.converged + 1].set(0.0))
 
     def _each(self, d: Any, first: int, count: int) -> jax.Array:
+        self._warn(d)
         k = len(self._fixed.which)
         return d.userdata[..., first : first + count * k].reshape(*d.userdata.shape[:-1], k, count)
 
@@ -241,12 +265,14 @@ class Friction:
         d = self._integrated(m, d, where.jacobian, wrench, answer)
         kept = {"state": begun, "after": new, "guess": guess, "load": load, "held": held, "centre": where.moved(shift)}
         kept |= {"before": before, "axis": where.axes[:, 0]}
+        kept |= {"misplaced": where.misplaced(load, found.centre - own.displaced, own.scale, self._fixed.places.reach)}
         shift = shift + own.displaced
         kept |= {"wrench": wrench_from(xp, wrench.reshape(-1, 3), -shift), "twist": twist_at(xp, twist, shift)}
         kept |= {"time": given.time, "next": d.time, "iterations": found.iterations, "passes": found.passes}
         holds = found.slack <= SLACK[found.slack.dtype.name]
         kept |= {"residual": found.residual, "converged": found.converged & holds}
         d = d.replace(userdata=self._written(d.userdata, kept))
+        self._warn(d)
         # in double precision MJX makes long integers of some that came in short, at which `lax.scan` would stop
         return jax.tree.map(lambda after, before: after.astype(before.dtype), d, given)
 

@@ -19,6 +19,7 @@ from planarfriction.adapters.mjx.newton import HostResponse
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
 from planarfriction.formulas import turning_mean
 from planarfriction.jax.namespace import xp
+from planarfriction.kernels import placing
 from planarfriction.kernels.coupling_rows import ALONG, FLAT
 from planarfriction.tensors.pressure import centre_of
 
@@ -132,10 +133,14 @@ class PatchPlaces(NamedTuple):
     other: Any
     owner: Any
     support: Any
-    at_contact: Any
-    """True where the origin follows the contact forces."""
     carrier: Any
     """The geom along with which the patch goes over the other."""
+    centre: Any
+    """Origins, as those of `placing`."""
+    curved: Any
+    """Bits of their curved sides, as those of `placing`."""
+    reach: Any
+    """Reaches of the patches (see `placing`), `[k, 4]` [m]."""
     radius: Any
     """Lever arms of the patches [m]."""
     surface: Any
@@ -163,6 +168,10 @@ class Geometry(NamedTuple):
     """Cosine and sine of the angles from the x axes of the last step, carried along, to these, `[k, 2]`."""
     drift: jax.Array
     """Part of the twists that no wrench changes: of the surfaces and of what turns, own less other, `[k, 3]`."""
+    at_contact: jax.Array
+    """True for patches whose origin follows the contact forces, `[k]`."""
+    upright: jax.Array
+    """True for patches on no curved side whose sites have their x axis along the normal, `[k]`."""
 
     def carry(self, p: int, vectors: jax.Array) -> jax.Array:
         """Return vectors of patch p, x and y in front, in its axes of this step instead of the last ones."""
@@ -176,7 +185,15 @@ class Geometry(NamedTuple):
     def moved(self, shift: jax.Array) -> jax.Array:
         """Return origins `[k, 3]` that move by `[k, 2]` [m] in the patches, in the frames of the sites."""
         held = self.origin + jnp.einsum("pi,pij->pj", shift, self.axes[:, :2])
-        return jnp.where((self.share > 0.0)[:, None], held, 0.0)
+        return jnp.where(self.touching[:, None], held, 0.0)
+
+    def misplaced(self, load: jax.Array, centre: jax.Array, scale: jax.Array, reach: jax.Array) -> jax.Array:
+        """Return the fault of the last patch that has one (see `placing`), with contact forces at these centres."""
+        beyond = jnp.maximum(*jax.vmap(placing.excess)(centre[:, 0], centre[:, 1], scale, reach)) > 0.0
+        upright = jnp.where(self.upright, placing.ALONG_X, 0)
+        fault = jnp.where(beyond & ~self.at_contact, placing.BEYOND, upright)
+        noted = placing.FAULTS * jnp.arange(len(fault)) + fault
+        return jnp.where((load > 0.0) & (fault > 0), noted, 0).max()
 
 
 def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Array) -> Geometry:
@@ -204,9 +221,14 @@ def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Ar
         x = _unit(jnp.where(flat >= ALONG, sided, across[:, 1]), touching)
         x = jnp.where(kept & (flat < FLAT), along, x)
         middle = jnp.where(chosen[:, None], contact.pos, 0.0).sum(0) / jnp.maximum(chosen.sum(), 1)
-        last, new = site + turned @ held, (held == 0.0).all()
-        last = jnp.where(new, middle, last + normal * (normal @ (middle - last)))
-        centre = jnp.where(place.at_contact, last, site)
+        curved = place.curved & placing.ROUND > 0
+        for geom, side in ((place.own, placing.OWN), (place.other, placing.OTHER)):
+            axis = d.geom_xmat[geom].reshape(3, 3)[:, 2]
+            curved |= (place.curved & side > 0) & (placing.across(axis, normal) > placing.CURVED)
+        at_contact = (place.centre == placing.AT_CONTACT) | ((place.centre == placing.AUTO) & curved)
+        new = (held == 0.0).all()
+        last = jnp.where(new, middle, site + turned @ held)
+        centre = jnp.stack(placing.onto_plane(jnp.where(at_contact, last, site), middle, normal))
         y = jnp.cross(normal, x)
         carried = jnp.where(kept, jnp.stack([along @ x, -along @ y]), jnp.array([1.0, 0.0]))
         sides = zip((place.owner, place.support), (place.own, place.other), place.surface, strict=True)
@@ -222,10 +244,12 @@ def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Ar
         rolled, slid = xp.norm(across @ spin, -1)[0], xp.norm(jacobian[:2] @ d.qvel + drift[:2], -1)[0]
         rolled += jnp.where(place.radius > 0.0, slid / place.radius, 0.0)
         share = jnp.where(new, 1.0, jnp.minimum(1.0, m.opt.timestep * rolled / FOLLOWS))
-        share = jnp.where(touching & place.at_contact, share, 0.0)
+        share = jnp.where(touching & at_contact, share, 0.0)
+        upright = ~curved & (placing.across(turned[:, 0], normal) < placing.MARGIN**2)
         axes = jnp.where(touching, jnp.stack([x, y, normal]) @ turned, before)
         place_of = turned.T @ (centre - site)
-        return jnp.where(touching, jacobian, 0.0), own, touching, place_of, axes, share, carried, drift
+        jacobian = jnp.where(touching, jacobian, 0.0)
+        return jacobian, own, touching, place_of, axes, share, carried, drift, at_contact, upright
 
     jacobian, own, *others = jax.vmap(one)(jax.tree.map(jnp.asarray, where), held, before)
     rows = jnp.zeros((len(where.site), 3, d._impl.efc_J.shape[0])).at[:, :, contact.efc_address].set(own)

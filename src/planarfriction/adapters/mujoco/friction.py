@@ -19,7 +19,6 @@ import numpy as np
 from planarfriction.adapters.mujoco.draw import draw_patch
 from planarfriction.adapters.mujoco.library import layout, same
 from planarfriction.adapters.mujoco.loops import step as loops
-from planarfriction.adapters.mujoco.loops.centres import FAULTS
 from planarfriction.adapters.mujoco.loops.records import Host, scratch_layout
 from planarfriction.adapters.mujoco.patches import (
     PatchContact,
@@ -27,6 +26,7 @@ from planarfriction.adapters.mujoco.patches import (
     check_once,
     check_options,
     memory,
+    misplaced_line,
     parameters_in,
     place_of_parameters,
 )
@@ -168,11 +168,10 @@ class Friction:
     def misplaced(self, d: Any) -> str | None:
         """Return a line about a patch that did not lie in its contact in the last step, None if all did.
 
-        Its site is so far from the contact forces that they act beyond the patch, or on another side of its geom, or
-        has its x axis along the normal. `step` warns of it once.
+        Its site is so far beside the contact forces that they act beyond the patch, or has its x axis along the normal.
+        `step` warns of it once.
         """
-        found = int(d.userdata[self._memory.misplaced])
-        return self.placed[found // FAULTS].fault(found % FAULTS) if found else None
+        return misplaced_line(self.placed, int(d.userdata[self._memory.misplaced]))
 
     def report(self, d: Any) -> Report:
         """Return the statistics of the last step."""
@@ -282,7 +281,7 @@ class Friction:
         return row_of(host)
 
 
-_COLUMNS = "site", "own", "other", "owner", "support", "pair", "at_contact", "has_faces", "carrier", "on_box"
+_COLUMNS = "site", "own", "other", "owner", "support", "pair", "centre", "curved", "carrier", "on_box"
 """Attributes of `Placed` that compiled steps read, and fields of `Host` with their addresses."""
 
 _ALONE = "mj_step has none by itself; call friction.step(d) instead, or mj_step within friction.install()"

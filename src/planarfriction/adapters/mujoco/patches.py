@@ -16,8 +16,6 @@ import mujoco
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.adapters.mujoco.loops.centres import ALONG as ALONG_X
-from planarfriction.adapters.mujoco.loops.centres import BEHIND, BEYOND
 from planarfriction.adapters.mujoco.loops.models import DIGEST, LONGEST
 from planarfriction.adapters.mujoco.loops.records import Memory, memory_layout
 from planarfriction.compiler.memory import Layout
@@ -25,6 +23,7 @@ from planarfriction.environments import defaults
 from planarfriction.equality import Checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import PARAMETERS
+from planarfriction.kernels import placing
 from planarfriction.models import FrictionModel
 
 RECORD = "planarfriction"
@@ -69,8 +68,8 @@ class PatchContact(Checked):
     geoms: tuple[str, str]
     """Names of the two geoms in contact; one is on the site's body."""
     centre: str = "auto"
-    """Origin of the patch: that of the "site", or the centre of the forces of "contact"; "auto" follows the contact of
-    a sphere, a capsule or an ellipsoid, and of a cylinder with the site on its curved side."""
+    """Origin of the patch in the plane of the contact: below the "site" along the normal, or the centre of the forces
+    of "contact"; "auto" follows the contact of a sphere, a capsule, an ellipsoid, and of a cylinder's curved side."""
     pressure: str = "auto"
     """Pressure that "follows" the moments of the contact forces (see `ContactPatch.weights`), or is "fixed" to the
     patch; "auto" follows between two boxes, and between a plane and what is not a sphere, a capsule or an ellipsoid."""
@@ -119,7 +118,7 @@ def prepare(spec: Any, patches: Sequence[PatchContact]) -> Any:
     for patch in patches:
         _choose("site", patch.site, [each.name for each in spec.sites])
         for name in patch.geoms:
-            _choose("geoms", name, [each.name for each in spec.geoms])
+            _choose("geoms", name, [each.name for each in spec.geoms], [each.name for each in spec.flexes])
     compiled = spec.copy().compile()
     for patch in patches:
         pair = next((each for each in spec.pairs if {each.geomname1, each.geomname2} == set(patch.geoms)), None)
@@ -239,16 +238,16 @@ class Placed:
         free = faces and patch.model.law.reference_load is None
         self.follows = patch.pressure == "follows" or (patch.pressure == "auto" and free)
         """True if the pressure follows the contact forces."""
-        curved = bool(_ROUND.intersection(kinds)) or self._on_curved_side(m)
-        self.at_contact = patch.centre == "contact" or (patch.centre == "auto" and curved)
-        """True if the origin follows the contact forces."""
         reach = [math.inf if m.geom_type[geom] == _PLANE else m.geom_rbound[geom] for geom in (self.own, self.other)]
         self.carrier = self.own if reach[0] <= reach[1] else self.other
         """The smaller geom, along with which the patch goes over the other."""
+        self.centre = CENTRES.index(patch.centre)
+        """Origin of the patch, one of those of `placing`."""
+        self.curved = placing.ROUND if _ROUND.intersection(kinds) else 0
+        """Bits of its curved sides, as those of `placing`."""
+        for geom, bit in ((self.own, placing.OWN), (self.other, placing.OTHER)):
+            self.curved |= bit if int(m.geom_type[geom]) == _CYLINDER else 0
         self.on_box = int(m.geom_type[self.other]) == _BOX
-        own = int(m.geom_type[self.own])
-        self.has_faces = own != _PLANE and own not in _ROUND and not self._on_curved_side(m)
-        """True if the geom on the site's body has different sides."""
         for pair in range(m.npair):
             if {int(m.pair_geom1[pair]), int(m.pair_geom2[pair])} == set(self.geoms.tolist()):
                 self.pair = pair
@@ -298,29 +297,17 @@ class Placed:
         return d.site_xpos[self.site] + turned @ centre, np.array([x, np.cross(normal, x), normal])
 
     def extent(self) -> tuple[float, ...]:
-        """Return least and largest x and y of the patch, its largest distance from its origin, its edge's width [m]."""
+        """Return the reach of the patch (see `placing`) and the width of its edge, [5] [m]."""
         patch = self.patch.model.patch
-        (x, y), half = patch.positions.T, 0.5 * math.sqrt(patch.areas.max())
-        far = float(np.hypot(x, y).max()) + half
-        return x.min() - half, x.max() + half, y.min() - half, y.max() + half, far, EDGE * far
+        return *placing.reach_of(patch), EDGE * placing.size_of(patch)
 
-    def fault(self, number: int) -> str:
-        """Return a line about a patch that does not lie in its contact."""
-        words = {
-            BEYOND: 'contact forces act beyond the patch: put the site into the contact, or use centre="contact"',
-            BEHIND: "it lies on another side of its geom than the contact",
-            ALONG_X: "its x axis lies along the normal of the contact, where its y axis takes its place",
-        }
-        return f"site {self.patch.site} of the contact between {' and '.join(self.patch.geoms)}: {words[number]}"
 
-    def _on_curved_side(self, m: Any) -> bool:
-        """Return True if the geom on the site's body is a cylinder, and the site nearer to its curved side."""
-        if int(m.geom_type[self.own]) != _CYLINDER:
-            return False
-        axis, away = np.zeros(3), m.site_pos[self.site] - m.geom_pos[self.own]
-        mujoco.mju_rotVecQuat(axis, np.array([0.0, 0.0, 1.0]), m.geom_quat[self.own])
-        along, (radius, half, _) = axis @ away, m.geom_size[self.own]
-        return bool(abs(along) / half < math.sqrt(max(away @ away - along**2, 0.0)) / radius)
+def misplaced_line(placed: Sequence[Placed], found: int) -> str | None:
+    """Return a line about the patch and fault that a step has noted in its memory, None for 0."""
+    if found == 0:
+        return None
+    patch = placed[found // placing.FAULTS].patch
+    return placing.fault_line("site", patch.site, patch.geoms, found % placing.FAULTS)
 
 
 def surface_velocities(m: Any, placed: Sequence[Placed]) -> np.ndarray:
@@ -333,13 +320,16 @@ def _named(m: Any, what: str, name: str, kind: Any) -> int:
     found = mujoco.mj_name2id(m, kind, name)
     if found < 0:
         count = getattr(m, f"n{kind.name.removeprefix('mjOBJ_').lower()}")
-        _choose(what, name, [mujoco.mj_id2name(m, kind, i) for i in range(count)])
+        flexes = [mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_FLEX, i) for i in range(m.nflex)]
+        _choose(what, name, [mujoco.mj_id2name(m, kind, i) for i in range(count)], flexes)
     return found
 
 
-def _choose(what: str, name: str, names: Iterable[str | None]) -> None:
+def _choose(what: str, name: str, names: Iterable[str | None], flexes: Iterable[str | None] = ()) -> None:
     """Raise unless a name is among these, and tell some of them, like ones first."""
     known = sorted(filter(None, names))
+    if what == "geoms" and name not in known and name in flexes:
+        raise InvalidValueError(what, "be rigid: flexes cannot have patches", name)
     if name not in known:
         near = difflib.get_close_matches(name, known, 3) or known[:5]
         told = f" (did you mean {' or '.join(near)}?)" if near else ""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -22,13 +23,15 @@ from planarfriction.adapters.mujoco.patches import (
     check_options,
     layout_of,
     memory,
+    misplaced_line,
     parameters_in,
     place_of_parameters,
     surface_velocities,
 )
-from planarfriction.adapters.mujoco_warp.loops import geometry, responses
+from planarfriction.adapters.mujoco_warp.loops import centres, geometry, responses
 from planarfriction.coupling import HostStep
 from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import placing
 from planarfriction.models.base import lever_of
 from planarfriction.warp import CoupledPatches
 
@@ -99,6 +102,8 @@ class Friction:
         size = layout_of(patches, m.nv).size
         self._memory = self.data.userdata if prepared else wp.zeros((worlds, size), dtype=float)
         self._at = memory(patches, m.nv, prepared or size)
+        self._said: set[str] = set()
+        self._steps = 0
         self._make(worlds)
 
     # ------------------------------------------------------------------ what the data hold
@@ -121,10 +126,26 @@ class Friction:
 
     def report(self) -> Report:
         """Wait for the device; return the statistics of the last step, arrays [worlds]."""
+        self._warn()
         u: Any = self._memory.numpy().copy()
         at = self._at
         rounds, passes = u[:, at.iterations].astype(int), u[:, at.passes].astype(int)
         return Report(rounds, passes, u[:, at.residual], u[:, at.converged] > 0.0)
+
+    def misplaced(self) -> str | None:
+        """Wait for the device; return a line about a patch that did not lie in its contact in the last step.
+
+        It is that of any world, and None if all lay there; see `planarfriction.adapters.mujoco`. `report` warns of it
+        once, and `step`, which looks after 1, 2, 4, 8 and so on steps.
+        """
+        return misplaced_line(self.placed, int(self._memory.numpy()[:, self._at.misplaced].max()))
+
+    def _warn(self) -> None:
+        """Warn, once, of a patch that did not lie in its contact."""
+        line = self.misplaced()
+        if line is not None and line not in self._said:
+            self._said.add(line)
+            warnings.warn(line, stacklevel=3)
 
     def reset(self) -> None:
         """Relax all bristles."""
@@ -142,6 +163,9 @@ class Friction:
         """
         with self.install():
             mjw.step(self.model, self.data)
+        self._steps += 1
+        if self._steps & (self._steps - 1) == 0 and not self._memory.device.is_capturing:
+            self._warn()
 
     @contextmanager
     def install(self) -> Iterator[Friction]:
@@ -180,7 +204,7 @@ class Friction:
         mjw.fwd_actuation(m, d)
         mjw.fwd_acceleration(m, d, factorize=True)
         mjw.solve(m, d)
-        launch(geometry.follow_centres, patches, host, frames, problem)
+        launch(centres.follow_centres, patches, host, frames, problem, self.coupled.parameters)
         if host.implicit == 2:
             mjw.deriv_smooth_vel(m, d, self._metric)
         for i in range(PASSES):
@@ -220,11 +244,13 @@ class Friction:
     def _numbers(self) -> Any:
         """Return the numbers of the patches for kernels."""
         shapes = [each.model.state_shape for each in self.patches]
-        names = "site", "own", "other", "owner", "support", "at_contact"
+        names = "site", "own", "other", "owner", "support", "centre", "curved"
         found = {name: [int(getattr(each, name)) for each in self.placed] for name in names}
         found |= {"bristles": [math.prod(shape[1:]) for shape in shapes]}
         found |= {"first": np.cumsum([0, *map(math.prod, shapes)])[:-1].tolist()}
         found |= {"radius": [lever_of(each.model) for each in self.patches]}
+        found |= {"reach": [placing.reach_of(each.model.patch) for each in self.patches]}
+        found |= {"scale": [end - 1 for end in np.cumsum([len(names) for names in self.coupled.names]).tolist()]}
         found |= {"surface": surface_velocities(self.m, self.placed).astype(np.float32)}
         kinds, device = geometry.Patches.vars, self.coupled.device
         arrays = {name: wp.array(each, dtype=kinds[name].type.dtype, device=device) for name, each in found.items()}

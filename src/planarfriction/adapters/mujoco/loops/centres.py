@@ -9,25 +9,27 @@ from __future__ import annotations
 
 import math
 
-from planarfriction.adapters.mujoco.loops.geometry import axes, column, owners_of, places_of
+from planarfriction.adapters.mujoco.loops.geometry import (
+    across,
+    axes,
+    column,
+    is_at_contact,
+    is_curved,
+    owners_of,
+    places_of,
+)
 from planarfriction.adapters.mujoco.loops.models import displacement_of, scale_of
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import at, doubles, integers
+from planarfriction.kernels import placing
 from planarfriction.kernels.vectors import dot, plus, square, three
 
 FOLLOWS = 1e-3
 """Angle [rad] by which bodies roll on each other, and displacement in lever arms of the patch by which they slide, in a
 step in which the origin moves all the way to the centre of the contact forces; less in proportion."""
 
-FAULTS = 4
-"""Number of faults, none included: 0."""
-
-BEYOND, BEHIND, ALONG = 1, 2, 3
-"""Faults: the contact forces act beyond the patch; it lies on another side of the geom; x lies along the normal."""
-
-MARGIN = 0.1
-"""Share of its size by which a patch may lie beside its contact, and sine of the least angle of x to the normal."""
+excess = kernel(placing.excess)
 
 
 @kernel
@@ -74,22 +76,12 @@ def _move(own, s, nefc, p, guess, dx, dy):
 def _fault(own, m, d, s, p, x, y):
     """Return the fault of patch p, with the centre of its contact forces at x, y in its frame."""
     scale, (dx, dy) = scale_of(own, m, p), displacement_of(own, m, p)
-    frame, site, extent = at(s.frames, 6 * p), integers(own.site)[p], at(doubles(own.extents), 6 * p)
-    normal, faces = axes(s, p)[2], integers(own.has_faces)[p] != 0
-    if integers(own.at_contact)[p] == 0:
-        size = scale * extent[4]
-        slack = MARGIN * size + s.depths[2 * p + 1]
-        if x - dx < scale * extent[0] - slack or x - dx > scale * extent[1] + slack:
-            return BEYOND
-        if y - dy < scale * extent[2] - slack or y - dy > scale * extent[3] + slack:
-            return BEYOND
-        geom = three(at(doubles(integers(d + own.data.geom_xpos)[0]), 3 * integers(own.own)[p]))
-        if faces and dot(normal, plus(three(at(frame, 3)), -1.0, geom)) > MARGIN * size:
-            return BEHIND
-        if abs(s.depths[2 * p]) > size + slack:
-            return BEYOND
+    reach, site = at(doubles(own.extents), 5 * p), integers(own.site)[p]
+    if not is_at_contact(own, d, s, p) and xp.maximum(*excess(x - dx, y - dy, scale, reach)) > 0.0:
+        return placing.BEYOND
     along = column(at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site), 0)
-    return ALONG if faces and square(plus(along, -dot(normal, along), normal)) < MARGIN**2 else 0
+    upright = across(along, axes(s, p)[2]) < placing.MARGIN**2
+    return placing.ALONG_X if upright and not is_curved(own, d, s, p) else 0
 
 
 @kernel
@@ -108,11 +100,11 @@ def _support(own, m, d, s, p, support):
     place = three(at(doubles(integers(d + own.data.geom_xpos)[0]), 3 * other))
     away = plus(place, -1.0, three(at(s.frames, 6 * p + 3)))
     for k in range(3):
-        if dot(normal, column(turned, k)) ** 2 > 1.0 - MARGIN**2:
+        if across(column(turned, k), normal) < placing.MARGIN**2:
             i, j = (k + 1) % 3, (k + 2) % 3
             first = column(turned, i)
             support[0], support[1] = shrunk * dot(x, away), shrunk * dot(y, away)
-            support[2], support[3], support[6] = dot(x, first), dot(y, first), doubles(own.extents)[6 * p + 5]
+            support[2], support[3], support[6] = dot(x, first), dot(y, first), doubles(own.extents)[5 * p + 4]
             support[4], support[5] = shrunk * half[i], shrunk * half[j]
 
 
@@ -147,16 +139,16 @@ def follow_centres(own, m, d, s, nefc, radius, problem, kept):
         if force > 0.0:
             fault = _fault(own, m, d, s, p, x, y)
             if fault != 0:
-                kept.misplaced[0] = FAULTS * p + fault
+                kept.misplaced[0] = placing.FAULTS * p + fault
         guess = at(problem.guess, 3 * p)
-        if integers(own.at_contact)[p] != 0:
+        if is_at_contact(own, d, s, p):
             lever = scale_of(own, m, p) * radius[p]
             share = 1.0 if square(three(held)) == 0.0 else _share(own, d, s, p, lever, dt)
             _move(own, s, nefc, p, guess, share * x, share * y)
-            turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
-            place = three(at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site))
-            away = plus(three(at(s.frames, 6 * p + 3)), -1.0, place)
-            for i in range(3):
-                centre[i] = dot(column(turned, i), away)
+        turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
+        place = three(at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site))
+        away = plus(three(at(s.frames, 6 * p + 3)), -1.0, place)
+        for i in range(3):
+            centre[i] = dot(column(turned, i), away)
         _resize(own, m, s, nefc, p, guess)
         _support(own, m, d, s, p, at(problem.support, 7 * p))

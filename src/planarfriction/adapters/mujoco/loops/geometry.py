@@ -15,13 +15,16 @@ from __future__ import annotations
 
 import math
 
-from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call_c
 from planarfriction.compiler.memory import at, doubles, integers, integers32
 from planarfriction.formulas import turning_mean
+from planarfriction.kernels import placing
 from planarfriction.kernels.coupling_rows import ALONG, FLAT
 from planarfriction.kernels.vectors import clear, dot, norm, plus, square, three, times, zeros
+
+onto_plane = kernel(placing.onto_plane)
+across = kernel(placing.across)
 
 
 @kernel
@@ -44,7 +47,7 @@ def _collect(own, d, s, nefc):
     for r in range(nefc):
         owners[r] = -1
     for p in range(own.count):
-        counts[p], s.depths[2 * p + 1] = 0, 0.0
+        counts[p] = 0
     clear(frames, 6 * own.count)
     for c in range(ncon):
         contact = contacts + own.contact.size * c
@@ -62,7 +65,6 @@ def _collect(own, d, s, nefc):
                     frames[6 * p + 3 + i] += doubles(contact + own.contact.pos)[i]
                 counts[p] += 1
                 owners[row] = p
-                s.depths[2 * p + 1] = xp.maximum(s.depths[2 * p + 1], -doubles(contact + own.contact.dist)[0])
 
 
 @kernel
@@ -190,20 +192,44 @@ def _put_places(own, d, s, nefc, p, centre, x, y):
 
 
 @kernel
-def _put_origin(own, d, s, p, normal, held):
-    """Write the origin of patch p in place of the sum of its contacts: at the site, or at the last centre, if any.
+def _turns_over(own, d, geom, normal):
+    """Return True if a cylinder touches with its curved side."""
+    turned = at(doubles(integers(d + own.data.geom_xmat)[0]), 9 * geom)
+    return across(column(turned, 2), normal) > placing.CURVED
 
-    The latter moves with the body of the site, within the plane of the contacts.
+
+@kernel
+def is_curved(own, d, s, p):
+    """Return True if patch p lies on a curved side, of either geom."""
+    sides, normal = integers(own.curved)[p], axes(s, p)[2]
+    return (
+        sides & placing.ROUND != 0
+        or (sides & placing.OWN != 0 and _turns_over(own, d, integers(own.own)[p], normal))
+        or (sides & placing.OTHER != 0 and _turns_over(own, d, integers(own.other)[p], normal))
+    )
+
+
+@kernel
+def is_at_contact(own, d, s, p):
+    """Return True if the origin of patch p follows the contact forces."""
+    centre = integers(own.centre)[p]
+    return centre == placing.AT_CONTACT or (centre == placing.AUTO and is_curved(own, d, s, p))
+
+
+@kernel
+def _put_origin(own, d, s, p, normal, held):
+    """Write the origin of patch p, in the plane of its contacts, in place of the sum of these.
+
+    It lies below the site, or at the last centre, if any, which moves with the body of the site.
     """
     frame, local = at(s.frames, 6 * p), three(held)
     middle = times(1.0 / s.counts[p], three(at(frame, 3)))
     site, new = integers(own.site)[p], square(local) == 0.0
     turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
-    origin = plus(three(at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site)), 1.0, turned_by(turned, local))
-    if integers(own.at_contact)[p] != 0:
-        origin = middle if new else plus(origin, dot(normal, plus(middle, -1.0, origin)), normal)
-    s.depths[2 * p] = dot(normal, plus(middle, -1.0, origin))
-    frame[3], frame[4], frame[5] = origin
+    origin = three(at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site))
+    if is_at_contact(own, d, s, p):
+        origin = middle if new else plus(origin, 1.0, turned_by(turned, local))
+    frame[3], frame[4], frame[5] = onto_plane(origin, middle, normal)
 
 
 @kernel

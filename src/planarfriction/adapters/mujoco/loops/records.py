@@ -64,7 +64,7 @@ class Remembered(NamedTuple):
     guess: Doubles
     """Wrenches at the beginning of the step, [3k]."""
     held: Doubles
-    """Origins of patches at the beginning of the step, in the frames of their sites, [3k]; 0 at a site, or for none."""
+    """Origins of patches at the beginning of the step, in the frames of their sites, [3k]; 0 for none."""
     axis: Doubles
     """x axes of patches in the step, [3k]."""
     after: Doubles
@@ -92,7 +92,7 @@ class Remembered(NamedTuple):
     passes: Doubles
     residual: Doubles
     misplaced: Doubles
-    """0, or `FAULTS p + fault` of a patch p that does not lie in its contact (see `centres`)."""
+    """0, or `FAULTS p + fault` of a patch p that does not lie in its contact (see `placing`)."""
     converged: Doubles
 
 
@@ -151,8 +151,6 @@ class Scratch(NamedTuple):
     their surfaces (`surfacevel`), and of the turning of both (see `geometry`)."""
     tilts: Doubles
     """Speeds at which the bodies roll or rock on each other [rad/s], [k]."""
-    depths: Doubles
-    """Means over these of positions along the normal from the origin, and the largest overlap [m], [k, 2]."""
     misses: Doubles
     """J qacc - aref, [nefc]; behind them `owners_of` finds the patch of each constraint, -1 of others, and `places_of`
     the points of contacts."""
@@ -169,7 +167,7 @@ def scratch_layout(words: int, records: int, k: int, nv: int) -> Layout:
     """
     n = 3 * k
     shapes = {"problem": words, "records": records, "jacobian": n * nv, "more": nv, "block": 36, "frames": 2 * n}
-    shapes |= {"counts": k, "tilts": k, "depths": 2 * k, "carried": 2 * k, "misses": 0}
+    shapes |= {"counts": k, "tilts": k, "carried": 2 * k, "misses": 0}
     shapes |= dict.fromkeys(("inertia", "stiff"), nv * nv) | dict.fromkeys(("answers", "held"), nv * (n + 1))
     shapes |= dict.fromkeys(("moves", "turns"), 3 * nv) | dict.fromkeys(("start", "goal", "move", "axes", "drift"), n)
     return Layout(Scratch, **shapes)
@@ -209,17 +207,16 @@ class Host(NamedTuple):
     support: int
     pair: int
     """Contact pairs of the model."""
-    at_contact: int
-    """Address of flags: 1 where the origin is at the centre of the contact forces."""
-    has_faces: int
-    """Address of flags: 1 where a side of the geom on the site's body, and an axis on it, can be told from others."""
+    centre: int
+    """Origins of the patches, as those of `placing`."""
+    curved: int
+    """Bits of their curved sides, as those of `placing`."""
     carrier: int
     """Address of the geoms along with which the patches go over the others."""
     on_box: int
     """Address of flags: 1 where the other geom is a box, whose faces bear patches as far as they go."""
     extents: int
-    """Address of least and largest x and y of each patch, its largest distance from the origin, and the width of
-    the edge beyond which cells carry nothing, [k, 6] [m]."""
+    """Address of the reach of each patch, and the width of the edge beyond which cells carry nothing, [k, 5] [m]."""
     parameters: int
     """Place of the parameters of the patches in the numerics of a model, behind the digest of the patches."""
     laws: int

@@ -1,6 +1,6 @@
 """Places of patches in contact in the worlds of MuJoCo Warp, and the Jacobian of their twists, as kernels.
 
-As `planarfriction.adapters.mujoco.loops.geometry` and `centres`, one thread a world.
+As `planarfriction.adapters.mujoco.loops.geometry`, one thread a world.
 """
 
 # No `from __future__ import annotations` here: Warp reads the types themselves.
@@ -8,11 +8,14 @@ As `planarfriction.adapters.mujoco.loops.geometry` and `centres`, one thread a w
 import mujoco
 import warp as wp
 
-from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
 from planarfriction.adapters.mujoco.loops.records import Memory
+from planarfriction.kernels import placing
 from planarfriction.kernels.coupling_rows import ALONG, FLAT
 
 FRICTIONLESS = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS))
+
+onto_plane = wp.func(placing.onto_plane)
+across = wp.func(placing.across)
 
 
 @wp.struct
@@ -26,7 +29,14 @@ class Patches:
     other: wp.array(dtype=int)
     owner: wp.array(dtype=int)
     support: wp.array(dtype=int)
-    at_contact: wp.array(dtype=int)
+    centre: wp.array(dtype=int)
+    """Origins, as those of `placing`."""
+    curved: wp.array(dtype=int)
+    """Bits of their curved sides, as those of `placing`."""
+    reach: wp.array(dtype=wp.vec4)
+    """Reaches of the patches (see `placing`) [m]."""
+    scale: wp.array(dtype=int)
+    """Columns of their sizes in the parameters of `CoupledPatches`."""
     bristles: wp.array(dtype=int)
     """Number of bristles of a patch: all x components come before all y."""
     first: wp.array(dtype=int)
@@ -110,8 +120,12 @@ class Frames:
     """Speed at which the bodies roll on each other [rad/s], [E, k]."""
     jacobian: wp.array3d(dtype=float)
     """[E, 3k, nv]"""
+    at_contact: wp.array2d(dtype=int)
+    """1 of patches whose origin follows the contact forces [E, k]."""
+    fault: wp.array2d(dtype=int)
+    """Faults of the places of the patches, as those of `placing` [E, k]."""
     held: wp.array2d(dtype=wp.vec3)
-    """Origins at the beginning of the step in the frames of the sites; 0 at a site, or for none [E, k]."""
+    """Origins at the beginning of the step in the frames of the sites; 0 for none [E, k]."""
     centre: wp.array2d(dtype=wp.vec3)
     """Origins in the step [E, k]."""
     before: wp.array2d(dtype=wp.vec3)
@@ -160,10 +174,16 @@ def jacobian_of(host: Host, w: int, point: wp.vec3, body: int, dof: int) -> wp.s
 
 
 @wp.func
+def axis_of(turned: wp.mat33, i: int) -> wp.vec3:
+    """Return an axis of a frame in the world."""
+    return wp.vec3(turned[0, i], turned[1, i], turned[2, i])
+
+
+@wp.func
 def axes_of(turned: wp.mat33, normal: wp.vec3, last: wp.vec3) -> wp.mat33:
     """Return the axes of a patch as rows: x along that of its site, across the normal, on the side of the last one."""
-    one = wp.vec3(turned[0, 0], turned[1, 0], turned[2, 0])
-    two = wp.vec3(turned[0, 1], turned[1, 1], turned[2, 1])
+    one = axis_of(turned, 0)
+    two = axis_of(turned, 1)
     x = one - wp.dot(one, normal) * normal
     flat = wp.dot(x, x)
     if wp.dot(last, last) > 0.0:
@@ -218,6 +238,19 @@ def touch(patches: Patches, host: Host, frames: Frames, w: int, p: int, nefc: in
                 middle += host.pos[c]
                 count += 1
     return normal, middle, count
+
+
+@wp.func
+def is_curved(patches: Patches, host: Host, w: int, p: int, normal: wp.vec3) -> bool:
+    """Return True if a patch lies on a curved side, of either geom."""
+    sides = patches.curved[p]
+    if (sides & wp.static(placing.ROUND)) != 0:
+        return True
+    own = across(axis_of(host.geom_xmat[w, patches.own[p]], 2), normal)
+    other = across(axis_of(host.geom_xmat[w, patches.other[p]], 2), normal)
+    if (sides & wp.static(placing.OWN)) != 0 and own > wp.static(placing.CURVED):
+        return True
+    return (sides & wp.static(placing.OTHER)) != 0 and other > wp.static(placing.CURVED)
 
 
 @wp.func
@@ -291,12 +324,20 @@ def place(patches: Patches, host: Host, frames: Frames, problem: Problem):
         carry(patches, problem, w, p, last, x, normal)
         origin = host.site_xpos[w, site]
         held = frames.held[w, p]
-        if patches.at_contact[p] != 0:
+        curved = is_curved(patches, host, w, p, normal)
+        centre = patches.centre[p]
+        frames.at_contact[w, p] = 0
+        if centre == wp.static(placing.AT_CONTACT) or (centre == wp.static(placing.AUTO) and curved):
+            frames.at_contact[w, p] = 1
             if held[0] == 0.0 and held[1] == 0.0 and held[2] == 0.0:
                 origin = middle
             else:
                 origin += turned * held
-                origin += wp.dot(normal, middle - origin) * normal
+        frames.fault[w, p] = 0
+        if not curved and across(axis_of(turned, 0), normal) < wp.static(placing.MARGIN**2):
+            frames.fault[w, p] = wp.static(placing.ALONG_X)
+        o_x, o_y, o_z = onto_plane(origin, middle, normal)
+        origin = wp.vec3(o_x, o_y, o_z)
         own = patches.own[p]
         other = patches.other[p]
         drift = drift_of(host.geom_xmat[w, own], origin - host.geom_xpos[w, own], patches.surface[p, 0], axes)
@@ -310,53 +351,3 @@ def place(patches: Patches, host: Host, frames: Frames, problem: Problem):
             if frames.owner[w, r] == p:
                 away = axes * (host.pos[host.id[w, r]] - origin)
                 frames.lever[w, r] = wp.vec2(away[0], away[1])
-
-
-@wp.func
-def speed_of(host: Host, frames: Frames, w: int, p: int) -> float:
-    """Return the speed at which a patch slides [m/s]."""
-    v = wp.vec2(frames.drift[w, p][0], frames.drift[w, p][1])
-    for i in range(frames.jacobian.shape[2]):
-        v += host.qvel[w, i] * wp.vec2(frames.jacobian[w, 3 * p, i], frames.jacobian[w, 3 * p + 1, i])
-    return wp.length(v)
-
-
-@wp.kernel(enable_backward=False)
-def follow_centres(patches: Patches, host: Host, frames: Frames, problem: Problem):
-    """Move origins towards the centres of the contact forces, as far as bodies move on each other, and note them."""
-    w = wp.tid()
-    nefc = wp.min(host.nefc[w], frames.owner.shape[1])
-    for p in range(patches.count):
-        frames.centre[w, p] = wp.vec3()
-        if frames.touching[w, p] == 0 or patches.at_contact[p] == 0:
-            continue
-        total = float(0.0)
-        sum = wp.vec2()
-        for r in range(nefc):
-            if frames.owner[w, r] == p:
-                total += host.force[w, r]
-                sum += host.force[w, r] * frames.lever[w, r]
-        if total > 0.0:
-            held = frames.held[w, p]
-            share = float(1.0)
-            if held[0] != 0.0 or held[1] != 0.0 or held[2] != 0.0:
-                rate = frames.rolling[w, p]
-                if patches.radius[p] > 0.0:
-                    rate += speed_of(host, frames, w, p) / patches.radius[p]
-                share = wp.min(1.0, host.timestep[w % host.timestep.shape[0]] * rate / wp.static(FOLLOWS))
-            move = (share / total) * sum
-            for i in range(frames.jacobian.shape[2]):
-                spin = frames.jacobian[w, 3 * p + 2, i]
-                frames.jacobian[w, 3 * p, i] = frames.jacobian[w, 3 * p, i] - move[1] * spin
-                frames.jacobian[w, 3 * p + 1, i] = frames.jacobian[w, 3 * p + 1, i] + move[0] * spin
-            drift = frames.drift[w, p]
-            frames.drift[w, p] = drift + drift[2] * wp.vec3(-move[1], move[0], 0.0)
-            guess = problem.guess[w, p, 2] - move[0] * problem.guess[w, p, 1] + move[1] * problem.guess[w, p, 0]
-            problem.guess[w, p, 2] = guess
-            for r in range(nefc):
-                if frames.owner[w, r] == p:
-                    frames.lever[w, r] = frames.lever[w, r] - move
-            axes = frames.axes[w, p]
-            frames.origin[w, p] = frames.origin[w, p] + wp.transpose(axes) * wp.vec3(move[0], move[1], 0.0)
-        site = patches.site[p]
-        frames.centre[w, p] = wp.transpose(host.site_xmat[w, site]) * (frames.origin[w, p] - host.site_xpos[w, site])

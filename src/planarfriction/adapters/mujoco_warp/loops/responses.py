@@ -10,6 +10,7 @@ import mujoco
 import warp as wp
 
 from planarfriction.adapters.mujoco_warp.loops.geometry import Frames, Host, Patches, Places, Problem
+from planarfriction.kernels import placing
 
 EQUALITY = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_EQUALITY))
 DOF_LOSS = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF))
@@ -316,9 +317,12 @@ def remember(
     """Write the result of the step into the memory, the passive forces and the start of the solver."""
     w = wp.tid()
     touches = s.passes[w] > 0
+    misplaced = int(0)
     for i in range(patches.states):
         memory[w, at.after + i] = wp.where(touches, state[w, i], 0.0)
     for p in range(patches.count):
+        if frames.fault[w, p] != 0:
+            misplaced = wp.static(placing.FAULTS) * p + frames.fault[w, p]
         memory[w, at.load + p] = wp.where(touches, load[w, p], 0.0)
         for i in range(3):
             place = 3 * p + i
@@ -333,6 +337,7 @@ def remember(
     if touches:
         for j in range(host.passive.shape[1]):
             host.warmstart[w, j] = float(s.acceleration[w, j])
+    memory[w, at.misplaced] = float(misplaced)
     memory[w, at.iterations] = float(s.rounds[w])
     memory[w, at.passes] = float(s.passes[w])
     memory[w, at.residual] = wp.where(touches, residual[w], 0.0)

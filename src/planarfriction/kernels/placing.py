@@ -1,0 +1,89 @@
+"""Rule for the places of patches in their contacts, one for all simulators.
+
+A patch lies in the plane of its contact. Its origin is that of its site or frame, moved along the normal into this
+plane; where a curved side touches, it is the centre of the contact forces, which move over a body that rolls. The
+functions have no branches: MuJoCo's and MuJoCo Warp's loops compile them, MJX traces them, Drake calls them.
+"""
+
+# No `from __future__ import annotations` here: Warp reads the types themselves.
+
+from typing import Any
+
+import numpy as np
+
+AUTO = 0
+"""Origin at the centre of the contact forces where a curved side touches, else at the site."""
+
+AT_SITE = 1
+"""Origin at the site or frame of the patch, moved into the plane of the contact."""
+
+AT_CONTACT = 2
+"""Origin at the centre of the contact forces."""
+
+OWN = 1
+"""Bit of a cylinder on the patch's own body, whose curved side may touch."""
+
+OTHER = 2
+"""Bit of a cylinder on the other body."""
+
+ROUND = 4
+"""Bit of a shape that is curved all over, on either body."""
+
+CURVED = 0.5
+"""Square of the sine of the angle between a cylinder's axis and the normal above which its curved side touches."""
+
+MARGIN = 0.1
+"""Share of its size by which a patch may lie beside its contact, and sine of the least angle of x to the normal."""
+
+BEYOND = 1
+"""Fault of a patch: the contact forces act beyond it."""
+
+ALONG_X = 2
+"""Fault of a patch: the x axis of its site or frame lies along the normal."""
+
+FAULTS = 3
+"""Number of faults, none included: 0."""
+
+_FAULTS = {
+    BEYOND: 'contact forces act beyond the patch: put the {} into the contact, or use centre="contact"',
+    ALONG_X: "its x axis lies along the normal of the contact, where its y axis takes its place",
+}
+
+
+def onto_plane(place: Any, middle: Any, normal: Any) -> Any:
+    """Return a place `[3]` moved along the normal onto the plane through the `middle` of the contact points."""
+    x = middle[0] - place[0]
+    y = middle[1] - place[1]
+    z = middle[2] - place[2]
+    height = normal[0] * x + normal[1] * y + normal[2] * z
+    return place[0] + height * normal[0], place[1] + height * normal[1], place[2] + height * normal[2]
+
+
+def across(axis: Any, normal: Any) -> Any:
+    """Return the square of the sine of the angle between an axis and the normal, both of length 1."""
+    along = axis[0] * normal[0] + axis[1] * normal[1] + axis[2] * normal[2]
+    return 1.0 - along * along
+
+
+def excess(x: Any, y: Any, scale: Any, reach: Any) -> Any:
+    """Return the distances in x and y [m] by which a point lies beyond a patch resized by `scale`; < 0 within it."""
+    return abs(x - scale * reach[0]) - scale * reach[2], abs(y - scale * reach[1]) - scale * reach[3]
+
+
+def reach_of(patch: Any) -> tuple[float, ...]:
+    """Return the middle of a patch in x and y, and its half widths, with the margin of its size, [4] [m]."""
+    half = 0.5 * np.sqrt(patch.areas.max())
+    least = patch.positions.min(axis=0) - half
+    largest = patch.positions.max(axis=0) + half
+    margin = MARGIN * size_of(patch)
+    return *(0.5 * (least + largest)).tolist(), *(0.5 * (largest - least) + margin).tolist()
+
+
+def size_of(patch: Any) -> float:
+    """Return the largest distance of a patch from its origin [m]."""
+    return float(np.hypot(*patch.positions.T).max() + 0.5 * np.sqrt(patch.areas.max()))
+
+
+def fault_line(kind: str, name: str, between: tuple[str, str], fault: int) -> str:
+    """Return a line about a patch that does not lie in its contact; `kind` is that of its place, a site or frame."""
+    return f"{kind} {name} of the contact between {' and '.join(between)}: {_FAULTS[fault].format(kind)}"
