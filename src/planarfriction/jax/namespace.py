@@ -14,6 +14,11 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.tilt import OVERSHOT, SHORTENINGS, SOFTNESS, STEPS
 from planarfriction.tensors.namespace import Namespace
 
+if hasattr(jax, "enable_x64"):
+    _enable_x64 = jax.enable_x64
+else:  # before JAX 0.8
+    from jax.experimental import enable_x64 as _enable_x64
+
 
 class _Tilt(NamedTuple):
     """Cells in scaled coordinates about their centre of pressure, as `kernels.tilt.Scaled`."""
@@ -121,6 +126,13 @@ def _extremes(name: str, value: jax.Array) -> tuple[float, float] | None:
     return low, high
 
 
+def _in_double(function: Any, *arrays: jax.Array) -> jax.Array:
+    precision = jnp.result_type(*arrays)
+    with _enable_x64(True):
+        wide = [jax.lax.convert_element_type(each, jnp.float64) for each in arrays]
+        return jax.lax.convert_element_type(function(*wide), precision)
+
+
 xp = Namespace(
     jnp,
     broadcast_arrays=jnp.broadcast_arrays,
@@ -131,6 +143,7 @@ xp = Namespace(
     pressing=pressing,
     to_numpy=lambda value: np.asarray(value) if isinstance(value, jax.Array) else value,
     from_numpy=lambda array, like: jnp.asarray(array, like.dtype),
+    in_double=_in_double,
     widened=lambda x: x,
     narrowed=lambda result, *inputs: result,
 )
