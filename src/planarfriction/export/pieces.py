@@ -75,7 +75,8 @@ class Pieces(NamedTuple):
     states: int
     """Number of states of a cell; the first of all cells come first."""
     tables: dict[str, np.ndarray]
-    """Constant arrays by name; `share` [count] is that in the load, `place_x` and `place_y` are those of its parts."""
+    """Constant arrays by name; `share` [count] is that in the load, `place_x` and `place_y` are those of its parts,
+    which in single precision nothing else reads."""
     step: Block
     """New states, then the wrench per unit load, from `p`, `k`, `z`, `v`, `dt`, and `normal_force` if it is `fixed`."""
     parameters: dict[str, float]
@@ -200,7 +201,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     moved, by = (_settled(cell, reference, LIGHTEST[precision] * reference), (*by, "load")) if fixed else (cell, by)
     given = ("dt", "normal_force") if fixed else ("dt",)
     lever = twin(levers[model.patch.anisotropic])
-    names = ["place_x", "place_y"]
+    names = ["place_x", "place_y"] if precision == "double" else ["lever_x", "lever_y"]
     if model.patch.anisotropic:
         names = ["lever_xx", "lever_xy", "lever_yy", "lever_x", "lever_y"]
     names += ["gyration"] * (size == 3)

@@ -93,6 +93,9 @@ def _described(models: Sequence[Pieces], precision: str, slopes: bool) -> tuple[
         outputs += [f"w[{i}]" for i in range(len(block.results) - pieces.states)]
         lines = list(writer.lines(block, outputs, indent=" " * 12))
         tables = {name: pieces.tables[name] for name in ("place_x", "place_y", "share")}
+        for axis in "xy":  # digits that single precision has no room for, and of which the slopes of a plane make much
+            place = tables[f"place_{axis}"]
+            tables[f"rest_{axis}"] = place - place.astype({"float": "f4", "double": "f8"}[precision])
         tables |= {name: each for name, each in pieces.tables.items() if any(f"{name}[" in line for line in lines)}
         described.append(
             {
