@@ -14,11 +14,6 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.tilt import OVERSHOT, SHORTENINGS, SOFTNESS, STEPS
 from planarfriction.tensors.namespace import Namespace
 
-if hasattr(jax, "enable_x64"):
-    _enable_x64 = jax.enable_x64
-else:  # before JAX 0.8
-    from jax.experimental import enable_x64 as _enable_x64
-
 
 class _Tilt(NamedTuple):
     """Cells in scaled coordinates about their centre of pressure, as `kernels.tilt.Scaled`."""
@@ -128,7 +123,7 @@ def _extremes(name: str, value: jax.Array) -> tuple[float, float] | None:
 
 def _in_double(function: Any, *arrays: jax.Array) -> jax.Array:
     precision = jnp.result_type(*arrays)
-    with _enable_x64(True):
+    with jax.enable_x64(True):
         wide = [jax.lax.convert_element_type(each, jnp.float64) for each in arrays]
         return jax.lax.convert_element_type(function(*wide), precision)
 

@@ -12,9 +12,9 @@ from planarfriction.export.c_values import Array, Fixed
 from planarfriction.export.library import PARAMETERS, PRECISIONS, tilt_of
 from planarfriction.export.loops import Loops
 from planarfriction.export.pieces import Pieces
-from planarfriction.export.twins import twin
 from planarfriction.kernels import coupling, small_matrices
 from planarfriction.kernels.trace import Block, Number, Trace, traced
+from planarfriction.kernels.twins import twin
 
 ROUNDING = {"double": (coupling.ROUNDING,) * 2, "float": (3e-7, 1e-5)}
 """Errors of a twist, in the largest speed that goes into it, by precision: below the first no step gets, and below the
