@@ -100,7 +100,8 @@ def bristle_decay(xp: Any, deflection: Any, along: Any, speed: Any, grip: Any, l
 
 def decay_at(xp: Any, alpha: Any, along: Any, speed: Any, grip: Any, law: Any) -> Any:
     """`bristle_decay` at a known `alpha`."""
-    return xp.where(law.elasto_plastic > 0.0, 0.5 * alpha * (speed + along), speed + law.creep_speed) * grip
+    closing = xp.maximum(speed + along, 0.0)  # rounding below zero would let a long step grow without bound
+    return xp.where(law.elasto_plastic > 0.0, 0.5 * alpha * closing, speed + law.creep_speed) * grip
 
 
 def traction(z: Any, zdot: Any, velocity: Any, law: Any) -> Any:

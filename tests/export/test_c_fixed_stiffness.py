@@ -64,3 +64,20 @@ def test_no_load_and_hardly_any(name, precision):
 def test_pressure_does_not_follow_moments():
     """Python refuses moments for such a law, so that the library has no such step."""
     assert "step_moments" not in (library("fixed discs").folder / "friction.h").read_text()
+
+
+def test_long_steps_back_in_single_precision():
+    """Bristles that face their velocity, at small loads: a decay rounded below zero would let them grow by 1e3."""
+    made = library("fixed metric", "float")
+    rng, count = np.random.default_rng(1), 400
+    twist = np.zeros((count, 3))
+    twist[:, :2] = rng.normal(size=(count, 2)) * 10.0 ** rng.uniform(-2.0, 1.0, (count, 1))
+    load, dt = 10.0 ** rng.uniform(-3.0, 0.0, count), 10.0 ** rng.uniform(-2.0, 0.5, count)
+    rest = np.broadcast_to(made.model.rest(), (count, *made.model.state_shape))
+    state, _ = made.model.step(rest, -twist, 2.0, 1.0)
+    given = [np.ascontiguousarray(np.asarray(each, np.float32).astype(float)) for each in (state, twist, load, dt)]
+    wanted, wrench = made.model.step(*given)
+    found, pulled = run(made, given)
+    size = np.maximum(load, np.abs(wrench).max(1))[:, None]
+    assert (np.abs(pulled - wrench) / size).max() < 1e-3  # sigma_1 times the rounding of 10 m/s
+    assert np.abs(found - wanted).max() < 1e-4 * np.abs(wanted).max()

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from planarfriction.export.pieces import ladder_of
-from tests.support.c_libraries import library, samples
+from tests.support.c_libraries import TURNED, library, samples
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
 NAMES = "few", "distributed", "ellipsoid", "soft"
+QUICK = "few", "feet on a line"
 COUNT = 200
 
 
@@ -42,7 +43,7 @@ def run(made, state, twist, load, dt, moments):
 @pytest.mark.parametrize(
     ("name", "precision"),
     [(name, "double") for name in NAMES]
-    + [pytest.param(name, "float", marks=[] if name == "few" else pytest.mark.slow) for name in NAMES],
+    + [pytest.param(name, "float", marks=[] if name in QUICK else pytest.mark.slow) for name in (*NAMES, *TURNED)],
 )
 def test_steps(name, precision):
     made = library(name, precision)
@@ -56,7 +57,7 @@ def test_steps(name, precision):
     off += [np.abs(np.array([each[1] for each in found]) - wrench) / load / lever / np.abs(wrench / load).max()]
     worst = np.maximum(*(each.reshape(COUNT, -1).max(axis=1) for each in off))
     # rounding is multiplied where no three cells have the centre between them: by a compliance of 1e-9
-    assert worst.max() < (1e-6 if precision == "double" else 1e-2)
+    assert worst.max() < (1e-6 if precision == "double" else 1e-4)
     assert np.quantile(worst, 0.5) < (1e-12 if precision == "double" else 1e-5)
 
 

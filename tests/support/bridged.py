@@ -57,25 +57,24 @@ def motions() -> tuple[np.ndarray, ...]:
 
 
 def torch() -> dict[str, Any]:
-    """Compute steps, rollouts and gradients of each kind of model in PyTorch, two of them in single precision."""
+    """Compute steps, rollouts and gradients of each kind of model in PyTorch."""
     import torch
 
     import planarfriction.torch as pt
 
-    double, single = {"dtype": torch.float64}, {"dtype": torch.float32}
+    double = {"dtype": torch.float64}
     weighed = ("mu_c", "mu_s", "sigma_1", "breakaway_ratio", "weights")
     made = {name: pt.DistributedModel(*each, **double) for name, each in CELLS.items()}
     made |= {name: pt.ReducedModelPublished(*each, trainable=TRAINED, **double) for name, each in SURFACES.items()}
     made |= {
         "weights": pt.DistributedModel(PATCH, LAW, trainable=weighed, **double),
-        "reduced": pt.ReducedModel(PATCH, LAW, cells=4),
         "planar": pt.ReducedPlanarLuGre(**double),
-        "planar table": pt.ReducedPlanarLuGre(radius=0.004, surface=SURFACES["table"][2], **single),
     }
-    return {name: _of_torch(model) for name, model in made.items()} | {"scene": _scene_of_torch()}
+    return {name: of_torch(model) for name, model in made.items()} | {"scene": _scene_of_torch()}
 
 
-def _of_torch(model: Any) -> dict[str, Any]:
+def of_torch(model: Any) -> dict[str, Any]:
+    """Compute steps, rollouts and gradients of a model in PyTorch."""
     import torch
 
     import planarfriction.torch as pt

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import planarfriction as pf
+from tests.support import single_precision
 
 DISC = pf.ContactPatch.disc(0.01)
 FEW = pf.ContactPatch.disc(0.01, cells=5)
@@ -38,6 +39,11 @@ FOLLOWING = {
     "maps": lambda: pf.DistributedModel(pf.ContactPatch.from_pressure(MAPS, cell_size=1e-3), LAW),
 }
 """Models whose shape follows the load."""
+TURNED = {
+    name: functools.partial(pf.DistributedModel, single_precision.PATCHES[name], LAW)
+    for name in ("three feet", "feet on a line", "many points")
+}
+"""Models with cells along lines, of which some lie along no axis."""
 _FIXED_LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9, reference_load=2.0)
 FIXED = {
     "fixed discs": lambda: pf.ReducedModel(DISC, _FIXED_LAW),
@@ -94,7 +100,7 @@ def _folder() -> tempfile.TemporaryDirectory:
 @functools.cache
 def library(name: str, precision: str = "double", *options: str, patches: int = 1) -> Library:
     """Compile the model called `name` once, without a warning, and load it."""
-    model = (MODELS | FOLLOWING | FIXED)[name]()
+    model = (MODELS | FOLLOWING | TURNED | FIXED)[name]()
     folder = Path(_folder().name) / "-".join([name, precision, str(patches), *options])
     pf.export_c(model, folder, precision=precision, patches=patches)
     (folder / "driver.c").write_text(DRIVER)

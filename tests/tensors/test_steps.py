@@ -30,7 +30,7 @@ def contact_of(kind: str):
     """Return the equations of a model, its contact over NumPy, and the model itself."""
     numbers = LAW_OF_TEST.numbers
     if kind == "distributed":
-        cells = distributed.cells_of(PATCH, LAW_OF_TEST, None)
+        cells = distributed.cells_of(PATCH, LAW_OF_TEST, None, float)
         return distributed, Contact(numbers, cells), pf.DistributedModel(PATCH, LAW_OF_TEST)
     shape = published.shape_of(PATCH, LAW_OF_TEST, None)
     values = {name: np.array([[value]]) for name, value in published.values_of(LAW_OF_TEST, shape).items()}

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
+from tests.support import single_precision
 from tests.support.walks import walk
 
 wp = pytest.importorskip("warp", reason="needs the extra [warp]")
@@ -113,6 +114,19 @@ def test_moments(name):
             state, expected = own.step(state, twist[i], load[i], 1e-3, moments=moments[i])
         # the softness of `kernels.tilt` magnifies rounding where no three cells have the centre between them
         assert wrench.numpy()[i] == pytest.approx(expected, rel=1e-9, abs=1e-8)
+
+
+@pytest.mark.parametrize("name", ["feet on a line", pytest.param("many points", marks=pytest.mark.slow)])
+def test_moments_in_single_precision(name):
+    model = pf.DistributedModel(single_precision.PATCHES[name], LAW)
+    inputs = single_precision.drawn(model, 600, 5)
+    state, twist, load, dt, moments = inputs
+    friction = Model(model, contacts=600, device="cpu")
+    new, wrench = outputs(friction)
+    state, twist, load, moments = arrays(wp.float32, state, twist, load, moments)
+    friction.step(state, twist, load, float(dt[0]), new, wrench, moments=moments)
+    friction.check()
+    assert single_precision.error(model, inputs, wrench.numpy()) < 1e-4
 
 
 def test_shapes():

@@ -166,7 +166,7 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, given: dict, k
     read, always = "\n".join(functions.values()), ("share", "rungs", *(() if pieces.fixed else ("place_x", "place_y")))
     tables = {table: each for table, each in pieces.tables.items() if table in always or f"{table}[" in read}
     tables |= {} if slip is None else slip.tables
-    tables = {table: _table(writer, numbers) for table, numbers in tables.items()}
+    tables = {table: _table(writer, table, numbers) for table, numbers in tables.items()}
     step = functions["step"].splitlines()
     vector = Writer(precision, own=precision == "double")
     share = "(at->low[k] + at->part * (at->high[k] - at->low[k]))" if pieces.rungs else "share[k]"
@@ -248,9 +248,14 @@ def tilt_of(count: int) -> str:
 _SLOW = "sqrt", "exp", "sin", "cos", "pow", "atan2"
 
 
-def _table(writer: Writer, numbers: np.ndarray) -> tuple[str, list[str]]:
-    """Return the type and the constants of a table: in single precision where that is how it is stored."""
+def _table(writer: Writer, name: str, numbers: np.ndarray) -> tuple[str, list[str]]:
+    """Return the type and the constants of a table: in single precision where that is how it is stored.
+
+    Places are always of double precision, as the functions that read them are (see `tilt_of`).
+    """
     single = numbers.dtype == np.float32
+    if name.startswith("place_"):
+        return "double", [Writer().constant(float(each)).strip("()") for each in numbers]
     return ("float" if single else "real"), [
         f"{np.float32(each)!s}f" if single else writer.constant(float(each)).strip("()") for each in numbers.ravel()
     ]

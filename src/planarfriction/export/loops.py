@@ -33,10 +33,10 @@ from planarfriction.export.c_values import (
     mapped,
     plain,
 )
-from planarfriction.export.twins import twin
 from planarfriction.kernels import surfaces
 from planarfriction.kernels.definitions import definition_of
 from planarfriction.kernels.trace import Number, Table, Trace, traced
+from planarfriction.kernels.twins import twin
 
 _OPERATORS: dict[type, tuple[str, Callable[..., Any]]] = {
     ast.Add: ("+", operator.add), ast.Sub: ("-", operator.sub), ast.Mult: ("*", operator.mul),

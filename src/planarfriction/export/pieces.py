@@ -12,7 +12,6 @@ import numpy as np
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.errors import InvalidValueError
-from planarfriction.export.twins import twin
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import cells, cells_rollout, discs, points, published_step
 from planarfriction.kernels.derive import derive
@@ -22,6 +21,7 @@ from planarfriction.kernels.rules import ratio
 from planarfriction.kernels.settle import within
 from planarfriction.kernels.surfaces import CELLS
 from planarfriction.kernels.trace import Block, Mathematics, Number, Table, Trace, traced
+from planarfriction.kernels.twins import twin
 from planarfriction.kernels.vectors import norm, times
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
@@ -75,7 +75,8 @@ class Pieces(NamedTuple):
     states: int
     """Number of states of a cell; the first of all cells come first."""
     tables: dict[str, np.ndarray]
-    """Constant arrays by name; `share` [count] is that in the load, `place_x` and `place_y` are those of its parts."""
+    """Constant arrays by name; `share` [count] is that in the load, `place_x` and `place_y` are those of its parts,
+    which in single precision nothing else reads."""
     step: Block
     """New states, then the wrench per unit load, from `p`, `k`, `z`, `v`, `dt`, and `normal_force` if it is `fixed`."""
     parameters: dict[str, float]
@@ -155,13 +156,11 @@ def _sliding(u: Any) -> Any:
 
 
 def _sliding_of_disc(u: Any) -> Any:
-    """Return what `discs.sliding` does, from the direction of u: fourth powers of speeds leave single precision."""
-    spin = math.sqrt(2.0) * u[2]
-    size = norm((u[0], u[1], spin))
-    turned = ratio(spin, size)
-    turned = turned * turned
-    c_t, c_s, m = formulas.disc_friction_above(1.0 - turned, turned, 0.0)
-    return c_t, c_s, size * math.sqrt(1.0 - turned + m * turned), (c_t * u[0], c_t * u[1], c_s * u[2])
+    """Return what `discs.sliding` does, in a unit of speed whose fourth powers do not leave single precision."""
+    slide, spin = u[0] * u[0] + u[1] * u[1], 2.0 * u[2] * u[2]
+    per = 1.0 / (slide + spin + math.sqrt(formulas.DISC_REST))
+    c_t, c_s, m = formulas.disc_friction_above(per * slide, per * spin, formulas.DISC_REST * per * per)
+    return c_t, c_s, math.sqrt(slide + m * spin), (c_t * u[0], c_t * u[1], c_s * u[2])
 
 
 def _with(function: Any, **others: Any) -> Any:
@@ -200,7 +199,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     moved, by = (_settled(cell, reference, LIGHTEST[precision] * reference), (*by, "load")) if fixed else (cell, by)
     given = ("dt", "normal_force") if fixed else ("dt",)
     lever = twin(levers[model.patch.anisotropic])
-    names = ["place_x", "place_y"]
+    names = ["place_x", "place_y"] if precision == "double" else ["lever_x", "lever_y"]
     if model.patch.anisotropic:
         names = ["lever_xx", "lever_xy", "lever_yy", "lever_x", "lever_y"]
     names += ["gyration"] * (size == 3)

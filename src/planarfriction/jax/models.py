@@ -31,19 +31,19 @@ class DistributedModel(FrictionPytree, CellsModel):
     """The distributed model (`planarfriction.DistributedModel`) as a pytree, for small patches.
 
     `W = sum w_i f_N [t_i ; rho_i x t_i]`. State: deflections `[2, N]` [m]. Leaves: the law's parameters, the cells'
-    positions and weights. A patch whose shape depends on the load keeps that of `normal_force` [N].
+    positions, the digits of these that single precision leaves out, and weights. A patch whose shape depends on the load keeps that of `normal_force` [N].
 
     Raises InvalidValueError for a parameter that breaks its rule.
     """
 
-    leaves = ("parameters", "positions", "weights")
+    leaves = ("parameters", "positions", "remainder", "weights")
     parameters: LawParameters
 
     def __init__(self, patch: ContactPatch, law: FrictionLaw, normal_force: float | None = None) -> None:
         super().__init__(patch, law)
-        cells = distributed.cells_of(patch, law, normal_force)
+        cells = distributed.cells_of(patch, law, normal_force, jnp.result_type(float))
         self.parameters = record_of(LawParameters, law.numbers._asdict())
-        self.positions, self.weights = map(jnp.asarray, cells)
+        self.positions, self.weights, self.remainder = map(jnp.asarray, cells)
 
     def compiled(self) -> Packed:
         """Return the model as compiled rollouts take it."""

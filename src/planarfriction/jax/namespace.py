@@ -121,6 +121,13 @@ def _extremes(name: str, value: jax.Array) -> tuple[float, float] | None:
     return low, high
 
 
+def _in_double(function: Any, *arrays: jax.Array) -> jax.Array:
+    precision = jnp.result_type(*arrays)
+    with jax.enable_x64(True):
+        wide = [jax.lax.convert_element_type(each, jnp.float64) for each in arrays]
+        return jax.lax.convert_element_type(function(*wide), precision)
+
+
 xp = Namespace(
     jnp,
     broadcast_arrays=jnp.broadcast_arrays,
@@ -131,6 +138,7 @@ xp = Namespace(
     pressing=pressing,
     to_numpy=lambda value: np.asarray(value) if isinstance(value, jax.Array) else value,
     from_numpy=lambda array, like: jnp.asarray(array, like.dtype),
+    in_double=_in_double,
     widened=lambda x: x,
     narrowed=lambda result, *inputs: result,
 )

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import cells, discs, leaning_cells, points, settle
 from planarfriction.kernels.leaning_cells import Leaning
@@ -46,21 +48,25 @@ class Cells(NamedTuple):
     """Numbers of the cells as their levers read them: see `kernels.cells.Lever`, `[numbers, N]`."""
     weights: Any
     """Share of the load that each cell carries [-], `[N]`."""
+    remainder: Any
+    """Digits of the positions, x then y [m], that the numbers of `levers` have no room for, `[2, N]`."""
 
 
-def cells_of(patch: ContactPatch, law: Any, normal_force: float | None) -> Cells:
-    """Return the cells of a patch at a load [N] as NumPy arrays."""
+def cells_of(patch: ContactPatch, law: Any, normal_force: float | None, precision: Any) -> Cells:
+    """Return the cells of a patch at a load [N] as NumPy arrays, for levers of a number type of NumPy."""
     numbers = DistributedModel(patch, law).compiled.numbers()
     if patch.anisotropic and not patch.asymmetric:
         numbers = numbers[:-2]
-    return Cells(numbers, patch.weights(normal_force))
+    levers = numbers.astype(precision)
+    remainder = patch.positions.T - positions_of(np, levers.astype(float))
+    return Cells(levers, patch.weights(normal_force), remainder)
 
 
-def positions_of(xp, shape: Cells):
-    """Return the positions of the cells, x then y [m], `[2, N]`."""
-    if len(shape.levers) < 5:
-        return shape.levers[:2]
-    xx, xy, yy, x, y = (shape.levers[k] for k in range(5))
+def positions_of(xp, levers):
+    """Return the positions of the cells to the digits of their levers, x then y [m], `[2, N]`."""
+    if len(levers) < 5:
+        return levers[:2]
+    xx, xy, yy, x, y = (levers[k] for k in range(5))
     return xp.stack([xx * y - xy * x, xy * y - yy * x], 0) / (xx * yy - xy * xy)
 
 

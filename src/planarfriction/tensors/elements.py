@@ -107,9 +107,10 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
         some = y > 0.0
         return xp.where(some, x / xp.where(some, y, 1.0), 0.0)
 
-    def beyond(deflection: Any, largest: Any) -> Any:
-        """Return the deflection where it is larger by more than rounding, else 0."""
-        return xp.where(deflection > (1.0 + ROUNDING * xp.epsilon(deflection)) * largest, deflection, 0.0)
+    def sloping(value: Any, deflection: Any, largest: Any) -> Any:
+        """Return a value, without slopes where the deflection is not larger by more than rounding."""
+        beyond = deflection > (1.0 + ROUNDING * xp.epsilon(deflection)) * largest
+        return xp.where(beyond, value, xp.stop_gradient(value))
 
     def through(root: Any, x: Any, y: Any) -> tuple[Any, Any]:
         """Return `published_contact.through`, without a metric if there is none."""
@@ -133,6 +134,6 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
         (published_contact.through, through),
         (rules.per, per),
         (rules.ratio, ratio),
-        (bristle_step.cap, lambda deflection, most: formulas.cap(xp, beyond(deflection, most), most)),
-        (bristle_step.reachable, lambda x, law: formulas.reachable_deflection(xp, beyond(x, 1.0), law)),
+        (bristle_step.cap, lambda x, most: sloping(formulas.cap(xp, x, most), x, most)),
+        (bristle_step.reachable, lambda x, law: formulas.reachable_deflection(xp, sloping(x, x, 1.0), law)),
     ]

@@ -22,6 +22,8 @@ class CellsModel(TensorModel):
     """Positions of the cells `[2, N]` [m]; with a friction metric their levers (see `tensors.distributed.Cells`)."""
     weights: Any
     """Share of the load that each cell carries [-], `[N]`."""
+    remainder: Any
+    """Digits of the positions that the number type of `positions` has no room for (see `tensors.distributed.Cells`)."""
 
     @property
     def state_shape(self) -> tuple[int, ...]:
@@ -41,7 +43,7 @@ class CellsModel(TensorModel):
         return dataclasses.replace(cells, pressure=weights / cells.areas, point_shares=None)
 
     def _shape(self, values: Mapping[str, Any]) -> distributed.Cells:
-        return distributed.Cells(self.positions, self.weights)
+        return distributed.Cells(self.positions, self.weights, self.remainder)
 
 
 class PublishedModel(TensorModel):

@@ -35,6 +35,7 @@ class Namespace:
       bool `[..., N]`, by the rule of `kernels.tilt` in its scaled coordinates; without derivatives
     - `to_numpy(value)`, where anything but an array of the library stays; `from_numpy(array, like)`, a copy with the
       number type and the device of `like`
+    - `in_double(function, *arrays)`, the result of a function of arrays computed in double precision, in their own
     - `widened(x)`, numbers of a step in the precision in which the library computes it; `narrowed(result, *inputs)`,
       its result in the precision of the inputs
     """

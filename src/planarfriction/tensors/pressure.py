@@ -7,6 +7,7 @@ whose derivatives are those of the rule: cells that are about to lift press with
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any, NamedTuple
 
 from planarfriction.kernels import tilt
@@ -33,7 +34,10 @@ def wrench_from(xp: Any, wrench: Any, offset: Any) -> Any:
 
 
 def tilted(xp: Any, positions: Any, weights: Any, centre: Any) -> Any:
-    """Return weights `[..., N]` of cells at `positions`, x then y `[..., N]`, that press about a centre `[..., 2]`."""
+    """Return weights `[..., N]` of cells at `positions`, x then y `[..., N]`, that press about a centre `[..., 2]`.
+
+    Numbers are of double precision: where the centre lies beyond all cells, the plane has slopes of `1/SOFTNESS`.
+    """
 
     def mean(values: Any, by: Any) -> Any:
         return (by * values).sum(-1, keepdims=True)
@@ -86,10 +90,14 @@ class Pressed(NamedTuple):
         return wrench if self.moved is None else wrench_from(xp, wrench, self.moved)
 
 
+def _shared(xp: Any, levers: Any, weights: Any, remainder: Any, centre: Any) -> Any:
+    return tilted(xp, positions_of(xp, levers) + xp.stop_gradient(remainder), weights, centre)
+
+
 def follow(xp: Any, equations: Any, contact: Any, centre: Any) -> Pressed:
     """Return a model with its pressure about `centre` `[..., 2]` [m]: cells share the load, another patch moves."""
     shape = contact.shape
     if isinstance(shape, Cells):
-        weights = tilted(xp, positions_of(xp, shape), shape.weights, centre)[..., None, :]
+        weights = xp.in_double(partial(_shared, xp), *shape, centre)[..., None, :]
         return Pressed(contact._replace(shape=shape._replace(weights=weights)), None)
     return Pressed(contact, centre - xp.stack(equations.centre(shape), -1))

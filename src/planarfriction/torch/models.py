@@ -37,6 +37,7 @@ class DistributedModel(FrictionModule, CellsModel):
     """
 
     positions: Tensor
+    remainder: Tensor
 
     def __init__(
         self,
@@ -49,8 +50,9 @@ class DistributedModel(FrictionModule, CellsModel):
         device: torch.device | str | None = None,
     ):
         super().__init__(patch, law)
-        cells = distributed.cells_of(patch, law, normal_force)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
+        precision = float if kind["dtype"] == torch.float64 else "f4"
+        cells = distributed.cells_of(patch, law, normal_force, precision)
         if law.reference_load is not None:
             self.reference_load = torch.tensor(law.reference_load, **kind)
         numbers, chosen = law.numbers._asdict(), tuple(trainable)
@@ -58,6 +60,7 @@ class DistributedModel(FrictionModule, CellsModel):
         physical = [name for name in chosen if name != "weights"]
         self._adopt({name: numbers[name] for name in LAW}, physical, lever, **kind)
         self.register_buffer("positions", torch.tensor(cells.levers, **kind))
+        self.register_buffer("remainder", torch.tensor(cells.remainder, **kind), persistent=False)
         raw = torch.tensor(cells.weights, **kind).log()
         if "weights" in chosen:
             self.raw_weights = nn.Parameter(raw)

@@ -79,6 +79,10 @@ def _narrowed(result: Tensor, *inputs: Tensor) -> Tensor:
     return result.to(functools.reduce(torch.promote_types, (each.dtype for each in inputs)))
 
 
+def _in_double(function: Any, *arrays: Tensor) -> Tensor:
+    return _narrowed(function(*map(_widened, arrays)), *arrays)
+
+
 class _Twins:
     """Functions over tensors by the names of `_name_of`: `torch.compile` calls what it finds in a place."""
 
@@ -106,6 +110,7 @@ xp = Namespace(
     pressing=_Pressing.apply,
     to_numpy=lambda value: value.detach().cpu().numpy() if isinstance(value, Tensor) else value,
     from_numpy=lambda array, like: torch.tensor(array, dtype=like.dtype, device=like.device),
+    in_double=_in_double,
     widened=_widened,
     narrowed=_narrowed,
 )

@@ -12,9 +12,9 @@ from planarfriction.export.c_values import Array, Fixed
 from planarfriction.export.library import PARAMETERS, PRECISIONS, tilt_of
 from planarfriction.export.loops import Loops
 from planarfriction.export.pieces import Pieces
-from planarfriction.export.twins import twin
 from planarfriction.kernels import coupling, small_matrices
 from planarfriction.kernels.trace import Block, Number, Trace, traced
+from planarfriction.kernels.twins import twin
 
 ROUNDING = {"double": (coupling.ROUNDING,) * 2, "float": (3e-7, 1e-5)}
 """Errors of a twist, in the largest speed that goes into it, by precision: below the first no step gets, and below the
@@ -93,6 +93,9 @@ def _described(models: Sequence[Pieces], precision: str, slopes: bool) -> tuple[
         outputs += [f"w[{i}]" for i in range(len(block.results) - pieces.states)]
         lines = list(writer.lines(block, outputs, indent=" " * 12))
         tables = {name: pieces.tables[name] for name in ("place_x", "place_y", "share")}
+        for axis in "xy":  # digits that single precision has no room for, and of which the slopes of a plane make much
+            place = tables[f"place_{axis}"]
+            tables[f"rest_{axis}"] = place - place.astype({"float": "f4", "double": "f8"}[precision])
         tables |= {name: each for name, each in pieces.tables.items() if any(f"{name}[" in line for line in lines)}
         described.append(
             {

@@ -1,0 +1,118 @@
+"""Pressure that follows moments in single precision, in PyTorch and JAX: what double precision gives, to 1e-4."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from tests.support import bridged
+from tests.support import single_precision as single
+
+LIMIT, BENDING = 1e-4, 1e-3
+"""Largest error of wrenches in the load; of derivatives in the largest of a contact, or a tenth of that of all."""
+
+EACH = [pytest.param(name, marks=() if name == "feet on a line" else pytest.mark.slow) for name in single.PATCHES]
+
+
+def in_torch(patch, precision: str):
+    """Return a function of numbers: derivatives of wrenches by twist, load and moments, and the wrenches."""
+    torch = pytest.importorskip("torch", reason="needs the extra [torch]")
+    from planarfriction.torch import DistributedModel
+
+    dtype = getattr(torch, precision)
+    step = pulled_by(DistributedModel(patch, single.LAW, dtype=dtype))
+    slopes = torch.func.vmap(torch.func.jacrev(step, argnums=(1, 2, 4), has_aux=True))
+
+    def of_numbers(*inputs):
+        found, wrenches = slopes(*(torch.tensor(each, dtype=dtype) for each in inputs))
+        return [each.detach().numpy() for each in found], wrenches.detach().numpy()
+
+    return of_numbers
+
+def in_jax(patch, precision: str):
+    """Return a function of numbers: derivatives of wrenches by twist, load and moments, and the wrenches."""
+    jax = pytest.importorskip("jax", reason="needs the extra [jax]")
+    from planarfriction.jax import DistributedModel
+
+    with jax.enable_x64(precision == "float64"):
+        step = pulled_by(DistributedModel(patch, single.LAW))
+        slopes = jax.jit(jax.vmap(jax.jacrev(step, argnums=(1, 2, 4), has_aux=True)))
+
+    def of_numbers(*inputs):
+        with jax.enable_x64(precision == "float64"):
+            return jax.tree.map(np.asarray, slopes(*(each.astype(precision) for each in inputs)))
+
+    return of_numbers
+
+def pulled_by(model):
+    """Return a function of one contact: the wrench of a step, twice."""
+
+    def pulled(state, twist, load, dt, moments):
+        wrench = model.step(state, twist, load, dt, moments=moments)[1]
+        return wrench, wrench
+
+    return pulled
+
+def compare(front, name: str, count: int, seed: int) -> tuple[float, float]:
+    """Return the largest errors of wrenches and of derivatives of a patch in single precision."""
+    patch = single.PATCHES[name]
+    model = pf.DistributedModel(patch, single.LAW)
+    inputs = single.drawn(model, count, seed)
+    slopes, wrenches = front(patch, "float32")(*inputs)
+    assert wrenches.dtype == np.float32
+    settled, bent = single.settled(model, inputs), 0.0
+    assert settled.mean() > 0.3
+    for got, wanted in zip(slopes, front(patch, "float64")(*inputs)[0], strict=True):
+        assert got.dtype == np.float32 and np.isfinite(got).all()
+        rows = (got - wanted)[settled].reshape(settled.sum(), -1), wanted[settled].reshape(settled.sum(), -1)
+        off, size = (np.abs(each).max(1) for each in rows)
+        bent = max(bent, (off / np.maximum(size, 0.1 * size.max())).max())
+    return single.error(model, inputs, wrenches), bent
+
+@pytest.mark.torch
+@pytest.mark.parametrize("name", single.PATCHES)
+def test_steps_of_torch(name):
+    wrench, slope = compare(in_torch, name, 200, seed=1)
+    assert wrench < LIMIT and slope < BENDING
+
+@pytest.mark.torch
+@pytest.mark.parametrize("name", ["few discs", "table"])
+def test_rollouts_and_gradients_of_torch(name):
+    """States, wrenches and gradients of six steps, by all methods; gradients have the steep slopes of stiff bristles."""
+    torch = pytest.importorskip("torch", reason="needs the extra [torch]")
+    import planarfriction.torch as pt
+
+    def made(dtype):
+        if name == "table":
+            return pt.ReducedPlanarLuGre(radius=0.004, surface=bridged.SURFACES["table"][2], dtype=dtype)
+        return pt.ReducedModel(bridged.PATCH, bridged.LAW, cells=4, dtype=dtype)
+
+    found, wanted = (bridged.of_torch(made(dtype)) for dtype in (torch.float32, torch.float64))
+    assert found.pop("kind") != wanted.pop("kind")
+    for part, limit in (("wrenches", LIMIT), ("state", LIMIT), ("gradient", BENDING), ("adjoint", BENDING)):
+        each = zip(leaves(found[part]), leaves(wanted[part]), strict=True)
+        assert max(np.abs(got - own).max() / np.abs(own).max() for got, own in each if own.any()) < limit
+
+
+def leaves(value):
+    """Return the arrays in lists."""
+    return [each for part in value for each in leaves(part)] if isinstance(value, list) else [np.asarray(value, float)]
+
+
+@pytest.mark.jax
+@pytest.mark.parametrize("name", EACH)
+def test_steps_of_jax(name):
+    wrench, slope = compare(in_jax, name, 200, seed=2)
+    assert wrench < LIMIT and slope < BENDING
+
+FRONTS = [pytest.param(in_torch, marks=pytest.mark.torch), pytest.param(in_jax, marks=pytest.mark.jax)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", single.PATCHES)
+@pytest.mark.parametrize("front", FRONTS)
+def test_many_steps(front, name):
+    worst = np.max([compare(front, name, 2000, seed) for seed in range(3, 6)], 0)
+    print(f"\n{front.__name__} {name}: wrenches {worst[0]:.1e}, derivatives {worst[1]:.1e}")
+    assert worst[0] < LIMIT and worst[1] < BENDING
