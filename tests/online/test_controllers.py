@@ -171,9 +171,12 @@ def test_bad_samples_keep_the_grip_finite():
     assert 1.0 / 0.52 < force < 20.0
 
 
-def test_a_grip_without_a_load_stays_as_it_is(observer):
-    hold = Hold(observer, most=30.0)
-    assert hold.update(Measurement([0.0], [(0.0, 1.0, 0.0)], [np.nan])).tolist() == [30.0]
+@pytest.mark.parametrize("load", [0.0, 0.05, np.nan])
+@pytest.mark.parametrize("start, most, grip", [(20.0, 60.0, 20.0), (8.0, 60.0, 8.0), (20.0, 15.0, 15.0)])
+def test_an_empty_hand_is_asked_for_the_starting_grip(observer, load, start, most, grip):
+    hold = Hold(observer, start=start, most=most)
+    for k in range(3):
+        assert hold.update(Measurement([1e-3 * k], [(0.0, 0.0, 0.0)], [load])).tolist() == [grip]
 
 
 def test_a_clock_that_is_set_back_does_not_stop_a_grip(observer):

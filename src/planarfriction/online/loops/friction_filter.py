@@ -22,7 +22,16 @@ from planarfriction.online.loops import filter_state as at
 from planarfriction.online.loops.square_root import ROOT, N, measure, reset, spread, variance_of
 
 RESTART = 10.0
-"""Samples in a row whose time went back after which the clock counts as set anew."""
+"""Samples in a row with an odd time after which the clock is set anew, and samples count as the period apart."""
+
+ODD = 30.0
+"""Ratio of a time step to the period, or of the period to a time step, above which the clock has jumped [-]."""
+
+STEADIES = 100.0
+"""Samples after which the period is known well enough to doubt the clock by it."""
+
+PERIODS = 10.0
+"""Samples over which the mean of the period is taken."""
 
 PEAK_TIME, SEEN_TIME, PLACE_TIME = 0.1, 0.004, 0.06
 """Times in which the peak of the wrench, its filter and the recent displacement fade [s]."""
@@ -53,13 +62,17 @@ ESTIMATE = np.dtype(
         ("determined", np.uint8, 3),
         *((name, float) for name in ("slip", "about_to_slip", "margin", "gauge")),
         ("flags", np.int64),
+        ("seen", np.int64),
         *((name, float) for name in ("dt", "normal_force")),
         *((name, float, 3) for name in ("wrench", "velocity")),
     ],
     align=True,
 )
-"""Estimate after a sample, and the sample as controllers read it: time step, grip force, wrench without its bias, and
-slip velocity."""
+"""Estimate after a sample, and the sample as controllers read it: 1 if wrench and load are there, time step, grip
+force, wrench without its bias, and slip velocity."""
+
+NONE = -1e3
+"""Log of the gauge of a hand that has not gripped yet."""
 
 NO_BIAS, NO_SIGN, NO_RANGE = 8, 16, 32
 """Flags of numbers that nothing is determined by (see `update`)."""
@@ -124,6 +137,31 @@ class Filter(NamedTuple):
     """Assumed logs of mu_c, its ratio and the scale of the radius `[3]`."""
     prior_spread: np.ndarray
     """Their standard deviations `[3]`."""
+
+
+@kernel
+def _step(s, now):
+    """Return the time step [s] of a sample, 0 for one that is left out; BACK tells if its time is odd.
+
+    Time is odd if it is missing, does not go on, or jumps. A jump is a pause if it stays alone; if odd times go on, the
+    clock is wrong, and samples are the last good period apart.
+    """
+    dt, period = now - s[at.TIME], s[at.PERIOD]
+    known = s[at.STEADY] >= STEADIES
+    far = dt > ODD * period and known
+    if xp.in_range(now) and dt > 0.0 and not far and (not known or ODD * dt >= period):
+        s[at.BACK] = 0.0
+        if dt <= 1.0:  # not the first sample, nor a long pause
+            s[at.STEADY] = min(s[at.STEADY] + 1.0, STEADIES)
+            step = min(max(dt, 0.5 * period), 2.0 * period) if period > 0.0 else dt
+            s[at.PERIOD] += (step - period) / min(s[at.STEADY], PERIODS)
+    else:
+        s[at.BACK] += 1.0
+        pause = far and s[at.BACK] == 1.0
+        dt = dt if pause else (period if s[at.BACK] > RESTART else 0.0)
+    if xp.in_range(now) and (s[at.BACK] == 0.0 or s[at.BACK] >= RESTART or far):
+        s[at.TIME] = now
+    return dt if dt <= 1.0 else (period if period > 0.0 else 1e-3)
 
 
 @kernel
@@ -318,23 +356,19 @@ def update(settings, states, samples, found):
     """Update states `[P, STATE]` with a sample each; `found [P]` of dtype `ESTIMATE` gets what is known.
 
     Samples `[P, 8]` are time, wrench, load and slip velocity; NaN is none. `flags` is the sum of what was odd: 1 no or
-    bad wrench or load, 2 time that does not go on, 4 saturated sensor, 8 unknown bias, 16 friction that drives the slip
+    bad wrench or load, 2 time that does not go on or jumps, 4 saturated sensor, 8 unknown bias, 16 friction that drives the slip
     (a sign), 32 friction or radius far from what was assumed (a unit).
     """
     h, column, jacobian, best, v = np.empty(N), np.empty(N), np.empty(9), np.empty(3), np.empty(3)
     for p in range(states.shape[0]):
-        s, e, flags = states[p], found[p], 0
+        s, e = states[p], found[p]
         now, wrench, load, velocity = samples[p, 0], samples[p, 1:4], samples[p, 4], samples[p, 5:]
-        dt = now - s[at.TIME]
-        if not xp.in_range(now) or dt <= 0.0:
-            s[at.BACK] += 1.0 if xp.in_range(now) else 0.0
-            flags, dt = 2, 0.0
-            s[at.TIME] = now if s[at.BACK] >= RESTART else s[at.TIME]
-        else:
-            s[at.TIME], s[at.BACK], dt = now, 0.0, dt if dt <= 1.0 else 1e-3  # the first sample, or a long pause
+        dt = _step(s, now)
+        flags = 2 if s[at.BACK] > 0.0 else 0
         force = math.hypot(wrench[0], wrench[1])
         good = xp.in_range(load) and xp.in_range(force) and xp.in_range(wrench[2])
-        flags += 0 if good else 1
+        lost = good and load <= settings.least_load and s[at.GAUGE] > NONE  # after a grip no load is not an empty hand
+        flags += 0 if good and not lost else 1
         if good and force >= settings.saturation:
             flags, good = flags + 4, False
         if dt > 0.0:
@@ -373,6 +407,7 @@ def update(settings, states, samples, found):
             h[at.SCALE] = s[at.LEVER]
             _measure(s, h, s[at.PEAK] - s[at.MU] - s[at.RATIO], PEAK_ERROR * PEAK_ERROR, column)
         e.flags, e.dt, e.normal_force = flags + _doubt(settings, s), dt, load
+        e.seen = 1 if good and not lost else 0
         for i in range(3):
             e.wrench[i], e.velocity[i] = wrench[i], velocity[i]
         _estimate(settings, s, e)

@@ -66,10 +66,10 @@ PAST, TURNED, RIM = 5e-3, np.radians(5.0), 8e-3
 FALLEN = 0.03
 """Slide of a part that is to turn or to hang, which counts as a fall [m]."""
 
-ENDS = {"hold": 4.0, "slide": 5.0, "turn": 5.0, "hinge": 4.5}
+ENDS = {"hold": 3.3, "slide": 4.0, "turn": 4.0, "hinge": 4.0}
 """Durations of the tasks [s]."""
 
-REST = 500
+REST = 300
 """Steps after which a part that did not move, and whose grip did not fall, is at its end."""
 
 
@@ -172,7 +172,7 @@ class Batch:
             return np.full(len(turn), now >= 0.5)
         if self.task == "hold":
             path = slid + RIM * turn
-            return path > 1.5e-4 if moment == 1 else (state["found"] > 0.0) & (now >= 2.3)
+            return path > 1.5e-4 if moment == 1 else (state["found"] > 0.0) & (now >= 2.2)
         axis = 1 if self.task == "slide" else 2
         return gripper.slip[:, axis] / self.goal > (0.4 if moment == 1 else 0.85)
 
@@ -186,8 +186,8 @@ class Batch:
         rows["quiet"] = np.where(still, rows["quiet"] + 1, 0)
         rows["seen"] = np.where(still[:, None], rows["seen"], place)
         gone = np.hypot(*gripper.slip[:, :2].T) > 0.08
-        past = gripper.time >= float(gripper.parts.tilt_time.max()) + 1.0 if self.task == "hold" else True
-        return (rows["fault"] >= 0) & (gone | ((rows["quiet"] > REST) & (rows["since"] > REST) & past))
+        still = (rows["quiet"] > REST) & (rows["since"] > REST) & ((rows["moment"] < 2) | (self.task != "hold"))
+        return (rows["fault"] >= 0) & (gone | still)
 
     def results(self, which: np.ndarray) -> np.ndarray:
         """Return part, fault, moment, flags, slip (3), goal, grip and its command, speed of rows."""
@@ -198,11 +198,11 @@ class Batch:
 
 
 def task_of(task: str, count: int, seed: int, kind: int) -> tuple[Any, Any]:
-    """Return parts and goals of a task; a held part is tapped at 2.6 s and tilted at 2.8 s."""
+    """Return parts and goals of a task; a held part is tapped at 2.4 s and tilted at 2.5 s."""
     base, random = random_parts(count, seed, kind), np.random.default_rng([seed, kind, 1])
     still = dataclasses.replace(base, tap=(0.0, 0.0, 0.0), tilt=0.0)
     if task == "hold":
-        return dataclasses.replace(base, tap_time=2.6, tilt_time=2.8, tilt_duration=0.3), np.zeros(count)
+        return dataclasses.replace(base, tap_time=2.4, tilt_time=2.5, tilt_duration=0.3), np.zeros(count)
     if task == "slide":
         centre = random.uniform((-1e-3, -0.02), (1e-3, 0.0), (count, 2))
         return dataclasses.replace(still, centre=centre), -random.choice([0.02, 0.04], count)
@@ -257,7 +257,7 @@ def _run(batch: Batch, faults: list[Fault]) -> np.ndarray:
 
 
 class Ends(NamedTuple):
-    """Runs that were kept, that ended with a flag, and that moved on at the end, bool `[N]` each."""
+    """Runs that were kept, that had a flag, and that were not kept and moved on at the end, bool `[N]` each."""
 
     kept: np.ndarray
     flagged: np.ndarray
@@ -274,5 +274,4 @@ def ends(task: str, found: np.ndarray) -> Ends:
         kept = -slip[:, 1] <= goal + PAST
     else:
         kept = (turn <= goal + TURNED) & (slid <= (PAST if task == "turn" else FALLEN))
-    moves = found[:, 11] > 5e-3
-    return Ends(kept & ~moves, found[:, 4] >= 1, moves)
+    return Ends(kept, found[:, 4] >= 1, ~kept & (found[:, 11] > 5e-3))
