@@ -17,6 +17,9 @@ _LEAST_MU = 3.0902
 """Standard deviations by which mu_c is assumed to be smaller where it cannot be found: one part in a thousand slips."""
 
 
+_PERIODS = 5.0
+"""Periods of the slip sensor for which it may be silent [-]."""
+
 START = 20.0
 """Grip force that is asked of an empty hand [N]."""
 
@@ -39,7 +42,9 @@ class GripController:
         known = observer._filter
         least_mu = math.exp(known.prior[0] - _LEAST_MU * known.prior_spread[0])
         self._grip = grip
-        self._settings = known.least_load, known.quantum, validation.positive("most", most), least_mu, *settings
+        rate = observer.sensors.slip_rate
+        silence = _PERIODS / rate if rate else grips.PAUSE
+        self._settings = known.least_load, known.quantum, silence, validation.positive("most", most), least_mu, *settings
         self.state["grip"] = min(validation.positive("start", start), most)
         self._found: Any = None
 
@@ -52,10 +57,11 @@ class GripController:
     def blind(self) -> np.ndarray:
         """True where sensors do not say what a part does, so that it is held firmly, bool `[...]`.
 
-        It began to fall and the slip sensor did not say so, or wrench or load are missing or less than half of those of
-        its weight.
+        It began to fall and the slip sensor did not say so, or no slip velocity comes, or wrench or load are missing or
+        cannot be right: the force is less than half of the weight, or the load does not follow the grip.
         """
-        return (self.state["blind"] >= grips.LATE) | (self.state["mute"] >= grips.LATE)
+        state = self.state
+        return (state["blind"] >= grips.LATE) | (state["mute"] >= grips.LATE) | (state["silent"] > 0.0)
 
     def update(self, measurement: Measurement) -> np.ndarray:
         """Take a sample of the sensors; return the grip force `[...]` [N].

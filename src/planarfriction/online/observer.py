@@ -26,6 +26,7 @@ FLAGS = {
     8: "bias of the wrench is unknown: no sample of an empty hand agrees with it",
     16: "friction drives the slip: the wrench or the slip velocity has the wrong sign",
     32: "friction or radius are far from what was assumed: check the units of wrench and load",
+    64: "wrench and slip velocity contradict the friction that was found",
 }
 """Meaning of the bits of `Estimate.flags`; those from 8 on last as long as their cause, and nothing is determined."""
 
@@ -96,7 +97,7 @@ class FrictionObserver:
     from what was assumed, and a bias that no empty hand has shown, unless `bias` (standard deviations) is at most the
     noise of the sensors. Nothing is determined then.
 
-    `information()` is that of the motion so far. `state` `[..., 189]` is all that changes: a copy of it is a
+    `information()` is that of the motion so far. `state` `[..., 190]` is all that changes: a copy of it is a
     checkpoint. With `batch`, the observer watches so many parts at once; measurements have that leading shape.
 
     Raises InvalidValueError for what is neither a model nor a limit surface, asymmetric friction, and values out of

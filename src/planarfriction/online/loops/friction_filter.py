@@ -74,11 +74,15 @@ force, wrench without its bias, and slip velocity."""
 NONE = -1e3
 """Log of the gauge of a hand that has not gripped yet."""
 
-NO_BIAS, NO_SIGN, NO_RANGE = 8, 16, 32
+NO_BIAS, NO_SIGN, NO_RANGE, NO_FIT = 8, 16, 32, 64
 """Flags of numbers that nothing is determined by (see `update`)."""
 
 POWERS = 8.0
 """Velocities over which the mean of the dissipated power is taken."""
+
+WORST, UNLIKELY = 1e3, 10.0
+"""Largest square of an innovation over its variance in their mean, and the mean above which wrench and velocity contradict
+what was learnt [-]."""
 
 FAR = 4.0
 """Standard deviations of what was assumed by which friction and radius may differ from it."""
@@ -159,7 +163,9 @@ def _step(s, now):
         s[at.BACK] += 1.0
         pause = far and s[at.BACK] == 1.0
         dt = dt if pause else (period if s[at.BACK] > RESTART else 0.0)
-    if xp.in_range(now) and (s[at.BACK] == 0.0 or s[at.BACK] >= RESTART or far):
+    if not xp.in_range(now):
+        s[at.TIME] += dt
+    elif s[at.BACK] == 0.0 or s[at.BACK] >= RESTART or far:
         s[at.TIME] = now
     return dt if dt <= 1.0 else (period if period > 0.0 else 1e-3)
 
@@ -207,10 +213,11 @@ def _move(settings, s, column):
 
 @kernel
 def _measure(s, h, miss, variance, column):
-    """Update the unknowns with a measurement, their logs within bounds."""
-    measure(s, h, miss, variance, column)
+    """Update the unknowns with a measurement, their logs within bounds; return the scaled innovation."""
+    scaled = measure(s, h, miss, variance, column)
     for i in range(at.MU, at.BIAS):
         s[i] = min(max(s[i], -LARGEST_LOG), LARGEST_LOG)
+    return scaled
 
 
 @kernel
@@ -221,7 +228,7 @@ def _learn(settings, s, h, column, jacobian):
     if count == 0.0:
         return
     load = s[at.OLD + 3] / count
-    before, power, force2, speed2 = s[at.SCALE], 0.0, 0.0, 0.0
+    before, power, force2, speed2, misfit = s[at.SCALE], 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         w = load * s[at.OLD + i] / count - s[at.BIAS + i]
         power, force2, speed2 = power + w * s[at.TWIST + i], force2 + w * w, speed2 + s[at.TWIST + i] * s[at.TWIST + i]
@@ -252,7 +259,10 @@ def _learn(settings, s, h, column, jacobian):
         h[at.BIAS + row] = 1.0
         error = settings.model_error * factor * g
         variance = settings.noise[row] / count + error * error
-        _measure(s, h, load * s[at.OLD + row] / count - factor * g * along - s[at.BIAS + row], variance, column)
+        miss = load * s[at.OLD + row] / count - factor * g * along - s[at.BIAS + row]
+        scaled = _measure(s, h, miss, variance, column)
+        misfit += scaled * scaled / 3.0
+    s[at.MISFIT] += (min(misfit, WORST) - s[at.MISFIT]) / POWERS
     s[at.BOUND] -= s[at.LEVER] * (s[at.SCALE] - before)
 
 
@@ -322,7 +332,7 @@ def _doubt(settings, s):
     far = s[at.GAUGE] > settings.prior[0] + settings.prior[1] + reach
     for i in range(3):
         far = far or abs(s[at.MU + i] - settings.prior[i]) > FAR * settings.prior_spread[i]
-    return flags + (NO_RANGE if far else 0)
+    return flags + (NO_RANGE if far else 0) + (NO_FIT if s[at.MISFIT] > UNLIKELY else 0)
 
 
 @kernel
@@ -357,7 +367,7 @@ def update(settings, states, samples, found):
 
     Samples `[P, 8]` are time, wrench, load and slip velocity; NaN is none. `flags` is the sum of what was odd: 1 no or
     bad wrench or load, 2 time that does not go on or jumps, 4 saturated sensor, 8 unknown bias, 16 friction that drives the slip
-    (a sign), 32 friction or radius far from what was assumed (a unit).
+    (a sign), 32 friction or radius far from what was assumed (a unit), 64 wrench and slip velocity contradict the rest.
     """
     h, column, jacobian, best, v = np.empty(N), np.empty(N), np.empty(9), np.empty(3), np.empty(3)
     for p in range(states.shape[0]):

@@ -21,7 +21,7 @@ STATE = np.dtype(
         *((name, float) for name in ("found", "goal", "began", "balance", "caught", "eased", "force", "torque")),
         *((name, float) for name in ("blind", "weight", "lately", "pressed", "count")),
         *((name, float) for name in ("broke", "dipped", "before", "borne", "stood", "quiet")),
-        *((name, float) for name in ("mute", "weighed", "pulls")),
+        *((name, float) for name in ("mute", "weighed", "pulls", "felt", "sent", "still", "silent")),
         ("same", float, 3),
         *((name, float, EARLY) for name in ("forces", "loads")),
     ]
@@ -34,11 +34,12 @@ slip sensor does not say so [s], largest holding load before that, filtered hold
 grips and holding loads of the first samples; of slips on purpose: holding load over grip at which the part breaks
 loose, time since a dip of the grip began [s], and displacement then; of all: filtered size of the wrench, and the
 largest since the part stuck [N], time since a slip velocity along the wrench [s], time since wrench and load were
-plausible [s], first force and filtered force of the part [N], and number of slip velocities in a row that were equal,
+plausible [s], first force and filtered force of the part [N], the last grip force that was measured, the grip that was asked for when
+it came [N], and the time for which it has been the same [s], 1 while no slip velocity comes, and number of slip velocities in a row that were equal,
 each component."""
 
 _FAR = math.inf
-FRESH = (-_FAR, -_FAR, 0.0, _FAR, *[0.0] * 6, -_FAR, 0.0, 0.0, 1.0, *[0.0] * 8, _FAR, *[0.0] * 8, _FAR, _FAR)
+FRESH = (-_FAR, -_FAR, 0.0, _FAR, *[0.0] * 6, -_FAR, 0.0, 0.0, 1.0, *[0.0] * 8, _FAR, *[0.0] * 12, _FAR, _FAR)
 """State before the first sample; what has not begun is infinitely far."""
 
 LOAD_TIME = 0.3
@@ -57,6 +58,9 @@ in a slip on purpose; and the time of its filter, after which a slip sensor that
 
 HALF = 0.5
 """Share of its first force that a part in the hand keeps at least: a smaller one is a sensor's fault, or it falls [-]."""
+
+FOLLOWS = 0.2
+"""Change of the grip that is asked for after which a sensor of the grip force that always says the same is dead [-]."""
 
 COUNTED, REPEATS = 0.5, 4.0
 """Speed along the wrench, in quanta, below which a slip velocity says that the part sticks, and number of repetitions
@@ -161,7 +165,11 @@ def _follow(c, e, least_load, quantum, turns):
     if e.seen > 0:
         c.borne += share * (size - c.borne)
         c.pulls += share * (force - c.pulls)
-    bears = e.seen > 0 and (c.age < SETTLED or c.pulls >= HALF * c.weighed)
+    c.still += dt
+    if e.normal_force != c.felt:
+        c.felt, c.sent, c.still = e.normal_force, c.grip, 0.0
+    frozen = c.still >= PAUSE and abs(c.grip - c.sent) > FOLLOWS * c.sent
+    bears = e.seen > 0 and not frozen and (c.age < SETTLED or c.pulls >= HALF * c.weighed)
     c.mute = 0.0 if bears else c.mute + dt
     if e.seen > 0:  # filtered as the gauge is, else a grip that falls fast seems to lose load
         grown = c.pressed + (e.normal_force - c.pressed) * (1.0 - math.exp(-dt / SEEN_TIME))
@@ -171,14 +179,14 @@ def _follow(c, e, least_load, quantum, turns):
     c.span += dt
     v, c.quiet = e.velocity, c.quiet + dt
     if dt > 0.0 and xp.in_range(v[0]) and xp.in_range(v[1]) and xp.in_range(v[2]):
-        along, frozen = 0.0, 0.0
+        same = 0.0
         for i in range(3):
             c.slid[i] += v[i] * c.span if c.span >= 0.0 else 0.0
             c.same[i] = c.same[i] + 1.0 if v[i] == c.velocity[i] and v[i] != 0.0 else 0.0
-            frozen = max(frozen, c.same[i])
+            same = max(same, c.same[i])
             c.velocity[i] = v[i]
         along = -(e.wrench[0] * v[0] + e.wrench[1] * v[1] + turn * e.radius * v[2])
-        if along >= COUNTED * quantum * size and size > 0.0 and frozen < REPEATS:
+        if along >= COUNTED * quantum * size and size > 0.0 and same < REPEATS:
             c.quiet = 0.0
         c.span = 0.0
     if c.age < SETTLED and bears:  # one wrong sample is not the grip, nor the load
@@ -194,7 +202,7 @@ def _follow(c, e, least_load, quantum, turns):
 
 
 @kernel
-def _unsure(c, e, dt, seeks, lost):
+def _unsure(c, e, dt, silence, seeks, lost):
     """Return True if friction cannot be found: it contradicts itself, sensors are silent, or slip velocities stay at 0.
 
     A wrench that a part which sticks bears does not change with the grip, that of one which slips falls with it.
@@ -205,7 +213,8 @@ def _unsure(c, e, dt, seeks, lost):
         c.weight = max(c.weight, c.lately)
         c.stood += max(c.borne - c.stood, 0.0) * dt / LOAD_TIME  # not by a tap
         c.blind = c.blind + dt if c.quiet > LATE and c.borne < (1.0 - lost) * c.stood else 0.0
-    return c.blind >= LATE or c.mute >= LATE or e.flags >= NO_SIGN or max(c.span, c.age if c.span < 0.0 else 0.0) >= PAUSE
+    c.silent = 1.0 if max(c.span, c.age if c.span < 0.0 else 0.0) >= silence else 0.0
+    return c.silent > 0.0 or c.blind >= LATE or c.mute >= LATE or e.flags >= NO_SIGN
 
 
 @kernel
@@ -228,7 +237,7 @@ def _set(c, asked, most):
 
 
 @jit
-def hold(states, found, least_load, quantum, most, least_mu, z, reserve, gain, explore):
+def hold(states, found, least_load, quantum, silence, most, least_mu, z, reserve, gain, explore):
     """Set the grips of `Hold` in states `[P]` from what an observer found `[P]`; `z` is the quantile of mu_c."""
     for p in range(states.shape[0]):
         c, e = states[p], found[p]
@@ -237,7 +246,7 @@ def hold(states, found, least_load, quantum, most, least_mu, z, reserve, gain, e
         path = math.hypot(slid[0], slid[1]) + e.radius * abs(slid[2])
         if slips and c.quiet <= LATE and c.age >= SETTLED and (e.determined[0] > 0 or path >= explore):
             c.found = 1.0
-        unsure = _unsure(c, e, dt, c.found == 0.0, LOST)
+        unsure = _unsure(c, e, dt, silence, c.found == 0.0, LOST)
         low = e.mu_c * math.exp(-z * math.sqrt(e.covariance[0, 0]))
         speed = math.hypot(v[0], v[1]) + e.radius * abs(v[2]) if slips else 0.0
         held = reserve * c.load / low + gain * speed
@@ -252,7 +261,7 @@ def hold(states, found, least_load, quantum, most, least_mu, z, reserve, gain, e
 
 
 @jit
-def slip(states, found, least_load, quantum, most, least_mu, axis, tolerance, duration, acceleration, adapt, delay):
+def slip(states, found, least_load, quantum, silence, most, least_mu, axis, tolerance, duration, acceleration, adapt, delay):
     """Set the grips of `SlideBy` (axis 1) and `TurnBy` (axis 2) in states `[P]` from what an observer found `[P]`."""
     for p in range(states.shape[0]):
         c, e = states[p], found[p]
@@ -264,7 +273,7 @@ def slip(states, found, least_load, quantum, most, least_mu, axis, tolerance, du
         if slips and c.began < 0.0 and c.age >= SETTLED:
             c.began, c.balance = 0.0, 1.05 * needed / max(e.gauge, 1e-9)
         rests = c.since > SURE and c.quiet > STICKS  # if the slip sensor is right, the wrench stays as it is
-        balance, unsure = c.balance, _unsure(c, e, dt, c.began < 0.0 or rests, LOST if c.began < 0.0 else LOSES)
+        balance, unsure = c.balance, _unsure(c, e, dt, silence, c.began < 0.0 or rests, LOST if c.began < 0.0 else LOSES)
         time = c.began + delay if c.began >= 0.0 else 0.0
         place, speed, push = trapezoid(xp, time, goal, duration)
         there = x + v * delay
@@ -300,13 +309,13 @@ def slip(states, found, least_load, quantum, most, least_mu, axis, tolerance, du
         else:
             brake = BRAKE if stuck and c.since < STICKS + BRAKES else 1.0
             asked = brake * balance * (1.0 - lead) * math.exp(-STUCK * max(c.since - STICKS - BRAKES, 0.0))
-        if unsure and (c.caught == 0.0 or c.blind >= LATE or c.mute >= LATE):
+        if unsure:
             asked = UNSURE * max(c.load, c.weight) / least_mu
         _set(c, asked, most)
 
 
 @jit
-def hinge(states, found, least_load, quantum, most, least_mu, reserve, gain):
+def hinge(states, found, least_load, quantum, silence, most, least_mu, reserve, gain):
     """Set the grips of `Hinge` in states `[P]` from what an observer found `[P]`."""
     for p in range(states.shape[0]):
         c, e = states[p], found[p]
@@ -329,6 +338,6 @@ def hinge(states, found, least_load, quantum, most, least_mu, reserve, gain):
         speed = math.hypot(v[0], v[1]) if slips else 0.0
         carried = reserve * (BRAKE if brakes else c.eased) * c.force / e.mu_c + gain * speed
         asked = carried if c.found > 0.0 else min(start, c.grip * math.exp(-RELEASE * dt))
-        if _unsure(c, e, dt, c.found == 0.0 or c.since > SURE, LOST if c.found == 0.0 else LOSES):
+        if _unsure(c, e, dt, silence, c.found == 0.0 or c.since > SURE, LOST if c.found == 0.0 else LOSES):
             asked = UNSURE * max(c.load, c.weight) / least_mu
         _set(c, asked, most)
