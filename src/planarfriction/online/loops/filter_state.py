@@ -26,6 +26,6 @@ LEVER = BACK + 1  # the share of the torque in the gauge of the wrench
 DISSIPATED = LEVER + 1  # the recent mean of the dissipated power over that of the force times the speed [-]
 TARED = DISSIPATED + 1  # 1 once the bias is known: an empty hand showed it, or it is as small as the noise
 PERIOD = TARED + 1  # the mean time between samples [s]
-STEADY = PERIOD + 1  # the number of samples of which it is the mean, up to `STEADIES`
+STEADY = PERIOD + 1  # the number of samples of which it is the mean, as far as they count
 MISFIT = STEADY + 1  # the recent mean of the squares of the innovations over their variances
 STATE = MISFIT + 1  # length of the state

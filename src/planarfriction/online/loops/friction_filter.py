@@ -19,19 +19,8 @@ from planarfriction.compiler import jit, kernel
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
 from planarfriction.kernels.vectors import clear
 from planarfriction.online.loops import filter_state as at
+from planarfriction.online.loops.clock import time_step
 from planarfriction.online.loops.square_root import ROOT, N, measure, reset, spread, variance_of
-
-RESTART = 10.0
-"""Samples in a row with an odd time after which the clock is set anew, and samples count as the period apart."""
-
-ODD = 30.0
-"""Ratio of a time step to the period, or of the period to a time step, above which the clock has jumped [-]."""
-
-STEADIES = 100.0
-"""Samples after which the period is known well enough to doubt the clock by it."""
-
-PERIODS = 10.0
-"""Samples over which the mean of the period is taken."""
 
 PEAK_TIME, SEEN_TIME, PLACE_TIME = 0.1, 0.004, 0.06
 """Times in which the peak of the wrench, its filter and the recent displacement fade [s]."""
@@ -80,9 +69,11 @@ NO_BIAS, NO_SIGN, NO_RANGE, NO_FIT = 8, 16, 32, 64
 POWERS = 8.0
 """Velocities over which the mean of the dissipated power is taken."""
 
-WORST, UNLIKELY = 1e3, 10.0
-"""Largest square of an innovation over its variance in their mean, and the mean above which wrench and velocity contradict
-what was learnt [-]."""
+WORST = 1e3
+"""Largest square of an innovation over its variance that counts in their mean [-]."""
+
+UNLIKELY = 10.0
+"""Mean above which wrench and velocity contradict what was learnt [-]: it stays below 4 with sensors that are right."""
 
 FAR = 4.0
 """Standard deviations of what was assumed by which friction and radius may differ from it."""
@@ -141,33 +132,6 @@ class Filter(NamedTuple):
     """Assumed logs of mu_c, its ratio and the scale of the radius `[3]`."""
     prior_spread: np.ndarray
     """Their standard deviations `[3]`."""
-
-
-@kernel
-def _step(s, now):
-    """Return the time step [s] of a sample, 0 for one that is left out; BACK tells if its time is odd.
-
-    Time is odd if it is missing, does not go on, or jumps. A jump is a pause if it stays alone; if odd times go on, the
-    clock is wrong, and samples are the last good period apart.
-    """
-    dt, period = now - s[at.TIME], s[at.PERIOD]
-    known = s[at.STEADY] >= STEADIES
-    far = dt > ODD * period and known
-    if xp.in_range(now) and dt > 0.0 and not far and (not known or ODD * dt >= period):
-        s[at.BACK] = 0.0
-        if dt <= 1.0:  # not the first sample, nor a long pause
-            s[at.STEADY] = min(s[at.STEADY] + 1.0, STEADIES)
-            step = min(max(dt, 0.5 * period), 2.0 * period) if period > 0.0 else dt
-            s[at.PERIOD] += (step - period) / min(s[at.STEADY], PERIODS)
-    else:
-        s[at.BACK] += 1.0
-        pause = far and s[at.BACK] == 1.0
-        dt = dt if pause else (period if s[at.BACK] > RESTART else 0.0)
-    if not xp.in_range(now):
-        s[at.TIME] += dt
-    elif s[at.BACK] == 0.0 or s[at.BACK] >= RESTART or far:
-        s[at.TIME] = now
-    return dt if dt <= 1.0 else (period if period > 0.0 else 1e-3)
 
 
 @kernel
@@ -332,7 +296,7 @@ def _doubt(settings, s):
     far = s[at.GAUGE] > settings.prior[0] + settings.prior[1] + reach
     for i in range(3):
         far = far or abs(s[at.MU + i] - settings.prior[i]) > FAR * settings.prior_spread[i]
-    return flags + (NO_RANGE if far else 0) + (NO_FIT if s[at.MISFIT] > UNLIKELY else 0)
+    return flags + (NO_RANGE if far else (NO_FIT if s[at.MISFIT] > UNLIKELY else 0))
 
 
 @kernel
@@ -373,7 +337,7 @@ def update(settings, states, samples, found):
     for p in range(states.shape[0]):
         s, e = states[p], found[p]
         now, wrench, load, velocity = samples[p, 0], samples[p, 1:4], samples[p, 4], samples[p, 5:]
-        dt = _step(s, now)
+        dt = time_step(s, now)
         flags = 2 if s[at.BACK] > 0.0 else 0
         force = math.hypot(wrench[0], wrench[1])
         good = xp.in_range(load) and xp.in_range(force) and xp.in_range(wrench[2])
