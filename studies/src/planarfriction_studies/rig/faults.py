@@ -26,15 +26,15 @@ wrench        kept  kept  kept    kept  kept   kept  kept   kept    kept
 load          kept  kept  kept    kept  kept   kept  kept   kept    kept
 slip_x        kept  kept  kept    kept  kept   kept  -      -       -
 slip_y        S     kept  S       S     S      kept  -      -       -
-spin          T     kept  T       T     T      kept  -      -       -
-slip          ST    kept  ST      ST    ST     kept  kept   kept    kept
+spin          TR    kept  TR      TR    TR     kept  -      -       -
+slip          STR   kept  STR     STR   STR    kept  kept   kept    kept
 time          kept  kept  kept    kept  kept   kept  kept   kept    kept
 """
 """End of each fault of a channel, at any moment.
 
 Kept: no part slips more than 5 mm (or turns 5 degrees, where that is the task) further than it shall, and none falls.
-Letters are tasks (S slide, T turn) which cannot be kept, as the way on which they shall stop is that of the sensor
-that is wrong: there the part may go further, but it stops, and a flag says so. A sensor's samples are late, early or
+Letters are tasks (S slide, T turn, R hinge) which cannot be kept, as the way on which they shall stop, or the speed by
+which they brake, is that of the sensor that is wrong: the part may go further, but it stops, and a flag says so. A sensor's samples are late, early or
 lost together: so are force and torque, or the three slip velocities, and the clock is that of all samples."""
 
 CHANNELS = {
