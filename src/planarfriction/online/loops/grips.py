@@ -213,7 +213,8 @@ def _unsure(c, e, dt, silence, seeks, lost):
         c.weight = max(c.weight, c.lately)
         c.stood += max(c.borne - c.stood, 0.0) * dt / LOAD_TIME  # not by a tap
         c.blind = c.blind + dt if c.quiet > LATE and c.borne < (1.0 - lost) * c.stood else 0.0
-    c.silent = 1.0 if max(c.span, c.age if c.span < 0.0 else 0.0) >= silence else 0.0
+    none = c.span < 0.0 and c.age >= max(silence, PAUSE)
+    c.silent = 1.0 if c.span >= silence or none else 0.0
     return c.silent > 0.0 or c.blind >= LATE or c.mute >= LATE or e.flags >= NO_SIGN
 
 
