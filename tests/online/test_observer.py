@@ -196,7 +196,8 @@ def test_a_clock_that_fails_leaves_the_period_of_the_samples(name):
 
 def test_a_pause_is_not_a_clock_that_fails():
     own = observer()
-    steps = [float(own._take(Measurement(t, (0.0, 1.0, 0.0), 4.0))["dt"]) for t in (*(1e-3 * np.arange(150)), 0.4, 0.401)]
+    times = *(1e-3 * np.arange(150)), 0.4, 0.401
+    steps = [float(own._take(Measurement(time, (0.0, 1.0, 0.0), 4.0))["dt"]) for time in times]
     assert steps[-2:] == pytest.approx([0.251, 1e-3])
 
 

@@ -44,7 +44,8 @@ class GripController:
         self._grip = grip
         rate = observer.sensors.slip_rate
         silence = _PERIODS / rate if rate else grips.PAUSE
-        self._settings = known.least_load, known.quantum, silence, validation.positive("most", most), least_mu, *settings
+        most = validation.positive("most", most)
+        self._settings = known.least_load, known.quantum, silence, most, least_mu, *settings
         self.state["grip"] = min(validation.positive("start", start), most)
         self._found: Any = None
 

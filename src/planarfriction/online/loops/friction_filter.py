@@ -330,8 +330,9 @@ def update(settings, states, samples, found):
     """Update states `[P, STATE]` with a sample each; `found [P]` of dtype `ESTIMATE` gets what is known.
 
     Samples `[P, 8]` are time, wrench, load and slip velocity; NaN is none. `flags` is the sum of what was odd: 1 no or
-    bad wrench or load, 2 time that does not go on or jumps, 4 saturated sensor, 8 unknown bias, 16 friction that drives the slip
-    (a sign), 32 friction or radius far from what was assumed (a unit), 64 wrench and slip velocity contradict the rest.
+    bad wrench or load, 2 time that does not go on or jumps, 4 saturated sensor, 8 unknown bias, 16 friction that
+    drives the slip (a sign), 32 friction or radius far from what was assumed (a unit), 64 wrench
+    and slip velocity contradict what was found.
     """
     h, column, jacobian, best, v = np.empty(N), np.empty(N), np.empty(9), np.empty(3), np.empty(3)
     for p in range(states.shape[0]):

@@ -34,9 +34,9 @@ slip sensor does not say so [s], largest holding load before that, filtered hold
 grips and holding loads of the first samples; of slips on purpose: holding load over grip at which the part breaks
 loose, time since a dip of the grip began [s], and displacement then; of all: filtered size of the wrench, and the
 largest since the part stuck [N], time since a slip velocity along the wrench [s], time since wrench and load were
-plausible [s], first force and filtered force of the part [N], the last grip force that was measured, the grip that was asked for when
-it came [N], and the time for which it has been the same [s], 1 while no slip velocity comes, and number of slip velocities in a row that were equal,
-each component."""
+plausible [s], first force and filtered force of the part [N], the last grip force that was measured, the grip that was
+asked for when it came [N], and the time for which it has been the same [s], 1 while no slip velocity comes, and number
+of slip velocities in a row that were equal, each component."""
 
 _FAR = math.inf
 FRESH = (-_FAR, -_FAR, 0.0, _FAR, *[0.0] * 6, -_FAR, 0.0, 0.0, 1.0, *[0.0] * 8, _FAR, *[0.0] * 12, _FAR, _FAR)
@@ -57,14 +57,16 @@ LOST, LOSES, LATE = 0.08, 0.05, 0.02
 in a slip on purpose; and the time of its filter, after which a slip sensor that works has said so [s]."""
 
 HALF = 0.5
-"""Share of its first force that a part in the hand keeps at least: a smaller one is a sensor's fault, or it falls [-]."""
+"""Share of its first force that a part in the hand keeps at least, unless a sensor is wrong or it falls [-]."""
 
 FOLLOWS = 0.2
-"""Change of the grip that is asked for after which a sensor of the grip force that always says the same is dead [-]."""
+"""Change of the asked grip after which a sensor of the grip force that always says the same is dead [-]."""
 
-COUNTED, REPEATS = 0.5, 4.0
-"""Speed along the wrench, in quanta, below which a slip velocity says that the part sticks, and number of repetitions
-from which one that is not 0 is that of a frozen sensor [-]."""
+COUNTED = 0.5
+"""Speed along the wrench, in quanta, below which a slip velocity says that the part sticks [-]."""
+
+REPEATS = 4.0
+"""Repetitions from which a slip velocity that is not 0 is that of a frozen sensor [-]."""
 
 UNSURE = 1.2
 """Grip of a part whose friction cannot be found, over the one that its load needs at the least friction [-]."""
@@ -262,7 +264,21 @@ def hold(states, found, least_load, quantum, silence, most, least_mu, z, reserve
 
 
 @jit
-def slip(states, found, least_load, quantum, silence, most, least_mu, axis, tolerance, duration, acceleration, adapt, delay):
+def slip(
+    states,
+    found,
+    least_load,
+    quantum,
+    silence,
+    most,
+    least_mu,
+    axis,
+    tolerance,
+    duration,
+    acceleration,
+    adapt,
+    delay,
+):
     """Set the grips of `SlideBy` (axis 1) and `TurnBy` (axis 2) in states `[P]` from what an observer found `[P]`."""
     for p in range(states.shape[0]):
         c, e = states[p], found[p]
@@ -274,7 +290,8 @@ def slip(states, found, least_load, quantum, silence, most, least_mu, axis, tole
         if slips and c.began < 0.0 and c.age >= SETTLED:
             c.began, c.balance = 0.0, 1.05 * needed / max(e.gauge, 1e-9)
         rests = c.since > SURE and c.quiet > STICKS  # if the slip sensor is right, the wrench stays as it is
-        balance, unsure = c.balance, _unsure(c, e, dt, silence, c.began < 0.0 or rests, LOST if c.began < 0.0 else LOSES)
+        unsure = _unsure(c, e, dt, silence, c.began < 0.0 or rests, LOST if c.began < 0.0 else LOSES)
+        balance = c.balance
         time = c.began + delay if c.began >= 0.0 else 0.0
         place, speed, push = trapezoid(xp, time, goal, duration)
         there = x + v * delay
@@ -320,7 +337,8 @@ def hinge(states, found, least_load, quantum, silence, most, least_mu, reserve, 
     """Set the grips of `Hinge` in states `[P]` from what an observer found `[P]`."""
     for p in range(states.shape[0]):
         c, e = states[p], found[p]
-        _, dt = _follow(c, e, least_load, quantum, 1.0 - c.found)  # a part that is to turn loses torque, but carries its weight
+        # a part that is to turn loses torque, but carries its weight
+        _, dt = _follow(c, e, least_load, quantum, 1.0 - c.found)
         force, torque = math.hypot(e.wrench[0], e.wrench[1]), e.wrench[2]
         if xp.in_range(force) and xp.in_range(torque):
             share = dt / FORCE_TIME

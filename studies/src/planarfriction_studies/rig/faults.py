@@ -34,8 +34,9 @@ time          kept  kept  kept    kept  kept   kept  kept   kept    kept
 
 Kept: no part slips more than 5 mm (or turns 5 degrees, where that is the task) further than it shall, and none falls.
 Letters are tasks (S slide, T turn, R hinge) which cannot be kept, as the way on which they shall stop, or the speed by
-which they brake, is that of the sensor that is wrong: the part may go further, but it stops, and a flag says so. A sensor's samples are late, early or
-lost together: so are force and torque, or the three slip velocities, and the clock is that of all samples."""
+which they brake, is that of the sensor that is wrong: the part may go further, but it stops, and a flag says so.
+Samples of a sensor are late, early or lost together: so are force and torque, or the three slip velocities, and the
+clock is that of all samples."""
 
 CHANNELS = {
     "force": (1, 2),
@@ -53,9 +54,17 @@ CHANNELS = {
 FACTORS = {"0": 0.0, "nan": np.nan, "sign": -1.0, "1e-3": 1e-3, "1e3": 1e3}
 """Factors of what sensors with a wrong value say."""
 
-LATE, JITTER, STAMP, WINDOW = 20, 8, 1.5e-3, 16
-"""Steps by which samples come late, those by which they are early or late, error of a stamp [s], and steps of which
-samples of every other span, by chance, are lost."""
+LATE = 20
+"""Steps by which samples come late."""
+
+JITTER = 8
+"""Largest number of steps by which samples come late by chance."""
+
+STAMP = 1.5e-3
+"""Largest error of a time that jitters [s]."""
+
+WINDOW = 16
+"""Steps of a span whose samples are lost, by chance every other one."""
 
 MOMENTS = ("search", "slip", "end")
 """Moments at which faults begin: while the grip falls, while the part slips, and once it is held or nearly there."""
@@ -63,8 +72,14 @@ MOMENTS = ("search", "slip", "end")
 TASKS = {"hold": "H", "slide": "S", "turn": "T", "hinge": "R"}
 """Tasks, and their letters in the table."""
 
-PAST, TURNED, RIM = 5e-3, np.radians(5.0), 8e-3
-"""Slip [m] and turn [rad] beyond the goal that is still kept, and radius at which a turn of a held part is a slip [m]."""
+PAST = 5e-3
+"""Slip beyond the goal that is still kept [m]."""
+
+TURNED = np.radians(5.0)
+"""Turn beyond the goal that is still kept [rad]."""
+
+RIM = 8e-3
+"""Radius at which a turn of a held part is a slip [m]."""
 
 FALLEN = {"turn": 0.01, "hinge": 0.03}
 """Slide of a part that is to turn or to hang, which is not kept [m]: with healthy sensors 5 mm, and 20 mm at most."""
@@ -132,7 +147,7 @@ class Batch:
         for name in ("normal_force", "centre", "angle", "slip"):
             setattr(gripper, name, getattr(gripper, name)[index])
         gripper._past = gripper._past[:, index]
-        arrays = ("mass", "inertia", "centre", "mu_c", "radius", "delay", "bias", "tap", "tap_time", "tilt", "tilt_time")
+        arrays = "mass inertia centre mu_c radius delay bias tap tap_time tilt tilt_time".split()
         gripper.parts = dataclasses.replace(gripper.parts, **{n: getattr(gripper.parts, n)[index] for n in arrays})
         controller.state, controller.observer.state = controller.state[index], controller.observer.state[index]
         self.rows = {name: each[index] for name, each in self.rows.items()}
