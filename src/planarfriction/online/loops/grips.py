@@ -265,19 +265,7 @@ def hold(states, found, least_load, quantum, silence, most, least_mu, z, reserve
 
 @jit
 def slip(
-    states,
-    found,
-    least_load,
-    quantum,
-    silence,
-    most,
-    least_mu,
-    axis,
-    tolerance,
-    duration,
-    acceleration,
-    adapt,
-    delay,
+    states, found, least_load, quantum, silence, most, least_mu, axis, tolerance, duration, acceleration, adapt, delay
 ):
     """Set the grips of `SlideBy` (axis 1) and `TurnBy` (axis 2) in states `[P]` from what an observer found `[P]`."""
     for p in range(states.shape[0]):
