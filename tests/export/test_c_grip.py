@@ -37,7 +37,7 @@ def compiled(model, folder, *options):
 
 
 def recorded():
-    """Return samples [T, 8] of a part that slips for 0.3 s of every second; at times numbers are missing."""
+    """Return samples [T, 8] of a part that slips for 0.3 s of every second; at times numbers are missing or wrong."""
     rng, surface, time = np.random.default_rng(0), pf.LimitSurfaceTable(DISC), 1e-3 * np.arange(COUNT)
     slips, load = time % 1.0 < 0.3, 10.0 + 3.0 * np.sin(5.0 * time)
     turning = np.column_stack([np.cos(3.0 * time), np.sin(3.0 * time), 150.0 * np.sin(7.0 * time)])
@@ -45,6 +45,8 @@ def recorded():
     wrench += rng.normal(size=(COUNT, 3)) * [0.03, 0.03, 3e-4]
     velocity = np.where(slips[:, None], 0.02 * turning, 0.0) + 1e-4 * rng.normal(size=(COUNT, 3))
     wrench[::997], velocity[np.arange(COUNT) % 8 > 0] = np.nan, np.nan
+    load[3000:3040], load[5000:5300], wrench[7000:7100] = 0.0, 9.0, 0.0  # sensors that die for a while
+    velocity[6000:6200:8], time[8000:8050], time[9000:] = (0.0, 2e-3, 0.0), np.nan, 1e-3 * time[9000:]
     return np.column_stack([time, wrench, load, velocity])
 
 

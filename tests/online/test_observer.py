@@ -172,6 +172,51 @@ def test_a_wrench_beyond_all_friction_is_said_and_forgotten():
     assert set(flags[110:150]) == {32}  # |f|/f_N = 5
 
 
+CLOCKS = {
+    "missing": lambda now: np.nan,
+    "zero": lambda now: 0.0,
+    "stands": lambda now: 0.2,
+    "backwards": lambda now: -now,
+    "in ks": lambda now: 1e-3 * now,
+    "in ms": lambda now: 1e3 * now,
+    "set back": lambda now: now - 0.15,
+}
+
+
+@pytest.mark.parametrize("name", CLOCKS)
+def test_a_clock_that_fails_leaves_the_period_of_the_samples(name):
+    own, steps = observer(), []
+    for k in range(400):
+        now = 2e-3 * k if k < 200 else CLOCKS[name](2e-3 * k)
+        found = own._take(Measurement(now, (0.0, 1.0, 0.0), 4.0))
+        steps.append(float(found["dt"]))
+        assert (found["flags"] & 2 > 0) == (k >= 200 and (name != "set back" or k < 210))
+    assert sum(steps[200:]) == pytest.approx(0.4, abs=0.025)  # ten samples are left out, until the fault is certain
+
+
+def test_a_pause_is_not_a_clock_that_fails():
+    own = observer()
+    times = *(1e-3 * np.arange(150)), 0.4, 0.401
+    steps = [float(own._take(Measurement(time, (0.0, 1.0, 0.0), 4.0))["dt"]) for time in times]
+    assert steps[-2:] == pytest.approx([0.251, 1e-3])
+
+
+def test_no_load_is_said_once_the_hand_has_gripped():
+    own, empty = observer(), Measurement(0.0, (0.0, 0.0, 0.0), 0.0)
+    assert own.update(empty).flags == 0
+    assert own.update(Measurement(1e-3, (0.0, 1.0, 0.0), 4.0)).flags == 0
+    assert own.update(empty._replace(time=2e-3)).flags == 1
+
+
+@pytest.mark.parametrize("part, flag", [((1.0, 1.0, 1.0), 0), ((1.0, 1.0, 0.0), 64), ((0.3, 0.3, 1.0), 64)])
+def test_a_wrench_that_contradicts_what_was_found_is_said(part, flag):
+    own, samples = observer(), list(sliding(count=900))
+    found = taken(own, samples[:600])
+    assert found.flags == 0
+    flags = {int(own.update(s._replace(wrench=np.asarray(s.wrench) * part)).flags) for s in samples[600:]}
+    assert flags <= {0, flag, 32} and (flag in flags)
+
+
 NUMBERS = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-10.0, 10.0)
 
 

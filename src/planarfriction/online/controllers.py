@@ -17,14 +17,24 @@ _LEAST_MU = 3.0902
 """Standard deviations by which mu_c is assumed to be smaller where it cannot be found: one part in a thousand slips."""
 
 
+_PERIODS = 5.0
+"""Periods of the slip sensor for which it may be silent [-]."""
+
+START = 20.0
+"""Grip force that is asked of an empty hand [N]."""
+
+
 class GripController:
     """Base of the controllers: an observer, and the load of the part that it sees.
+
+    While the hand is empty they ask for the grip `start` [N]; the first grip that is measured then stays until the load
+    is known. `most` [N] bounds all grips.
 
     `state` `[...]`, of the shape of the observer's batch, is all that changes beside the observer's: a copy of both is
     a checkpoint. Its fields are those of `planarfriction.online.loops.grips.STATE`.
     """
 
-    def __init__(self, observer: FrictionObserver, grip: Any, *settings: float, most: float) -> None:
+    def __init__(self, observer: FrictionObserver, grip: Any, *settings: float, start: float, most: float) -> None:
         self.observer = validation.instance("observer", observer, FrictionObserver, "a FrictionObserver")
         self.state = np.full(observer.state.shape[:-1], np.array(grips.FRESH, grips.STATE))
         if grip is not grips.hold and not observer.sensors.slip_rate:
@@ -32,8 +42,11 @@ class GripController:
         known = observer._filter
         least_mu = math.exp(known.prior[0] - _LEAST_MU * known.prior_spread[0])
         self._grip = grip
-        self._settings = known.least_load, validation.positive("most", most), least_mu, *settings
-        self.state["grip"] = most
+        rate = observer.sensors.slip_rate
+        silence = _PERIODS / rate if rate else grips.PAUSE
+        most = validation.positive("most", most)
+        self._settings = known.least_load, known.quantum, silence, most, least_mu, *settings
+        self.state["grip"] = min(validation.positive("start", start), most)
         self._found: Any = None
 
     @property
@@ -43,8 +56,13 @@ class GripController:
 
     @property
     def blind(self) -> np.ndarray:
-        """True where a part began to fall and the slip sensor did not say so, bool `[...]`."""
-        return self.state["blind"] >= grips.LATE
+        """True where sensors do not say what a part does, so that it is held firmly, bool `[...]`.
+
+        It began to fall and the slip sensor did not say so, or no slip velocity comes, or wrench or load are missing or
+        cannot be right: the force is less than half of the weight, or the load does not follow the grip.
+        """
+        state = self.state
+        return (state["blind"] >= grips.LATE) | (state["mute"] >= grips.LATE) | (state["silent"] > 0.0)
 
     def update(self, measurement: Measurement) -> np.ndarray:
         """Take a sample of the sensors; return the grip force `[...]` [N].
@@ -74,6 +92,7 @@ class Hold(GripController):
         reserve: float = 1.2,
         gain: float = 100.0,
         explore: float = 3e-4,
+        start: float = START,
         most: float = 60.0,
     ) -> None:
         from scipy.special import ndtri
@@ -82,7 +101,7 @@ class Hold(GripController):
             raise InvalidValueError("probability", "be between 0 and 0.5", probability)
         explore = validation.non_negative("explore", explore)
         numbers = validation.positive("reserve", reserve), validation.non_negative("gain", gain)
-        super().__init__(observer, grips.hold, -float(ndtri(probability)), *numbers, explore, most=most)
+        super().__init__(observer, grips.hold, -float(ndtri(probability)), *numbers, explore, start=start, most=most)
         self.state["found"] = explore == 0.0
 
 
@@ -111,12 +130,13 @@ class Slip(GripController):
         acceleration: float,
         adapt: float,
         delay: float = 0.02,
+        start: float = START,
         most: float = 60.0,
     ) -> None:
         positive, least = validation.positive, validation.non_negative
         times = positive("duration", duration), positive("acceleration", acceleration)
         gains = least("adapt", adapt), least("delay", delay)
-        super().__init__(observer, grips.slip, self.axis, self.tolerance, *times, *gains, most=most)
+        super().__init__(observer, grips.slip, self.axis, self.tolerance, *times, *gains, start=start, most=most)
         self.state["goal"] = validation.filled("goal", goal, self.state.shape)
         if not self.state["goal"].all():
             raise InvalidValueError("goal", "be finite and not zero", goal)
@@ -156,7 +176,13 @@ class Hinge(GripController):
     """
 
     def __init__(
-        self, observer: FrictionObserver, *, reserve: float = 1.1, gain: float = 50.0, most: float = 60.0
+        self,
+        observer: FrictionObserver,
+        *,
+        reserve: float = 1.1,
+        gain: float = 50.0,
+        start: float = START,
+        most: float = 60.0,
     ) -> None:
         numbers = validation.positive("reserve", reserve), validation.non_negative("gain", gain)
-        super().__init__(observer, grips.hinge, *numbers, most=most)
+        super().__init__(observer, grips.hinge, *numbers, start=start, most=most)

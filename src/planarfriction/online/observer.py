@@ -20,12 +20,13 @@ PARAMETERS = ("mu_c", "mu_s", "radius")
 """Names of what is estimated beside the twist, in the order of `Estimate.determined` and `covariance`."""
 
 FLAGS = {
-    1: "no wrench or load",
-    2: "time does not go on",
+    1: "no wrench, or no load since the hand gripped",
+    2: "time does not go on, or jumps",
     4: "sensor is saturated",
     8: "bias of the wrench is unknown: no sample of an empty hand agrees with it",
     16: "friction drives the slip: the wrench or the slip velocity has the wrong sign",
     32: "friction or radius are far from what was assumed: check the units of wrench and load",
+    64: "wrench and slip velocity contradict the friction that was found",
 }
 """Meaning of the bits of `Estimate.flags`; those from 8 on last as long as their cause, and nothing is determined."""
 
@@ -96,7 +97,7 @@ class FrictionObserver:
     from what was assumed, and a bias that no empty hand has shown, unless `bias` (standard deviations) is at most the
     noise of the sensors. Nothing is determined then.
 
-    `information()` is that of the motion so far. `state` `[..., 187]` is all that changes: a copy of it is a
+    `information()` is that of the motion so far. `state` `[..., 190]` is all that changes: a copy of it is a
     checkpoint. With `batch`, the observer watches so many parts at once; measurements have that leading shape.
 
     Raises InvalidValueError for what is neither a model nor a limit surface, asymmetric friction, and values out of
@@ -160,7 +161,7 @@ class FrictionObserver:
         state[..., filter_state.TARED] = (unsure <= np.sqrt(self._filter.noise)).all()
         state[..., kernels.ROOT : kernels.ROOT + n * n] = root.ravel()
         state[..., filter_state.SLIP], state[..., filter_state.TIME] = 1e-3, -math.inf
-        state[..., [filter_state.BOUND, filter_state.PEAK, filter_state.GAUGE]] = -10.0
+        state[..., [filter_state.BOUND, filter_state.PEAK]], state[..., filter_state.GAUGE] = -10.0, kernels.NONE
 
     def update(self, measurement: Measurement) -> Estimate:
         """Take a sample of every part, with NaN or None for what is missing; return what is known now.

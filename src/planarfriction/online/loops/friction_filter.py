@@ -19,10 +19,8 @@ from planarfriction.compiler import jit, kernel
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
 from planarfriction.kernels.vectors import clear
 from planarfriction.online.loops import filter_state as at
+from planarfriction.online.loops.clock import time_step
 from planarfriction.online.loops.square_root import ROOT, N, measure, reset, spread, variance_of
-
-RESTART = 10.0
-"""Samples in a row whose time went back after which the clock counts as set anew."""
 
 PEAK_TIME, SEEN_TIME, PLACE_TIME = 0.1, 0.004, 0.06
 """Times in which the peak of the wrench, its filter and the recent displacement fade [s]."""
@@ -53,19 +51,29 @@ ESTIMATE = np.dtype(
         ("determined", np.uint8, 3),
         *((name, float) for name in ("slip", "about_to_slip", "margin", "gauge")),
         ("flags", np.int64),
+        ("seen", np.int64),
         *((name, float) for name in ("dt", "normal_force")),
         *((name, float, 3) for name in ("wrench", "velocity")),
     ],
     align=True,
 )
-"""Estimate after a sample, and the sample as controllers read it: time step, grip force, wrench without its bias, and
-slip velocity."""
+"""Estimate after a sample, and the sample as controllers read it: 1 if wrench and load are there, time step, grip
+force, wrench without its bias, and slip velocity."""
 
-NO_BIAS, NO_SIGN, NO_RANGE = 8, 16, 32
+NONE = -1e3
+"""Log of the gauge of a hand that has not gripped yet."""
+
+NO_BIAS, NO_SIGN, NO_RANGE, NO_FIT = 8, 16, 32, 64
 """Flags of numbers that nothing is determined by (see `update`)."""
 
 POWERS = 8.0
 """Velocities over which the mean of the dissipated power is taken."""
+
+WORST = 1e3
+"""Largest square of an innovation over its variance that counts in their mean [-]."""
+
+UNLIKELY = 10.0
+"""Mean above which wrench and velocity contradict what was learnt [-]: it stays below 4 with sensors that are right."""
 
 FAR = 4.0
 """Standard deviations of what was assumed by which friction and radius may differ from it."""
@@ -169,10 +177,11 @@ def _move(settings, s, column):
 
 @kernel
 def _measure(s, h, miss, variance, column):
-    """Update the unknowns with a measurement, their logs within bounds."""
-    measure(s, h, miss, variance, column)
+    """Update the unknowns with a measurement, their logs within bounds; return the scaled innovation."""
+    scaled = measure(s, h, miss, variance, column)
     for i in range(at.MU, at.BIAS):
         s[i] = min(max(s[i], -LARGEST_LOG), LARGEST_LOG)
+    return scaled
 
 
 @kernel
@@ -183,7 +192,7 @@ def _learn(settings, s, h, column, jacobian):
     if count == 0.0:
         return
     load = s[at.OLD + 3] / count
-    before, power, force2, speed2 = s[at.SCALE], 0.0, 0.0, 0.0
+    before, power, force2, speed2, misfit = s[at.SCALE], 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         w = load * s[at.OLD + i] / count - s[at.BIAS + i]
         power, force2, speed2 = power + w * s[at.TWIST + i], force2 + w * w, speed2 + s[at.TWIST + i] * s[at.TWIST + i]
@@ -214,7 +223,10 @@ def _learn(settings, s, h, column, jacobian):
         h[at.BIAS + row] = 1.0
         error = settings.model_error * factor * g
         variance = settings.noise[row] / count + error * error
-        _measure(s, h, load * s[at.OLD + row] / count - factor * g * along - s[at.BIAS + row], variance, column)
+        miss = load * s[at.OLD + row] / count - factor * g * along - s[at.BIAS + row]
+        scaled = _measure(s, h, miss, variance, column)
+        misfit += scaled * scaled / 3.0
+    s[at.MISFIT] += (min(misfit, WORST) - s[at.MISFIT]) / POWERS
     s[at.BOUND] -= s[at.LEVER] * (s[at.SCALE] - before)
 
 
@@ -284,7 +296,7 @@ def _doubt(settings, s):
     far = s[at.GAUGE] > settings.prior[0] + settings.prior[1] + reach
     for i in range(3):
         far = far or abs(s[at.MU + i] - settings.prior[i]) > FAR * settings.prior_spread[i]
-    return flags + (NO_RANGE if far else 0)
+    return flags + (NO_RANGE if far else (NO_FIT if s[at.MISFIT] > UNLIKELY else 0))
 
 
 @kernel
@@ -318,23 +330,20 @@ def update(settings, states, samples, found):
     """Update states `[P, STATE]` with a sample each; `found [P]` of dtype `ESTIMATE` gets what is known.
 
     Samples `[P, 8]` are time, wrench, load and slip velocity; NaN is none. `flags` is the sum of what was odd: 1 no or
-    bad wrench or load, 2 time that does not go on, 4 saturated sensor, 8 unknown bias, 16 friction that drives the slip
-    (a sign), 32 friction or radius far from what was assumed (a unit).
+    bad wrench or load, 2 time that does not go on or jumps, 4 saturated sensor, 8 unknown bias, 16 friction that
+    drives the slip (a sign), 32 friction or radius far from what was assumed (a unit), 64 wrench
+    and slip velocity contradict what was found.
     """
     h, column, jacobian, best, v = np.empty(N), np.empty(N), np.empty(9), np.empty(3), np.empty(3)
     for p in range(states.shape[0]):
-        s, e, flags = states[p], found[p], 0
+        s, e = states[p], found[p]
         now, wrench, load, velocity = samples[p, 0], samples[p, 1:4], samples[p, 4], samples[p, 5:]
-        dt = now - s[at.TIME]
-        if not xp.in_range(now) or dt <= 0.0:
-            s[at.BACK] += 1.0 if xp.in_range(now) else 0.0
-            flags, dt = 2, 0.0
-            s[at.TIME] = now if s[at.BACK] >= RESTART else s[at.TIME]
-        else:
-            s[at.TIME], s[at.BACK], dt = now, 0.0, dt if dt <= 1.0 else 1e-3  # the first sample, or a long pause
+        dt = time_step(s, now)
+        flags = 2 if s[at.BACK] > 0.0 else 0
         force = math.hypot(wrench[0], wrench[1])
         good = xp.in_range(load) and xp.in_range(force) and xp.in_range(wrench[2])
-        flags += 0 if good else 1
+        lost = good and load <= settings.least_load and s[at.GAUGE] > NONE  # after a grip no load is not an empty hand
+        flags += 0 if good and not lost else 1
         if good and force >= settings.saturation:
             flags, good = flags + 4, False
         if dt > 0.0:
@@ -373,6 +382,7 @@ def update(settings, states, samples, found):
             h[at.SCALE] = s[at.LEVER]
             _measure(s, h, s[at.PEAK] - s[at.MU] - s[at.RATIO], PEAK_ERROR * PEAK_ERROR, column)
         e.flags, e.dt, e.normal_force = flags + _doubt(settings, s), dt, load
+        e.seen = 1 if good and not lost else 0
         for i in range(3):
             e.wrench[i], e.velocity[i] = wrench[i], velocity[i]
         _estimate(settings, s, e)

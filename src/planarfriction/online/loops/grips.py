@@ -21,6 +21,8 @@ STATE = np.dtype(
         *((name, float) for name in ("found", "goal", "began", "balance", "caught", "eased", "force", "torque")),
         *((name, float) for name in ("blind", "weight", "lately", "pressed", "count")),
         *((name, float) for name in ("broke", "dipped", "before", "borne", "stood", "quiet")),
+        *((name, float) for name in ("mute", "weighed", "pulls", "felt", "sent", "still", "silent")),
+        ("same", float, 3),
         *((name, float, EARLY) for name in ("forces", "loads")),
     ]
 )
@@ -31,10 +33,13 @@ caught, share of the grip that is left, and filtered force and torque; of all: t
 slip sensor does not say so [s], largest holding load before that, filtered holding load and grip force, and number,
 grips and holding loads of the first samples; of slips on purpose: holding load over grip at which the part breaks
 loose, time since a dip of the grip began [s], and displacement then; of all: filtered size of the wrench, and the
-largest since the part stuck [N], and time since a slip velocity that was not 0 [s]."""
+largest since the part stuck [N], time since a slip velocity along the wrench [s], time since wrench and load were
+plausible [s], first force and filtered force of the part [N], the last grip force that was measured, the grip that was
+asked for when it came [N], and the time for which it has been the same [s], 1 while no slip velocity comes, and number
+of slip velocities in a row that were equal, each component."""
 
 _FAR = math.inf
-FRESH = (-_FAR, -_FAR, 0.0, _FAR, *[0.0] * 6, -_FAR, 0.0, 0.0, 1.0, *[0.0] * 8, _FAR, *[0.0] * 4, _FAR, _FAR)
+FRESH = (-_FAR, -_FAR, 0.0, _FAR, *[0.0] * 6, -_FAR, 0.0, 0.0, 1.0, *[0.0] * 8, _FAR, *[0.0] * 12, _FAR, _FAR)
 """State before the first sample; what has not begun is infinitely far."""
 
 LOAD_TIME = 0.3
@@ -50,6 +55,18 @@ PAUSE = 0.1
 LOST, LOSES, LATE = 0.08, 0.05, 0.02
 """Shares of the wrench that a part loses only if it slips [-]: while the grip is first lowered, and once it has stuck
 in a slip on purpose; and the time of its filter, after which a slip sensor that works has said so [s]."""
+
+HALF = 0.5
+"""Share of its first force that a part in the hand keeps at least, unless a sensor is wrong or it falls [-]."""
+
+FOLLOWS = 0.2
+"""Change of the asked grip after which a sensor of the grip force that always says the same is dead [-]."""
+
+COUNTED = 0.5
+"""Speed along the wrench, in quanta, below which a slip velocity says that the part sticks [-]."""
+
+REPEATS = 4.0
+"""Repetitions from which a slip velocity that is not 0 is that of a frozen sensor [-]."""
 
 UNSURE = 1.2
 """Grip of a part whose friction cannot be found, over the one that its load needs at the least friction [-]."""
@@ -135,46 +152,60 @@ def _median(row, count):
 
 
 @kernel
-def _follow(c, e, least_load, turns):
+def _follow(c, e, least_load, quantum, turns):
     """Take in what an observer found; return the grip at mu = 1 that holds the present load, and the time step.
 
+    A wrench or a load that is missing, or with which the part would have lost its weight, leaves the load as it was.
     `turns` is the share of the torque that counts in the wrench that the part bears.
     """
-    if c.age < 0.0 and e.normal_force <= least_load:
+    if c.age < 0.0 and not e.normal_force > least_load:
         return 0.0, 0.0  # nothing begins before the hand grips
     dt = min(e.dt, PAUSE) if c.age >= 0.0 else 0.0  # the first sample has none
-    force = e.normal_force
-    if xp.in_range(force) and force > 0.0:  # filtered as the gauge is, else a grip that falls fast seems to lose load
-        c.pressed += (force - c.pressed) * (1.0 - math.exp(-dt / SEEN_TIME)) if c.pressed > 0.0 else force
-    needed = e.gauge * c.pressed if xp.in_range(force) and force > 0.0 else 0.0
+    share = min(dt / LATE, 1.0) if c.age >= SETTLED else 1.0
+    force, turn = math.hypot(e.wrench[0], e.wrench[1]), turns * e.wrench[2] / e.radius
+    size = math.hypot(force, turn)
+    if e.seen > 0:
+        c.borne += share * (size - c.borne)
+        c.pulls += share * (force - c.pulls)
+    c.still += dt
+    if e.normal_force != c.felt:
+        c.felt, c.sent, c.still = e.normal_force, c.grip, 0.0
+    frozen = c.still >= PAUSE and abs(c.grip - c.sent) > FOLLOWS * c.sent
+    bears = e.seen > 0 and not frozen and (c.age < SETTLED or c.pulls >= HALF * c.weighed)
+    c.mute = 0.0 if bears else c.mute + dt
+    if e.seen > 0:  # filtered as the gauge is, else a grip that falls fast seems to lose load
+        grown = c.pressed + (e.normal_force - c.pressed) * (1.0 - math.exp(-dt / SEEN_TIME))
+        c.pressed = grown if c.pressed > 0.0 else e.normal_force
+    needed = e.gauge * c.pressed if bears else c.lately
     c.load, c.age = max(needed, c.load * math.exp(-dt / LOAD_TIME)), max(c.age, 0.0) + dt
     c.span += dt
     v, c.quiet = e.velocity, c.quiet + dt
     if dt > 0.0 and xp.in_range(v[0]) and xp.in_range(v[1]) and xp.in_range(v[2]):
+        same = 0.0
         for i in range(3):
             c.slid[i] += v[i] * c.span if c.span >= 0.0 else 0.0
+            c.same[i] = c.same[i] + 1.0 if v[i] == c.velocity[i] and v[i] != 0.0 else 0.0
+            same = max(same, c.same[i])
             c.velocity[i] = v[i]
-            c.quiet = c.quiet if v[i] == 0.0 else 0.0
+        along = -(e.wrench[0] * v[0] + e.wrench[1] * v[1] + turn * e.radius * v[2])
+        if along >= COUNTED * quantum * size and size > 0.0 and same < REPEATS:
+            c.quiet = 0.0
         c.span = 0.0
-    if c.age < SETTLED and xp.in_range(force):  # one wrong sample is not the grip, nor the load
+    if c.age < SETTLED and bears:  # one wrong sample is not the grip, nor the load
         for i in range(EARLY - 1):
             c.forces[i], c.loads[i] = c.forces[i + 1], c.loads[i + 1]
-        c.forces[EARLY - 1], c.loads[EARLY - 1] = force, needed
+        c.forces[EARLY - 1], c.loads[EARLY - 1] = e.normal_force, needed
         c.count = min(c.count + 1.0, float(EARLY))
         c.grip, c.load = _median(c.forces, c.count), _median(c.loads, c.count)
-        c.weight, c.lately = c.load, c.load
-    share = min(dt / LATE, 1.0)
-    if needed > 0.0:
+        c.weight, c.lately, c.weighed = c.load, c.load, c.pulls
+    if bears:
         c.lately += share * (min(needed, 1.5 * c.lately) - c.lately)
-    size = math.hypot(math.hypot(e.wrench[0], e.wrench[1]), turns * e.wrench[2] / e.radius)
-    if xp.in_range(size):
-        c.borne += (share if c.age >= SETTLED else 1.0) * (size - c.borne)
     return needed, dt
 
 
 @kernel
-def _unsure(c, e, dt, seeks, lost):
-    """Return True if friction cannot be found: it contradicts itself, no slip velocity comes, or it stays at 0.
+def _unsure(c, e, dt, silence, seeks, lost):
+    """Return True if friction cannot be found: it contradicts itself, sensors are silent, or slip velocities stay at 0.
 
     A wrench that a part which sticks bears does not change with the grip, that of one which slips falls with it.
     """
@@ -184,7 +215,9 @@ def _unsure(c, e, dt, seeks, lost):
         c.weight = max(c.weight, c.lately)
         c.stood += max(c.borne - c.stood, 0.0) * dt / LOAD_TIME  # not by a tap
         c.blind = c.blind + dt if c.quiet > LATE and c.borne < (1.0 - lost) * c.stood else 0.0
-    return c.blind >= LATE or e.flags >= NO_SIGN or max(c.span, c.age if c.span < 0.0 else 0.0) >= PAUSE
+    none = c.span < 0.0 and c.age >= max(silence, PAUSE)
+    c.silent = 1.0 if c.span >= silence or none else 0.0
+    return c.silent > 0.0 or c.blind >= LATE or c.mute >= LATE or e.flags >= NO_SIGN
 
 
 @kernel
@@ -197,22 +230,26 @@ def _begin(c, value, most):
 
 @kernel
 def _set(c, asked, most):
-    """Set the grip that is asked for; before the filters have settled and a slip velocity may have come, leave it."""
+    """Set the grip that is asked for; before the filters have settled and a slip velocity may have come, leave it.
+
+    It does not fall while wrench or load are missing.
+    """
+    asked = asked if c.mute == 0.0 else max(asked, c.grip)
     ready = c.age >= SETTLED and (c.span >= 0.0 or c.age >= PAUSE)
     c.grip = min(max(asked if ready else c.grip, 0.0), most)
 
 
 @jit
-def hold(states, found, least_load, most, least_mu, z, reserve, gain, explore):
+def hold(states, found, least_load, quantum, silence, most, least_mu, z, reserve, gain, explore):
     """Set the grips of `Hold` in states `[P]` from what an observer found `[P]`; `z` is the quantile of mu_c."""
     for p in range(states.shape[0]):
         c, e = states[p], found[p]
-        _, dt = _follow(c, e, least_load, 1.0)
+        _, dt = _follow(c, e, least_load, quantum, 1.0)
         slips, slid, v = e.slip > 0.5, c.slid, c.velocity
         path = math.hypot(slid[0], slid[1]) + e.radius * abs(slid[2])
-        if slips and c.age >= SETTLED and (e.determined[0] > 0 or path >= explore):
+        if slips and c.quiet <= LATE and c.age >= SETTLED and (e.determined[0] > 0 or path >= explore):
             c.found = 1.0
-        unsure = _unsure(c, e, dt, c.found == 0.0, LOST)
+        unsure = _unsure(c, e, dt, silence, c.found == 0.0, LOST)
         low = e.mu_c * math.exp(-z * math.sqrt(e.covariance[0, 0]))
         speed = math.hypot(v[0], v[1]) + e.radius * abs(v[2]) if slips else 0.0
         held = reserve * c.load / low + gain * speed
@@ -221,17 +258,19 @@ def hold(states, found, least_load, most, least_mu, z, reserve, gain, explore):
             held = min(start, c.grip if slips else c.grip * math.exp(-RELEASE * dt))
         elif slips:
             held = max(held, start)  # as if nothing were known, until it sticks
-        if unsure and (c.found == 0.0 or e.flags >= NO_SIGN):
+        if unsure and (c.found == 0.0 or c.mute >= LATE or e.flags >= NO_SIGN):
             held = UNSURE * max(c.load, c.weight) / least_mu
         _set(c, held, most)
 
 
 @jit
-def slip(states, found, least_load, most, least_mu, axis, tolerance, duration, acceleration, adapt, delay):
+def slip(
+    states, found, least_load, quantum, silence, most, least_mu, axis, tolerance, duration, acceleration, adapt, delay
+):
     """Set the grips of `SlideBy` (axis 1) and `TurnBy` (axis 2) in states `[P]` from what an observer found `[P]`."""
     for p in range(states.shape[0]):
         c, e = states[p], found[p]
-        needed, dt = _follow(c, e, least_load, 1.0)
+        needed, dt = _follow(c, e, least_load, quantum, 1.0)
         slips, goal = e.slip > 0.5, abs(c.goal)
         sign = 1.0 if c.goal > 0.0 else -1.0
         v, x = sign * c.velocity[axis] if slips else 0.0, sign * c.slid[axis]
@@ -239,7 +278,8 @@ def slip(states, found, least_load, most, least_mu, axis, tolerance, duration, a
         if slips and c.began < 0.0 and c.age >= SETTLED:
             c.began, c.balance = 0.0, 1.05 * needed / max(e.gauge, 1e-9)
         rests = c.since > SURE and c.quiet > STICKS  # if the slip sensor is right, the wrench stays as it is
-        balance, unsure = c.balance, _unsure(c, e, dt, c.began < 0.0 or rests, LOST if c.began < 0.0 else LOSES)
+        unsure = _unsure(c, e, dt, silence, c.began < 0.0 or rests, LOST if c.began < 0.0 else LOSES)
+        balance = c.balance
         time = c.began + delay if c.began >= 0.0 else 0.0
         place, speed, push = trapezoid(xp, time, goal, duration)
         there = x + v * delay
@@ -275,17 +315,18 @@ def slip(states, found, least_load, most, least_mu, axis, tolerance, duration, a
         else:
             brake = BRAKE if stuck and c.since < STICKS + BRAKES else 1.0
             asked = brake * balance * (1.0 - lead) * math.exp(-STUCK * max(c.since - STICKS - BRAKES, 0.0))
-        if unsure and (c.caught == 0.0 or c.blind >= LATE):
+        if unsure:
             asked = UNSURE * max(c.load, c.weight) / least_mu
         _set(c, asked, most)
 
 
 @jit
-def hinge(states, found, least_load, most, least_mu, reserve, gain):
+def hinge(states, found, least_load, quantum, silence, most, least_mu, reserve, gain):
     """Set the grips of `Hinge` in states `[P]` from what an observer found `[P]`."""
     for p in range(states.shape[0]):
         c, e = states[p], found[p]
-        _, dt = _follow(c, e, least_load, 1.0 - c.found)  # a part that is to turn loses torque, but carries its weight
+        # a part that is to turn loses torque, but carries its weight
+        _, dt = _follow(c, e, least_load, quantum, 1.0 - c.found)
         force, torque = math.hypot(e.wrench[0], e.wrench[1]), e.wrench[2]
         if xp.in_range(force) and xp.in_range(torque):
             share = dt / FORCE_TIME
@@ -304,6 +345,6 @@ def hinge(states, found, least_load, most, least_mu, reserve, gain):
         speed = math.hypot(v[0], v[1]) if slips else 0.0
         carried = reserve * (BRAKE if brakes else c.eased) * c.force / e.mu_c + gain * speed
         asked = carried if c.found > 0.0 else min(start, c.grip * math.exp(-RELEASE * dt))
-        if _unsure(c, e, dt, c.found == 0.0 or c.since > SURE, LOST if c.found == 0.0 else LOSES):
+        if _unsure(c, e, dt, silence, c.found == 0.0 or c.since > SURE, LOST if c.found == 0.0 else LOSES):
             asked = UNSURE * max(c.load, c.weight) / least_mu
         _set(c, asked, most)

@@ -16,7 +16,10 @@ ROOT = N
 
 @kernel
 def measure(s, h, innovation, variance, column):
-    """Update with a scalar `innovation` of slope `h [N]` and variance: rotate `[[sqrt(variance), h'S], [0, S]]`."""
+    """Update with a scalar `innovation` of slope `h [N]` and variance; return it in its standard deviations.
+
+    A rotation of `[[sqrt(variance), h'S], [0, S]]`.
+    """
     corner = math.sqrt(variance)
     clear(column, N)
     for j in range(N - 1, -1, -1):
@@ -30,6 +33,7 @@ def measure(s, h, innovation, variance, column):
             column[i], s[ROOT + N * i + j] = cosine * a + sine * b, cosine * b - sine * a
     for i in range(N):
         s[i] += column[i] * innovation / corner
+    return innovation / corner
 
 
 @kernel

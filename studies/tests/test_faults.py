@@ -1,0 +1,45 @@
+"""Faults of sensors in the rig: every one ends as the table says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from planarfriction_studies.rig import faults
+
+ALL = faults.expected()
+
+
+def wrong(task: str, found: np.ndarray, kinds: list[faults.Fault]) -> list[str]:
+    """Return the faults that ended otherwise than expected, each with the numbers of parts that did so."""
+    ends, said = faults.ends(task, found), []
+    for number, fault in enumerate(kinds):
+        own = found[:, 2] == number
+        may = faults.TASKS[task] in fault.end
+        silent, lost = own & ~ends.kept & ~ends.flagged, own & ~ends.kept
+        if (silent if may else lost).any():
+            said.append(f"{fault.channel} {fault.kind}: {lost.sum()} of {own.sum()}, {silent.sum()} without a flag")
+    return said
+
+
+def test_the_table_names_every_channel_and_fault_once():
+    assert len(set(ALL)) == len(ALL) == 66
+    assert {fault.channel for fault in ALL} == set(faults.CHANNELS)
+    assert set("".join(fault.end for fault in ALL if fault.end != "kept")) <= set(faults.TASKS.values())
+
+
+def test_held_parts_stay_where_the_load_the_clock_or_the_slip_sensor_dies():
+    names = {("load", "0"), ("load", "nan"), ("time", "nan"), ("slip", "frozen"), ("slip_y", "0")}
+    kinds = [fault for fault in ALL if (fault.channel, fault.kind) in names]
+    found = faults.run_faults("hold", 2, 1, [1], kinds)
+    assert len(found) == 2 + 2 * len(kinds) * len(faults.MOMENTS)
+    assert wrong("hold", found, kinds) == []
+    assert not found[found[:, 2] < 0, 4].any()  # no flag with healthy sensors
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", range(len(faults.KINDS)))
+@pytest.mark.parametrize("task", faults.TASKS)
+def test_every_fault_ends_as_the_table_says(task, kind):
+    """16 parts of each kind: 64 in all, and three moments; about a quarter of an hour for each of the 16."""
+    assert wrong(task, faults.run_faults(task, 16, 0, [kind]), ALL) == []
