@@ -22,10 +22,19 @@ import numpy as np
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import call, pointer
-from planarfriction.compiler.memory import Doubles, Integers, Place, arrays_at, at, doubles
+from planarfriction.compiler.memory import Doubles, Place, arrays_at, at, doubles
+from planarfriction.kernels.coupling_path import trace
 from planarfriction.kernels.coupling_rows import INVALID, Patches, Problem, read
+from planarfriction.kernels.coupling_steps import (
+    follow_host,
+    follow_loads,
+    misfit_of,
+    row_applied,
+    size_of,
+    step_all,
+    write_load_slopes,
+)
 from planarfriction.kernels.following import follow
-from planarfriction.kernels.settle import factor_at, stepped
 from planarfriction.kernels.small_matrices import leave_out_rising, solved
 from planarfriction.kernels.vectors import clear, copy
 
@@ -39,123 +48,24 @@ JOINT, ROUND = 8, 24
 """Number of iterations at the start of a round in which loads move with the wrenches, and length of a round; in its
 others loads follow behind: where both turn against each other, one of the two ways gets on."""
 
-SHORTER, STAGES = 4.0, 8
-"""Ratio and number of the shorter steps that lead from damping alone to a step that is hard to solve."""
-
 NEAR = 10.0
 """Misfit of the guess, over the tolerance, up to which a Newton step goes from there: rest need not be tried."""
-
-LOAD_STEP = 1e-6
-"""Share of a load over which wrenches of a fixed stiffness are compared for their slope."""
 
 ROUNDING = 1e-13
 """Error of a twist, in the largest speed that goes into it, below which no step gets."""
 
+NOISE = 1e-14
+"""Difference between a twist and that which wrenches cause, in the speeds of that sum, which is its rounding."""
 
-@kernel
-def _applied(m: Doubles, i: int, n: int, x: Doubles, start: float) -> float:
-    """Return element i of `m x + start`, m of n columns."""
-    for j in range(n):
-        start += m[n * i + j] * x[j]
-    return start
-
-
-@kernel
-def _bring_back(step: Doubles, dx: float, dy: float) -> None:
-    """Bring the wrench of a shifted patch, and its slopes, to the twist and the wrench about the origin."""
-    for i in range(3):  # slopes by the spin: it moves the patch
-        row = at(step, 3 + 3 * i)
-        row[2] += dx * row[1] - dy * row[0]
-    step[2] += dx * step[1] - dy * step[0]
-    for j in range(3):
-        step[9 + j] += dx * step[6 + j] - dy * step[3 + j]
-
-
-@kernel
-def _step(patches: Patches, p: Problem, functions: Integers, k: int, load: float) -> None:
-    """Step patch k under a load, at the twist that it sees."""
-    first, reference = patches.firsts[k], patches.reference[k]
-    if reference > 0.0:
-        states, factor = patches.firsts[k + 1] - first, factor_at(reference, load)
-        bristles = patches.bristle[k], states, factor, at(p.state, first)
-        stepped(functions[k], p.acting[k], *bristles, p.seen, p.dt[0], at(p.new, first), p.step)
-    else:
-        call(functions[k], (p.acting[k], at(p.state, first), p.seen, p.dt[0], at(p.new, first), p.step))
-
-
-@kernel
-def _load_slopes(patches: Patches, p: Problem) -> None:
-    """Write the slopes of the wrenches by the loads; where stiffness is fixed, by a step under another load."""
-    for k in range(patches.count):
-        one, load = 3 * k, p.load[k]
-        for i in range(3):
-            p.unit_loaded[one + i] = p.unit[one + i]
-        if patches.reference[k] > 0.0 and p.acting[k] != 0 and load > 0.0:
-            p.seen[0], p.seen[1], p.seen[2] = p.twist[one], p.twist[one + 1], p.twist[one + 2]
-            _step(patches, p, patches.steps, k, (1.0 + LOAD_STEP) * load)
-            for i in range(3):
-                p.unit_loaded[one + i] += (p.step[i] - p.unit[one + i]) / LOAD_STEP
-
-
-@kernel
-def step_all(patches: Patches, p: Problem, functions: Integers) -> None:
-    """Step all patches at the twists of a problem: write the new state and wrenches per unit load.
-
-    `functions` are those of `Patches`: its `steps`, or its `slopes`, which write the slopes of the wrenches as well.
-    """
-    for k in range(patches.count):
-        seen, dx, dy, spin = p.seen, p.shift[2 * k], p.shift[2 * k + 1], p.twist[3 * k + 2]
-        if p.acting[k] == 0:
-            clear(p.step, 12)
-        else:
-            seen[0], seen[1], seen[2] = p.twist[3 * k] - spin * dy, p.twist[3 * k + 1] + spin * dx, spin
-            _step(patches, p, functions, k, p.load[k])
-            if dx != 0.0 or dy != 0.0:
-                _bring_back(p.step, dx, dy)
-        for i in range(3):
-            p.unit[3 * k + i] = p.step[i]
-        for i in range(9):
-            p.unit_slopes[9 * k + i] = p.step[3 + i]
-
-
-@kernel
-def _host(patches: Patches, p: Problem, keep_loads: bool) -> None:
-    """Write the twists and, unless they are kept, the loads that follow from the wrenches."""
-    n = 3 * patches.count
-    for i in range(n):
-        p.twist[i] = _applied(p.response, i, n, p.wrench, p.twist_0[i])
-    if not keep_loads:
-        for k in range(patches.count):
-            p.load[k] = xp.maximum(_applied(p.load_response, k, n, p.wrench, p.load_0[k]), 0.0)
-
-
-@kernel
-def _misfit(patches: Patches, p: Problem) -> float:
-    """Return the difference of the twists and loads from those that the models' wrenches there cause [m/s].
-
-    A load counts as the speed that all of it would cause as friction.
-    """
-    n, w, largest, finite = 3 * patches.count, p.change, 0.0, True
-    for i in range(n):
-        w[i] = p.load[i // 3] * p.unit[i]
-    for k in range(patches.count):
-        missing = xp.maximum(_applied(p.load_response, k, n, w, p.load_0[k]), 0.0) - p.load[k]
-        for i in range(3 * k, 3 * k + 3):
-            gap = abs(_applied(p.response, i, n, w, p.twist_0[i]) - p.twist[i])
-            if i == 3 * k + 2:
-                gap *= patches.radius[k]
-            else:
-                gap = xp.maximum(gap, p.response[n * i + i] * abs(missing))
-            finite = finite and xp.is_finite(gap)
-            largest = xp.maximum(largest, gap)
-    return largest if finite else math.inf
+PRECISION = 1e-9
+"""Error of a twist, in the largest speed that goes into it, with which a step has converged."""
 
 
 @kernel
 def _write_rows(patches: Patches, p: Problem, k: int, keep_loads: bool) -> None:
     """Write the rows of patch k in the system of the Newton step, whose right-hand side is `change`."""
     n, a, gap, slopes, load = 3 * patches.count, p.response, p.gap, at(p.slopes, 9 * k), p.load[k]
-    lacks = _applied(p.load_response, k, n, p.wrench, p.load_0[k]) - load
+    lacks = row_applied(p.load_response, k, n, p.wrench, p.load_0[k]) - load
     follows = 0.0 if keep_loads or (load == 0.0 and lacks < 0.0) else 1.0
     for i in range(3):
         one, x, y, s = 3 * k + i, slopes[3 * i], slopes[3 * i + 1], slopes[3 * i + 2]
@@ -173,11 +83,12 @@ def _newton(patches: Patches, p: Problem, keep_loads: bool, falling: bool) -> bo
     """Write the Newton step from the wrenches into `change` and `move`; return True if it leads downhill.
 
     `falling`: without the directions in which slopes rise. Twists and loads need not be those that the wrenches cause:
-    what they lack of these goes into the step.
+    what they lack of these goes into the step, unless it is rounding, which stiff bristles would multiply.
     """
     n = 3 * patches.count
     for i in range(n):
-        p.gap[i] = _applied(p.response, i, n, p.wrench, p.twist_0[i]) - p.twist[i]
+        gap = row_applied(p.response, i, n, p.wrench, p.twist_0[i]) - p.twist[i]
+        p.gap[i] = gap if abs(gap) > NOISE * size_of(patches, p, i) else 0.0
     for k in range(patches.count):
         slopes = at(p.slopes, 9 * k)
         for i in range(9):
@@ -194,7 +105,7 @@ def _downhill(patches: Patches, p: Problem) -> float:
     """Write `A dW` into `move`; return `A dW . (dW - dV.P dV)` with P as it is, rising directions and all."""
     n, move, downhill = 3 * patches.count, p.move, 0.0
     for i in range(n):
-        move[i] = _applied(p.response, i, n, p.change, 0.0)
+        move[i] = row_applied(p.response, i, n, p.change, 0.0)
     for i in range(n):
         k = i // 3
         caused = p.unit_slopes[3 * i] * move[3 * k] + p.unit_slopes[3 * i + 1] * move[3 * k + 1]
@@ -225,20 +136,28 @@ def shortening_of(first: float, here: float) -> float:
 
 @kernel
 def _go(patches: Patches, p: Problem, keep_loads: bool, whole: bool) -> None:
-    """Go along the Newton step from the wrenches, and, unless it is to be `whole`, back where it goes too far."""
+    """Go along the Newton step from the wrenches, and, unless it is to be `whole`, back where it goes too far.
+
+    Twists grow by what the step adds: those of stuck patches have more digits than `V_0 + A W`, a difference of large
+    numbers.
+    """
     n, w, first, far = 3 * patches.count, p.wrench, _slope(patches, p), 1.0
     copy(w, p.start, n)
+    for i in range(n):
+        p.gap[i] += p.twist[i]
     for shortening in range(SHORTENINGS + 1):
         for i in range(n):
             w[i] = p.start[i] + far * p.change[i]
-        _host(patches, p, keep_loads)
+            p.twist[i] = p.gap[i] + far * p.move[i]
+        if not keep_loads:
+            follow_loads(patches, p)
         step_all(patches, p, patches.steps)
         here = _slope(patches, p)
         if whole or not too_far(first, here) or shortening == SHORTENINGS:
             break
         far *= shortening_of(first, here)
     if keep_loads:
-        _host(patches, p, False)
+        follow_loads(patches, p)
 
 
 @kernel
@@ -259,29 +178,41 @@ def prepare(patches: Patches, p: Problem) -> float:
     """Write twists and loads without wrenches, and the scale; return the largest speed [m/s] that goes into a twist."""
     n, a, largest = 3 * patches.count, p.response, 0.0
     for i in range(n):
-        caused = _applied(a, i, n, p.guess, 0.0)
+        caused = row_applied(a, i, n, p.guess, 0.0)
         p.twist_0[i] = p.free_twist[i] - caused
         lever = patches.radius[i // 3] if i % 3 == 2 else 1.0
         largest = xp.maximum(largest, lever * (abs(p.free_twist[i]) + abs(caused)))
         p.scale[i] = math.sqrt(a[n * i + i]) if a[n * i + i] > 0.0 else 1.0
     for k in range(patches.count):
-        p.load_0[k] = p.free_load[k] - _applied(p.load_response, k, n, p.guess, 0.0)
+        p.load_0[k] = p.free_load[k] - row_applied(p.load_response, k, n, p.guess, 0.0)
+    return largest
+
+
+@kernel
+def speed_of(patches: Patches, p: Problem) -> float:
+    """Return the largest speed [m/s] that goes into the twists at the models' wrenches."""
+    largest = 0.0
+    for i in range(3 * patches.count):
+        p.wrench[i] = p.load[i // 3] * p.unit[i]
+    for i in range(3 * patches.count):
+        lever = patches.radius[i // 3] if i % 3 == 2 else 1.0
+        largest = xp.maximum(largest, lever * size_of(patches, p, i))
     return largest
 
 
 @kernel
 def _start(patches: Patches, p: Problem, tolerance: float) -> tuple[float, bool]:
     """Step at the better of the twists that the wrenches cause and of rest; return the misfit, and True for rest."""
-    _host(patches, p, False)
+    follow_host(patches, p)
     step_all(patches, p, patches.steps)
-    misfit = _misfit(patches, p)
+    misfit = misfit_of(patches, p)
     if misfit > NEAR * tolerance:
         clear(p.twist, 3 * patches.count)
         step_all(patches, p, patches.steps)
-        at_rest = _misfit(patches, p)
+        at_rest = misfit_of(patches, p)
         if at_rest <= misfit:
             return at_rest, True
-        _host(patches, p, False)
+        follow_host(patches, p)
         step_all(patches, p, patches.steps)
     return misfit, False
 
@@ -290,30 +221,6 @@ def _start(patches: Patches, p: Problem, tolerance: float) -> tuple[float, bool]
 def _copy(patches: Patches, twist: Doubles, load: Doubles, to_twist: Doubles, to_load: Doubles) -> None:
     copy(twist, to_twist, 3 * patches.count)
     copy(load, to_load, patches.count)
-
-
-@kernel
-def _again(patches: Patches, p: Problem, patches_at: Place, problem_at: Place, best: float) -> float:
-    """Solve without a guess, then from the wrenches of ever longer steps; return the misfit of the better solution.
-
-    Bristles that have hardly moved only damp, which is easy to solve. The host's step keeps its length.
-    """
-    dt, iterations = p.dt[0], p.iterations[0]
-    _copy(patches, p.twist, p.load, p.kept_twist, p.kept_load)
-    p.again[0] = 0.0
-    for stage in range(-1, STAGES + 1):
-        if stage <= 0:
-            clear(p.wrench, 3 * patches.count)
-        p.dt[0] = dt if stage < 0 else dt / SHORTER ** (STAGES - stage)
-        call(patches.solve, (patches_at, problem_at))
-        iterations += p.iterations[0]
-        if stage < 0 and p.converged[0] > 0.0:
-            break
-    p.dt[0], p.again[0], p.iterations[0] = dt, 1.0, iterations
-    if p.residual[0] < best:
-        return p.residual[0]
-    _copy(patches, p.kept_twist, p.kept_load, p.twist, p.load)
-    return best
 
 
 @kernel
@@ -326,7 +233,7 @@ def _restrain(patches: Patches, p: Problem) -> None:
     """
     n, w, move, work, begin, bends = 3 * patches.count, p.wrench, p.move, 0.0, 0.0, 0.0
     for i in range(n):
-        move[i] = _applied(p.response, i, n, w, 0.0)
+        move[i] = row_applied(p.response, i, n, w, 0.0)
         work, begin, bends = work + w[i] * p.twist[i], begin + w[i] * p.twist_0[i], bends + w[i] * move[i]
     if begin + bends > work:
         s = xp.minimum(xp.maximum(-0.5 * begin / bends, 0.0), 1.0) if bends > 0.0 else 0.0
@@ -350,14 +257,36 @@ def search(patches: Patches, p: Problem, tolerance: float, most: int) -> tuple[f
             break
         keep_loads = iteration % ROUND >= JOINT
         step_all(patches, p, patches.slopes)  # dear: not before they are needed, which at rest they are not
-        _load_slopes(patches, p)
+        write_load_slopes(patches, p)
         if not _newton(patches, p, keep_loads, False):
             _newton(patches, p, keep_loads, True)
         _go(patches, p, keep_loads, rest)
-        rest, misfit = False, _misfit(patches, p)
+        rest, misfit = False, misfit_of(patches, p)
     if not misfit <= best:
         _copy(patches, p.best_twist, p.best_load, p.twist, p.load)
     return best, misfit <= best
+
+
+@kernel
+def find(patches: Patches, p: Problem, rounding: float, most: int, again: bool) -> tuple[float, float]:
+    """Solve from the wrenches and, where that fails and `again` is True, along the curve from no friction to all of it.
+
+    Return the misfit, and that with which the step has converged.
+    """
+    tolerance = xp.maximum(p.tolerance[0], rounding * prepare(patches, p))
+    best, current = search(patches, p, tolerance, most)
+    accepted = xp.maximum(tolerance, PRECISION * speed_of(patches, p)) if best > tolerance else tolerance
+    if best > accepted and again:
+        _copy(patches, p.twist, p.load, p.best_twist, p.best_load)
+        traced = trace(patches, p, tolerance)
+        current = traced < best
+        if current:
+            best = traced
+        else:
+            _copy(patches, p.best_twist, p.best_load, p.twist, p.load)
+    if not current:
+        step_all(patches, p, patches.steps)
+    return best, accepted
 
 
 @entry
@@ -369,22 +298,17 @@ def solve(patches_at: Place, problem_at: Place) -> None:
     if not _valid(patches, p, doubles(problem_at)):
         return
     follow(patches, p, problem_at)
-    tolerance = xp.maximum(p.tolerance[0], ROUNDING * prepare(patches, p))
-    best, current = search(patches, p, tolerance, int(p.most[0]))
-    lost = best > tolerance and p.again[0] > 0.0
-    if lost and p.most[0] > 0.0:
-        best = _again(patches, p, patches_at, problem_at, best)
-    if lost or not current:
-        step_all(patches, p, patches.steps)
+    again = p.again[0] > 0.0
+    best, accepted = find(patches, p, ROUNDING, int(p.most[0]), again and p.most[0] > 0.0)
     for i in range(3 * patches.count):
         p.wrench[i] = p.load[i // 3] * p.unit[i]
     for k in range(patches.count):
         if p.load[k] == 0.0:  # without load there is no memory
             for i in range(patches.firsts[k], patches.firsts[k + 1]):
                 p.new[i] = 0.0
-    if lost and best > tolerance:
+    if best > accepted and again:
         _restrain(patches, p)
-    p.residual[0], p.converged[0] = best, 1.0 if best <= tolerance else 0.0
+    p.residual[0], p.converged[0] = best, 1.0 if best <= accepted else 0.0
 
 
 @jit
