@@ -66,11 +66,8 @@ def random_steps(generator: np.random.Generator, body: pf.SlidingBody, count: in
     """Yield steps of `count` bodies from rest: kicked, pushed, loaded and let go. Send back what each came to."""
     k, size = len(body.patches.models), max(np.abs(body.positions).max(), 0.003)
     unit = np.array([1.0, 1.0, 1.0 / size])
-    weight = np.where(
-        generator.uniform(size=count) < 0.5,
-        9.81 * body.mass * 10.0 ** generator.uniform(-2.0, 2.0, count),
-        10.0 ** generator.uniform(-2.0, 2.0, count),
-    )
+    wide = generator.uniform(size=count) < 0.5
+    weight = 9.81 * body.mass * 10.0 ** np.where(wide, generator.uniform(-2.0, 4.0, count), generator.uniform(-1.0, 1.0, count))
     share = 10.0 ** generator.uniform(-1.0, 0.0, (count, k))
     load = weight[:, None] * share / share.sum(axis=1, keepdims=True)
     dt, angle = 10.0 ** generator.uniform(-5.0, 0.0, count), generator.uniform(-3.0, 3.0, count)

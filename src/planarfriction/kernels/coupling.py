@@ -9,6 +9,8 @@ unknown is W alone, and
 is its Newton step. Where P falls (`V.P V <= 0`) A dW leads downhill in energy, whatever A is: `A dW . s` falls from
 `dW.A dW - dV.P dV > 0` to 0 at the next root, so that its sign tells whether a step has gone too far. Where friction
 falls as the patch speeds up (Stribeck; a bristle that gives way within the step), rising directions are left out of P.
+Where steps that may pass a root then turn in circles, a careful search halves them until they pass none: each lowers
+the energy, of which the forces are, but for a small part, the slope, so that they come to rest at one of its minima.
 
 A problem is a row of words (`layout`), so that compiled hosts call `solve` with two addresses.
 """
@@ -23,17 +25,8 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import call, pointer
 from planarfriction.compiler.memory import Doubles, Place, arrays_at, at, doubles
-from planarfriction.kernels.coupling_path import trace
 from planarfriction.kernels.coupling_rows import INVALID, Patches, Problem, read
-from planarfriction.kernels.coupling_steps import (
-    follow_host,
-    follow_loads,
-    misfit_of,
-    row_applied,
-    size_of,
-    step_all,
-    write_load_slopes,
-)
+from planarfriction.kernels.coupling_steps import step_all, write_load_slopes
 from planarfriction.kernels.following import follow
 from planarfriction.kernels.small_matrices import leave_out_rising, solved
 from planarfriction.kernels.vectors import clear, copy
@@ -48,6 +41,12 @@ JOINT, ROUND = 8, 24
 """Number of iterations at the start of a round in which loads move with the wrenches, and length of a round; in its
 others loads follow behind: where both turn against each other, one of the two ways gets on."""
 
+HALVINGS = 40
+"""Times at most that a careful Newton step which passed a root is halved."""
+
+PATIENCE = 10
+"""Iterations of a careful search, in those of a search."""
+
 NEAR = 10.0
 """Misfit of the guess, over the tolerance, up to which a Newton step goes from there: rest need not be tried."""
 
@@ -55,17 +54,72 @@ ROUNDING = 1e-13
 """Error of a twist, in the largest speed that goes into it, below which no step gets."""
 
 NOISE = 1e-14
-"""Difference between a twist and that which wrenches cause, in the speeds of that sum, which is its rounding."""
+"""Difference of a twist from that which wrenches cause, in the sum of what they add, that is their rounding."""
 
 PRECISION = 1e-9
 """Error of a twist, in the largest speed that goes into it, with which a step has converged."""
 
 
 @kernel
+def _applied(m: Doubles, i: int, n: int, x: Doubles, start: float) -> float:
+    """Return element i of `m x + start`, m of n columns."""
+    for j in range(n):
+        start += m[n * i + j] * x[j]
+    return start
+
+
+@kernel
+def _size(patches: Patches, p: Problem, i: int) -> float:
+    """Return the sum of the magnitudes of all that goes into element i of the twists."""
+    size = abs(p.twist_0[i])
+    for j in range(3 * patches.count):
+        size += abs(p.response[3 * patches.count * i + j] * p.wrench[j])
+    return size
+
+
+@kernel
+def _load(patches: Patches, p: Problem) -> None:
+    """Write the loads that follow from the wrenches."""
+    for k in range(patches.count):
+        p.load[k] = xp.maximum(_applied(p.load_response, k, 3 * patches.count, p.wrench, p.load_0[k]), 0.0)
+
+
+@kernel
+def _host(patches: Patches, p: Problem) -> None:
+    """Write the twists and loads that follow from the wrenches."""
+    n = 3 * patches.count
+    for i in range(n):
+        p.twist[i] = _applied(p.response, i, n, p.wrench, p.twist_0[i])
+    _load(patches, p)
+
+
+@kernel
+def _misfit(patches: Patches, p: Problem) -> float:
+    """Return the difference of the twists and loads from those that the models' wrenches there cause [m/s].
+
+    A load counts as the speed that all of it would cause as friction.
+    """
+    n, w, largest, finite = 3 * patches.count, p.change, 0.0, True
+    for i in range(n):
+        w[i] = p.load[i // 3] * p.unit[i]
+    for k in range(patches.count):
+        missing = xp.maximum(_applied(p.load_response, k, n, w, p.load_0[k]), 0.0) - p.load[k]
+        for i in range(3 * k, 3 * k + 3):
+            gap = abs(_applied(p.response, i, n, w, p.twist_0[i]) - p.twist[i])
+            if i == 3 * k + 2:
+                gap *= patches.radius[k]
+            else:
+                gap = xp.maximum(gap, p.response[n * i + i] * abs(missing))
+            finite = finite and xp.is_finite(gap)
+            largest = xp.maximum(largest, gap)
+    return largest if finite else math.inf
+
+
+@kernel
 def _write_rows(patches: Patches, p: Problem, k: int, keep_loads: bool) -> None:
     """Write the rows of patch k in the system of the Newton step, whose right-hand side is `change`."""
     n, a, gap, slopes, load = 3 * patches.count, p.response, p.gap, at(p.slopes, 9 * k), p.load[k]
-    lacks = row_applied(p.load_response, k, n, p.wrench, p.load_0[k]) - load
+    lacks = _applied(p.load_response, k, n, p.wrench, p.load_0[k]) - load
     follows = 0.0 if keep_loads or (load == 0.0 and lacks < 0.0) else 1.0
     for i in range(3):
         one, x, y, s = 3 * k + i, slopes[3 * i], slopes[3 * i + 1], slopes[3 * i + 2]
@@ -83,12 +137,12 @@ def _newton(patches: Patches, p: Problem, keep_loads: bool, falling: bool) -> bo
     """Write the Newton step from the wrenches into `change` and `move`; return True if it leads downhill.
 
     `falling`: without the directions in which slopes rise. Twists and loads need not be those that the wrenches cause:
-    what they lack of these goes into the step, unless it is rounding, which stiff bristles would multiply.
+    what they lack of these goes into the step, but not rounding, which stiff bristles would multiply.
     """
     n = 3 * patches.count
     for i in range(n):
-        gap = row_applied(p.response, i, n, p.wrench, p.twist_0[i]) - p.twist[i]
-        p.gap[i] = gap if abs(gap) > NOISE * size_of(patches, p, i) else 0.0
+        gap = _applied(p.response, i, n, p.wrench, p.twist_0[i]) - p.twist[i]
+        p.gap[i] = gap if abs(gap) > NOISE * _size(patches, p, i) else 0.0
     for k in range(patches.count):
         slopes = at(p.slopes, 9 * k)
         for i in range(9):
@@ -105,7 +159,7 @@ def _downhill(patches: Patches, p: Problem) -> float:
     """Write `A dW` into `move`; return `A dW . (dW - dV.P dV)` with P as it is, rising directions and all."""
     n, move, downhill = 3 * patches.count, p.move, 0.0
     for i in range(n):
-        move[i] = row_applied(p.response, i, n, p.change, 0.0)
+        move[i] = _applied(p.response, i, n, p.change, 0.0)
     for i in range(n):
         k = i // 3
         caused = p.unit_slopes[3 * i] * move[3 * k] + p.unit_slopes[3 * i + 1] * move[3 * k + 1]
@@ -135,29 +189,31 @@ def shortening_of(first: float, here: float) -> float:
 
 
 @kernel
-def _go(patches: Patches, p: Problem, keep_loads: bool, whole: bool) -> None:
+def _go(patches: Patches, p: Problem, keep_loads: bool, whole: bool, careful: bool) -> None:
     """Go along the Newton step from the wrenches, and, unless it is to be `whole`, back where it goes too far.
 
-    Twists grow by what the step adds: those of stuck patches have more digits than `V_0 + A W`, a difference of large
-    numbers.
+    Twists change by what the step adds, which keeps digits that `V_0 + A W` has lost where patches stick. A `careful`
+    step goes too far where it passes a root.
     """
     n, w, first, far = 3 * patches.count, p.wrench, _slope(patches, p), 1.0
     copy(w, p.start, n)
     for i in range(n):
         p.gap[i] += p.twist[i]
-    for shortening in range(SHORTENINGS + 1):
+    most = HALVINGS if careful else SHORTENINGS
+    for shortening in range(most + 1):
         for i in range(n):
             w[i] = p.start[i] + far * p.change[i]
             p.twist[i] = p.gap[i] + far * p.move[i]
         if not keep_loads:
-            follow_loads(patches, p)
+            _load(patches, p)
         step_all(patches, p, patches.steps)
         here = _slope(patches, p)
-        if whole or not too_far(first, here) or shortening == SHORTENINGS:
+        passed = first > 0.0 and not here >= 0.0 if careful else too_far(first, here)
+        if whole or not passed or shortening == most:
             break
-        far *= shortening_of(first, here)
+        far *= 0.5 if careful else shortening_of(first, here)
     if keep_loads:
-        follow_loads(patches, p)
+        _load(patches, p)
 
 
 @kernel
@@ -178,41 +234,42 @@ def prepare(patches: Patches, p: Problem) -> float:
     """Write twists and loads without wrenches, and the scale; return the largest speed [m/s] that goes into a twist."""
     n, a, largest = 3 * patches.count, p.response, 0.0
     for i in range(n):
-        caused = row_applied(a, i, n, p.guess, 0.0)
+        caused = _applied(a, i, n, p.guess, 0.0)
         p.twist_0[i] = p.free_twist[i] - caused
         lever = patches.radius[i // 3] if i % 3 == 2 else 1.0
         largest = xp.maximum(largest, lever * (abs(p.free_twist[i]) + abs(caused)))
         p.scale[i] = math.sqrt(a[n * i + i]) if a[n * i + i] > 0.0 else 1.0
     for k in range(patches.count):
-        p.load_0[k] = p.free_load[k] - row_applied(p.load_response, k, n, p.guess, 0.0)
+        p.load_0[k] = p.free_load[k] - _applied(p.load_response, k, n, p.guess, 0.0)
     return largest
 
 
 @kernel
 def speed_of(patches: Patches, p: Problem) -> float:
-    """Return the largest speed [m/s] that goes into the twists at the models' wrenches."""
-    largest = 0.0
-    for i in range(3 * patches.count):
+    """Write the models' wrenches; return the largest speed [m/s] that they and the host put into a twist."""
+    n, largest = 3 * patches.count, 0.0
+    for i in range(n):
         p.wrench[i] = p.load[i // 3] * p.unit[i]
-    for i in range(3 * patches.count):
+    for i in range(n):
         lever = patches.radius[i // 3] if i % 3 == 2 else 1.0
-        largest = xp.maximum(largest, lever * size_of(patches, p, i))
+        speed = xp.maximum(abs(p.twist_0[i]), abs(_applied(p.response, i, n, p.wrench, 0.0)))
+        largest = xp.maximum(largest, lever * speed)
     return largest
 
 
 @kernel
 def _start(patches: Patches, p: Problem, tolerance: float) -> tuple[float, bool]:
     """Step at the better of the twists that the wrenches cause and of rest; return the misfit, and True for rest."""
-    follow_host(patches, p)
+    _host(patches, p)
     step_all(patches, p, patches.steps)
-    misfit = misfit_of(patches, p)
+    misfit = _misfit(patches, p)
     if misfit > NEAR * tolerance:
         clear(p.twist, 3 * patches.count)
         step_all(patches, p, patches.steps)
-        at_rest = misfit_of(patches, p)
+        at_rest = _misfit(patches, p)
         if at_rest <= misfit:
             return at_rest, True
-        follow_host(patches, p)
+        _host(patches, p)
         step_all(patches, p, patches.steps)
     return misfit, False
 
@@ -233,7 +290,7 @@ def _restrain(patches: Patches, p: Problem) -> None:
     """
     n, w, move, work, begin, bends = 3 * patches.count, p.wrench, p.move, 0.0, 0.0, 0.0
     for i in range(n):
-        move[i] = row_applied(p.response, i, n, w, 0.0)
+        move[i] = _applied(p.response, i, n, w, 0.0)
         work, begin, bends = work + w[i] * p.twist[i], begin + w[i] * p.twist_0[i], bends + w[i] * move[i]
     if begin + bends > work:
         s = xp.minimum(xp.maximum(-0.5 * begin / bends, 0.0), 1.0) if bends > 0.0 else 0.0
@@ -244,7 +301,7 @@ def _restrain(patches: Patches, p: Problem) -> None:
 
 
 @kernel
-def search(patches: Patches, p: Problem, tolerance: float, most: int) -> tuple[float, bool]:
+def _search(patches: Patches, p: Problem, tolerance: float, most: int, careful: bool) -> tuple[float, bool]:
     """Write the twists and loads of the least misfit; return that, and True if states and wrenches are those there."""
     misfit, rest = _start(patches, p, tolerance)
     best = math.inf
@@ -260,8 +317,8 @@ def search(patches: Patches, p: Problem, tolerance: float, most: int) -> tuple[f
         write_load_slopes(patches, p)
         if not _newton(patches, p, keep_loads, False):
             _newton(patches, p, keep_loads, True)
-        _go(patches, p, keep_loads, rest)
-        rest, misfit = False, misfit_of(patches, p)
+        _go(patches, p, keep_loads, rest, careful)
+        rest, misfit = False, _misfit(patches, p)
     if not misfit <= best:
         _copy(patches, p.best_twist, p.best_load, p.twist, p.load)
     return best, misfit <= best
@@ -269,21 +326,27 @@ def search(patches: Patches, p: Problem, tolerance: float, most: int) -> tuple[f
 
 @kernel
 def find(patches: Patches, p: Problem, rounding: float, most: int, again: bool) -> tuple[float, float]:
-    """Solve from the wrenches and, where that fails and `again` is True, along the curve from no friction to all of it.
+    """Solve from the wrenches, and `again` where that fails, with care and without them, for a longer time.
 
-    Return the misfit, and that with which the step has converged.
+    Return the misfit of the twists and loads, whose states and wrenches are written, and that which is accepted.
     """
     tolerance = xp.maximum(p.tolerance[0], rounding * prepare(patches, p))
-    best, current = search(patches, p, tolerance, most)
-    accepted = xp.maximum(tolerance, PRECISION * speed_of(patches, p)) if best > tolerance else tolerance
+    best, current = _search(patches, p, tolerance, most, False)
+    accepted = tolerance
+    if best > tolerance:
+        if not current:
+            step_all(patches, p, patches.steps)
+        accepted = xp.maximum(tolerance, PRECISION * speed_of(patches, p))
+        current = True
     if best > accepted and again:
-        _copy(patches, p.twist, p.load, p.best_twist, p.best_load)
-        traced = trace(patches, p, tolerance)
-        current = traced < best
-        if current:
-            best = traced
-        else:
-            _copy(patches, p.best_twist, p.best_load, p.twist, p.load)
+        taken, first = p.iterations[0], best
+        _copy(patches, p.twist, p.load, p.kept_twist, p.kept_load)
+        clear(p.wrench, 3 * patches.count)
+        best, current = _search(patches, p, tolerance, PATIENCE * most, True)
+        p.iterations[0] += taken
+        if not best <= first:
+            best, current = first, False
+            _copy(patches, p.kept_twist, p.kept_load, p.twist, p.load)
     if not current:
         step_all(patches, p, patches.steps)
     return best, accepted
@@ -299,7 +362,7 @@ def solve(patches_at: Place, problem_at: Place) -> None:
         return
     follow(patches, p, problem_at)
     again = p.again[0] > 0.0
-    best, accepted = find(patches, p, ROUNDING, int(p.most[0]), again and p.most[0] > 0.0)
+    best, accepted = find(patches, p, ROUNDING, int(p.most[0]), again)
     for i in range(3 * patches.count):
         p.wrench[i] = p.load[i // 3] * p.unit[i]
     for k in range(patches.count):

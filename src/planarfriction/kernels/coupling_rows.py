@@ -77,7 +77,7 @@ class Problem(NamedTuple):
     gap: Doubles
     """Difference between the twists that wrenches cause and V, [3k]."""
     change: Doubles
-    """dW, and behind it the change of the share of friction, [3k + 1]."""
+    """dW, [3k]."""
     move: Doubles
     """A dW, [3k]."""
     start: Doubles
@@ -87,11 +87,11 @@ class Problem(NamedTuple):
     best_load: Doubles
     """N of the least residual so far, [k]."""
     kept_twist: Doubles
-    """V at the start of a step along the curve, [3k]."""
-    tangent: Doubles
-    """Direction of the curve (see `coupling_path`), [3k + 1]."""
+    """V of the first attempt, [3k]."""
+    kept_load: Doubles
+    """N of the first attempt, [k]."""
     matrix: Doubles
-    """Matrix of the Newton step, [3k + 1, 3k + 1]; [3k, 3k] are used off the curve."""
+    """Matrix of the Newton step, [3k, 3k]."""
     step: Doubles
     """Result of a patch's step (see `steps.StepFunctions`)."""
     seen: Doubles
@@ -120,12 +120,11 @@ def layout(patches: int, states: int, points: int, copies: int) -> Layout:
     k, n = patches, 3 * patches
     shapes = dict.fromkeys(Problem._fields, n)
     shapes |= dict.fromkeys(("dt", "tolerance", "most", "again", "iterations", "residual", "converged"), 1)
-    shapes |= dict.fromkeys(("free_load", "load", "load_0", "best_load"), k)
+    shapes |= dict.fromkeys(("free_load", "load", "load_0", "best_load", "kept_load"), k)
     shapes |= dict.fromkeys(("follows", "records", "acting"), k)
     shapes |= dict.fromkeys(("moments", "shift"), 2 * k) | {"weights": points, "copies": copies, "support": 7 * patches}
     shapes |= dict.fromkeys(("state", "new"), states)
-    shapes |= dict.fromkeys(("unit_slopes", "slopes"), 9 * k) | {"response": n * n, "matrix": (n + 1) ** 2}
-    shapes |= dict.fromkeys(("change", "tangent"), n + 1)
+    shapes |= dict.fromkeys(("unit_slopes", "slopes"), 9 * k) | dict.fromkeys(("response", "matrix"), n * n)
     return Layout(Problem, **shapes | {"load_response": k * n, "step": SLOPES, "turned": 18, "seen": 3})
 
 

@@ -1,10 +1,7 @@
-"""Steps of all patches at the twists and loads of a problem, and their differences from those that wrenches cause."""
+"""Steps of all patches at the twists and loads of a problem in contact space."""
 
 from __future__ import annotations
 
-import math
-
-from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call
 from planarfriction.compiler.memory import Doubles, Integers, at
@@ -14,23 +11,6 @@ from planarfriction.kernels.vectors import clear
 
 LOAD_STEP = 1e-6
 """Share of a load over which wrenches of a fixed stiffness are compared for their slope."""
-
-
-@kernel
-def row_applied(m: Doubles, i: int, n: int, x: Doubles, start: float) -> float:
-    """Return element i of `m x + start`, m of n columns."""
-    for j in range(n):
-        start += m[n * i + j] * x[j]
-    return start
-
-
-@kernel
-def size_of(patches: Patches, p: Problem, i: int) -> float:
-    """Return the sum of all that goes into element i of the twists, each by its magnitude."""
-    size = abs(p.twist_0[i])
-    for j in range(3 * patches.count):
-        size += abs(p.response[3 * patches.count * i + j] * p.wrench[j])
-    return size
 
 
 @kernel
@@ -45,7 +25,7 @@ def _bring_back(step: Doubles, dx: float, dy: float) -> None:
 
 
 @kernel
-def _step(patches: Patches, p: Problem, functions: Integers, k: int, load: float) -> None:
+def step_patch(patches: Patches, p: Problem, functions: Integers, k: int, load: float) -> None:
     """Step patch k under a load, at the twist that it sees."""
     first, reference = patches.firsts[k], patches.reference[k]
     if reference > 0.0:
@@ -65,7 +45,7 @@ def write_load_slopes(patches: Patches, p: Problem) -> None:
             p.unit_loaded[one + i] = p.unit[one + i]
         if patches.reference[k] > 0.0 and p.acting[k] != 0 and load > 0.0:
             p.seen[0], p.seen[1], p.seen[2] = p.twist[one], p.twist[one + 1], p.twist[one + 2]
-            _step(patches, p, patches.steps, k, (1.0 + LOAD_STEP) * load)
+            step_patch(patches, p, patches.steps, k, (1.0 + LOAD_STEP) * load)
             for i in range(3):
                 p.unit_loaded[one + i] += (p.step[i] - p.unit[one + i]) / LOAD_STEP
 
@@ -82,48 +62,10 @@ def step_all(patches: Patches, p: Problem, functions: Integers) -> None:
             clear(p.step, 12)
         else:
             seen[0], seen[1], seen[2] = p.twist[3 * k] - spin * dy, p.twist[3 * k + 1] + spin * dx, spin
-            _step(patches, p, functions, k, p.load[k])
+            step_patch(patches, p, functions, k, p.load[k])
             if dx != 0.0 or dy != 0.0:
                 _bring_back(p.step, dx, dy)
         for i in range(3):
             p.unit[3 * k + i] = p.step[i]
         for i in range(9):
             p.unit_slopes[9 * k + i] = p.step[3 + i]
-
-
-@kernel
-def follow_loads(patches: Patches, p: Problem) -> None:
-    """Write the loads that follow from the wrenches."""
-    for k in range(patches.count):
-        p.load[k] = xp.maximum(row_applied(p.load_response, k, 3 * patches.count, p.wrench, p.load_0[k]), 0.0)
-
-
-@kernel
-def follow_host(patches: Patches, p: Problem) -> None:
-    """Write the twists and loads that follow from the wrenches."""
-    n = 3 * patches.count
-    for i in range(n):
-        p.twist[i] = row_applied(p.response, i, n, p.wrench, p.twist_0[i])
-    follow_loads(patches, p)
-
-
-@kernel
-def misfit_of(patches: Patches, p: Problem) -> float:
-    """Return the difference of the twists and loads from those that the models' wrenches there cause [m/s].
-
-    A load counts as the speed that all of it would cause as friction.
-    """
-    n, w, largest, finite = 3 * patches.count, p.change, 0.0, True
-    for i in range(n):
-        w[i] = p.load[i // 3] * p.unit[i]
-    for k in range(patches.count):
-        missing = xp.maximum(row_applied(p.load_response, k, n, w, p.load_0[k]), 0.0) - p.load[k]
-        for i in range(3 * k, 3 * k + 3):
-            gap = abs(row_applied(p.response, i, n, w, p.twist_0[i]) - p.twist[i])
-            if i == 3 * k + 2:
-                gap *= patches.radius[k]
-            else:
-                gap = xp.maximum(gap, p.response[n * i + i] * abs(missing))
-            finite = finite and xp.is_finite(gap)
-            largest = xp.maximum(largest, gap)
-    return largest if finite else math.inf
