@@ -245,7 +245,7 @@ def prepare(patches: Patches, p: Problem) -> float:
 
 
 @kernel
-def speed_of(patches: Patches, p: Problem) -> float:
+def _largest_speed(patches: Patches, p: Problem) -> float:
     """Write the models' wrenches; return the largest speed [m/s] that they and the host put into a twist."""
     n, largest = 3 * patches.count, 0.0
     for i in range(n):
@@ -336,7 +336,7 @@ def find(patches: Patches, p: Problem, rounding: float, most: int, again: bool) 
     if best > tolerance:
         if not current:
             step_all(patches, p, patches.steps)
-        accepted = xp.maximum(tolerance, PRECISION * speed_of(patches, p))
+        accepted = xp.maximum(tolerance, PRECISION * _largest_speed(patches, p))
         current = True
     if best > accepted and again:
         taken, first = p.iterations[0], best
