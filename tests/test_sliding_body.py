@@ -158,6 +158,24 @@ def test_a_body_on_a_turntable_slides_where_friction_ends():
         assert abs(slid) < 2e-5 if share < 1.0 else slid > 1e-3
 
 
+def test_patches_of_a_host_on_a_support_that_turns():
+    """The recipe for `CoupledPatches`, without the chord of the support in the free twist, is the step of a body."""
+    body, dt, angle, table = four_feet([0.3, 0.0, -1.0, 2.0]), 1e-2, 0.7, np.array([-0.3, 0.4, 5.0])
+    twist, loads = np.array([-0.31, 0.41, 4.0]), np.array([0.5, 1.0, 0.2, 0.3])
+    end = body.step(body.rest(), twist, loads, dt, (0.1, 0.0, 0.0), angle, support_velocity=table)
+    chord = geometry.chord(table, dt)
+    arms = geometry.rotate(body.positions, angle)
+    turns = angle + body.angles
+    rows = geometry.rotate(geometry.twist_at(np.eye(3)[:, None], arms), -turns).transpose(1, 2, 0).reshape(12, 3)
+    response = dt / np.array([MASS, MASS, 2e-4])
+    free = twist + response * [0.1, 0.0, 0.0] - chord
+    host = coupling.HostStep((rows @ free).reshape(4, 3), loads, np.zeros((4, 3)), rows @ np.diag(response) @ rows.T)
+    step = body.patches.step(body.rest(), host, dt)
+    np.testing.assert_allclose(end.state, step.state, atol=1e-12)
+    np.testing.assert_allclose(end.wrench, rows.T @ step.wrench.ravel(), atol=1e-9)
+    np.testing.assert_allclose(rows @ (end.twist - chord), step.twist.ravel(), atol=1e-9)
+
+
 def test_only_motion_against_the_support_counts():
     """A belt under a body at rest is a body that slides on rest, seen from the belt."""
     body, belt = four_feet([0.3, 0.0, -1.0, 2.0]), np.array([0.2, -0.1, 0.0])
