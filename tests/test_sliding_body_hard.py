@@ -45,7 +45,7 @@ def test_a_million_random_steps_of_all_sizes(seed):
 
 def failures_in_c(seed: int, name: str, patches: int, total: int, count: int = 250, steps: int = 8) -> np.ndarray:
     """Return steps and failures by the decades of mass and time step, `[12, 5, 2]`."""
-    made, generator = library(name, patches=patches), np.random.default_rng(seed)
+    made, generator = library(name, "double", "-O2", patches=patches), np.random.default_rng(seed)
     table, states = np.zeros((12, 5, 2), int), patches * int(np.prod(made.model.state_shape))
     while table[..., 0].sum() < total:
         body = random_body(generator, [made.model], patches)

@@ -246,14 +246,13 @@ def prepare(patches: Patches, p: Problem) -> float:
 
 @kernel
 def _largest_speed(patches: Patches, p: Problem) -> float:
-    """Write the models' wrenches; return the largest speed [m/s] that they and the host put into a twist."""
-    n, largest = 3 * patches.count, 0.0
-    for i in range(n):
+    """Write the models' wrenches; return the largest sum of speeds [m/s] that they and the host put into a twist."""
+    largest = 0.0
+    for i in range(3 * patches.count):
         p.wrench[i] = p.load[i // 3] * p.unit[i]
-    for i in range(n):
+    for i in range(3 * patches.count):
         lever = patches.radius[i // 3] if i % 3 == 2 else 1.0
-        speed = xp.maximum(abs(p.twist_0[i]), abs(_applied(p.response, i, n, p.wrench, 0.0)))
-        largest = xp.maximum(largest, lever * speed)
+        largest = xp.maximum(largest, lever * _size(patches, p, i))
     return largest
 
 
