@@ -81,3 +81,14 @@ def test_batches_broadcast():
     turned = geometry.rotate(np.ones((4, 1, 3)), np.arange(5.0))
     assert turned.shape == (4, 5, 3)
     assert np.array_equal(turned[1, 4], geometry.rotate(np.ones(3), 4.0))
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-3, -0.7, 3.0, 6.5])
+def test_a_chord_joins_the_ends_of_an_arc(angle):
+    """A turntable moves a point at p by `(R(w dt) - I) p`; without spin the chord is the tangent."""
+    dt, p = 1e-2, np.array([0.3, -0.4])
+    spin = angle / dt
+    moved = dt * geometry.chord((-spin * p[1], spin * p[0], spin), dt)
+    np.testing.assert_allclose(moved[:2], geometry.rotate(p, angle) - p, rtol=1e-3 if abs(angle) < 1e-6 else 1e-12)
+    assert moved[2] == pytest.approx(angle) and geometry.chord((1.0, 2.0, 0.0), dt).tolist() == [1.0, 2.0, 0.0]
+    assert geometry.chord(np.ones((4, 1, 3)), np.ones(5)).shape == (4, 5, 3)

@@ -105,10 +105,87 @@ def test_largest_step_of_several_patches():
 
 
 def test_a_step_that_does_not_converge_says_so(monkeypatch):
+    """The error has the results of all bodies, and tells which of them hold."""
     monkeypatch.setattr(coupling, "ITERATIONS", 0)
     body = pf.SlidingBody(MASS, INERTIA, model_of())
-    with pytest.raises(SolverError, match=r"a body did not converge \(2 of 3 bodies, off by .* m/s at dt"):
+    with pytest.raises(SolverError, match=r"a body did not converge \(2 of 3 bodies, off by .* m/s at dt") as caught:
         body.step(body.rest(), [[0.1, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.2, 0.0]], 2.0, 1e-3)
+    assert caught.value.converged.tolist() == [False, True, False]
+    for of_all, alone in zip(caught.value.step, body.step(body.rest(), np.zeros(3), 2.0, 1e-3), strict=True):
+        np.testing.assert_array_equal(of_all[1], alone)
+        assert len(of_all) == 3 and np.isfinite(of_all).all()
+
+
+def test_energy_that_a_step_cannot_gain_says_nothing_of_its_size():
+    """A tolerance follows the speeds: the same step in grams and in tons, with times and lengths as they are."""
+    for scale in (1e-6, 1.0, 1e6):
+        body = pf.SlidingBody(scale * MASS, scale * INERTIA, model_of())
+        end = body.step(body.rest(), (0.0, 0.0, 0.0), scale * 1e4, 1.0, (scale * 5e3, 0.0, 0.0))
+        np.testing.assert_allclose(end.wrench / scale, (-5e3, 0.0, 0.0), atol=1e-5)
+
+
+@pytest.mark.parametrize("spin, radius, mu", [(1.0, 0.25, 0.3), (2.0, 0.25, 0.3), (3.0, 0.5, 1.0), (10.0, 0.02, 0.3)])
+@pytest.mark.parametrize("dt", [2e-3, 4e-3])
+def test_a_body_on_a_turntable_keeps_its_place(spin, radius, mu, dt):
+    """Along tangents it would move outwards by `exp(w^2 dt T/2)`, which is 8 % at 2 rad/s; along chords not at all."""
+    body = pf.SlidingBody(MASS, 1e-4, pf.ReducedModel(pf.ContactPatch.disc(radius=0.03), pf.LuGre(mu)))
+    state, pose, turned, duration = body.rest(), np.array([radius, 0.0, 0.0]), 0.0, 4.0
+    twist = np.array([0.0, spin * radius, spin])
+    for _ in range(round(duration / dt)):
+        carried, middle = (-spin * pose[1], spin * pose[0], spin), pose[2] + 0.5 * dt * spin
+        state, twist, _ = body.step(state, twist, MASS * 9.81, dt, angle=middle, support_velocity=carried)
+        pose += dt * twist
+        turned += dt * spin
+    x, y = geometry.rotate(pose[:2], -turned)
+    deflection = spin**2 * radius / (9.81 * body.models.law.sigma_0)  # bristles carry the centripetal force
+    # and 1e-9 m/s are the tolerance of a step
+    assert abs(x - radius) < 2.0 * deflection + 1e-9 * duration and abs(y) < 2.0 * deflection + 1e-9 * duration
+    assert pose[2] == pytest.approx(turned, abs=1e-7)
+
+
+def test_a_body_on_a_turntable_slides_where_friction_ends():
+    """At `mu g/w^2` friction is as large as the centripetal force."""
+    mu, spin, dt = 0.3, 2.0, 2e-3
+    body = pf.SlidingBody(MASS, 1e-4, pf.ReducedModel(pf.ContactPatch.disc(radius=1e-3), pf.LuGre(mu)))
+    for share in (0.97, 1.03):
+        pose = np.array([share * mu * 9.81 / spin**2, 0.0, 0.0])
+        state, twist, begin = body.rest(), np.array([0.0, spin * pose[0], spin]), pose[0]
+        for _ in range(500):
+            carried, middle = (-spin * pose[1], spin * pose[0], spin), pose[2] + 0.5 * dt * spin
+            state, twist, _ = body.step(state, twist, MASS * 9.81, dt, angle=middle, support_velocity=carried)
+            pose += dt * twist
+        slid = np.hypot(*pose[:2]) - begin
+        assert abs(slid) < 2e-5 if share < 1.0 else slid > 1e-3
+
+
+def test_patches_of_a_host_on_a_support_that_turns():
+    """The recipe for `CoupledPatches`, without the chord of the support in the free twist, is the step of a body."""
+    body, dt, angle, table = four_feet([0.3, 0.0, -1.0, 2.0]), 1e-2, 0.7, np.array([-0.3, 0.4, 5.0])
+    twist, loads = np.array([-0.31, 0.41, 4.0]), np.array([0.5, 1.0, 0.2, 0.3])
+    end = body.step(body.rest(), twist, loads, dt, (0.1, 0.0, 0.0), angle, support_velocity=table)
+    chord = geometry.chord(table, dt)
+    arms = geometry.rotate(body.positions, angle)
+    turns = angle + body.angles
+    rows = geometry.rotate(geometry.twist_at(np.eye(3)[:, None], arms), -turns).transpose(1, 2, 0).reshape(12, 3)
+    response = dt / np.array([MASS, MASS, 2e-4])
+    free = twist + response * [0.1, 0.0, 0.0] - chord
+    host = coupling.HostStep((rows @ free).reshape(4, 3), loads, np.zeros((4, 3)), rows @ np.diag(response) @ rows.T)
+    step = body.patches.step(body.rest(), host, dt)
+    np.testing.assert_allclose(end.state, step.state, atol=1e-12)
+    np.testing.assert_allclose(end.wrench, rows.T @ step.wrench.ravel(), atol=1e-9)
+    np.testing.assert_allclose(rows @ (end.twist - chord), step.twist.ravel(), atol=1e-9)
+
+
+def test_only_motion_against_the_support_counts():
+    """A belt under a body at rest is a body that slides on rest, seen from the belt."""
+    body, belt = four_feet([0.3, 0.0, -1.0, 2.0]), np.array([0.2, -0.1, 0.0])
+    given = {"normal_force": [0.5, 1.0, 0.2, 0.0], "dt": 2e-3, "wrench": (0.3, 0.2, 0.01), "angle": 0.7}
+    moved = body.step(body.rest(), (0.03, -0.01, 0.8), **given, support_velocity=belt)
+    seen = body.step(body.rest(), (-0.17, 0.09, 0.8), **given)
+    np.testing.assert_allclose(moved.twist, seen.twist + belt, atol=1e-12)
+    np.testing.assert_allclose(moved.wrench, seen.wrench, atol=1e-9)
+    many = body.step(body.rest(3), np.zeros(3), **given, support_velocity=np.zeros((2, 1, 3)))
+    assert many.twist.shape == (2, 3, 3)
 
 
 @pytest.mark.parametrize(
@@ -135,6 +212,8 @@ def test_bad_bodies(change, words):
         ({"dt": -1e-3}, "dt must be >= 0"),
         ({"dt": np.ones(2), "angle": np.ones(3)}, "must broadcast"),
         ({"state": np.zeros(3)}, "state must have shape"),
+        ({"support_velocity": (0.0, 0.0)}, "support_velocity must have shape"),
+        ({"support_velocity": (0.0, 0.0, np.inf)}, "support_velocity must be finite"),
     ],
 )
 def test_bad_steps(change, words):

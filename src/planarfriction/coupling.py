@@ -86,7 +86,7 @@ class CoupledStep(NamedTuple):
     """Largest difference between the twists and loads and those the wrenches cause, `[...]` [m/s]; loads count as the
     speed they could cause."""
     converged: np.ndarray
-    """True where the residual is within the tolerance, bool `[...]`."""
+    """True where the residual is within the tolerance, or 1e-9 of the speeds that go into it, bool `[...]`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,9 +149,10 @@ class CoupledPatches(ByValue):
         `w` are the wrenches of the models' steps of `dt` [s] from `state` `[..., states]`. Solved by Newton's method
         for W, starting from the better of the guess and rest; a step that goes too far is shortened, and slopes with
         the wrong sign are left out (docs/embedding.md). Leading axes broadcast; environments run on threads, without
-        the interpreter's lock. `tolerance` is that of the twists [m/s], with spins multiplied by the size of the patch.
-        What does not converge in 50 iterations is solved again without the guess, and through shorter steps. If that
-        fails too, the wrenches of the best result are scaled down and its bristles let go, as far as they would do more
+        the interpreter's lock. `tolerance` is that of the twists [m/s], with spins multiplied by the size of the patch;
+        1e-9 of the largest speed that goes into a twist is enough, too, since rounding may allow no more.
+        What does not converge in 50 iterations is solved again without the guess, by steps that each lower the energy. If
+        that fails too, the wrenches of the best result are scaled down and its bristles let go, as far as they would do more
         work on the host than the bristles give. With `iterations` there is one attempt, and its best result as it is.
 
         Raises `InvalidValueError` for input that is not finite, of the wrong shape, or negative where it must not be.

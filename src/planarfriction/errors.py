@@ -104,11 +104,13 @@ def needing(package: str, extra: str) -> Iterator[None]:
 class SolverError(FrictionError, RuntimeError):
     """The solver failed; the message suggests a remedy.
 
-    Its attribute `solution` is the `Solution` up to the failure, or None.
+    Its attribute `solution` is the `Solution` up to the failure, or None. From `SlidingBody.step`, `step` is the
+    `BodyStep` of all bodies and `converged` `[...]` is True for those whose results hold; both are None elsewhere.
     """
 
-    def __init__(self, message: str, solution: Any = None):
+    def __init__(self, message: str, solution: Any = None, step: Any = None, converged: Any = None):
         self.solution = solution
+        self.step, self.converged = step, converged
         super().__init__(message)
 
 

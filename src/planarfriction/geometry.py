@@ -47,3 +47,17 @@ def rotate(vector: ArrayLike, angle: ArrayLike) -> np.ndarray:
     x, y = vector[..., 0], vector[..., 1]
     turned = np.broadcast_arrays(c * x - s * y, s * x + c * y, *(vector[..., i] for i in range(2, vector.shape[-1])))
     return np.stack(turned, -1)
+
+
+def chord(twist: ArrayLike, dt: ArrayLike) -> np.ndarray:
+    """Return the mean over `dt` [s] of the twist of a point whose body keeps its twist in its own axes, `[..., 3]`.
+
+    The point runs along an arc, `v dt` along its tangent; `vx' = a vx - b vy`, `vy' = b vx + a vy` is along its chord,
+    with `a = sin(q)/q`, `b = (1 - cos(q))/q`, `q = omega dt`. For a point at p about the centre of a turntable it is
+    `(R(q) - I) p/dt` instead of `omega x p`.
+    """
+    twist = np.asarray(twist, dtype=float)
+    half = 0.5 * np.asarray(dt, dtype=float) * twist[..., 2]
+    a, b = np.sinc(2.0 * half / np.pi), half * np.sinc(half / np.pi) ** 2
+    vx, vy = twist[..., 0], twist[..., 1]
+    return np.stack(np.broadcast_arrays(a * vx - b * vy, b * vx + a * vy, twist[..., 2]), -1)

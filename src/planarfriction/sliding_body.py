@@ -79,6 +79,7 @@ class SlidingBody(ByValue):
         dt: ArrayLike,
         wrench: ArrayLike = (0.0, 0.0, 0.0),
         angle: ArrayLike = 0.0,
+        support_velocity: ArrayLike | None = None,
     ) -> BodyStep:
         """Advance by `dt` [s] under an applied `wrench` `[..., 3]` [N, N, N m]; stable at any `dt`.
 
@@ -86,27 +87,41 @@ class SlidingBody(ByValue):
         `[...]` for one model, `[..., k]` for a list of them. Twists and wrenches are those of the centre of mass, in
         world axes; the body's axes are at `angle` [rad], best half-way through the step. Leading axes broadcast.
 
+        `support_velocity` `[..., 3]` is the twist of what the patches lie on, at the place of the centre of mass at the
+        start of the step; None if it stands still. A body that is held keeps its place on it, at any spin, if the caller
+        moves it by `dt V'`: patches slide relative to `geometry.chord(support_velocity, dt)`.
+
         Raises InvalidValueError for shapes that do not fit, numbers that are not finite, and a load or time below zero;
-        SolverError if a body did not converge (see `CoupledPatches.step`).
+        SolverError if a body did not converge (see `CoupledPatches.step`): its `step` has all bodies, those in
+        `converged` with their result, the others with the best that was found.
         """
         given = {"twist": twist, "wrench": wrench, "dt": dt, "angle": angle}
         twist, wrench, dt, angle = (validation.finite_numbers(name, value) for name, value in given.items())
         twist, wrench = validation.vectors("twist", twist, 3), validation.vectors("wrench", wrench, 3)
         load = self._loads(normal_force)
-        validation.broadcast(twist=twist[..., 0], wrench=wrench[..., 0], dt=dt, angle=angle, normal_force=load[..., 0])
+        batches = {"twist": twist[..., 0], "wrench": wrench[..., 0], "dt": dt, "angle": angle}
+        carried = 0.0
+        if support_velocity is not None:
+            support = validation.finite_numbers("support_velocity", support_velocity)
+            support = validation.vectors("support_velocity", support, 3)
+            batches["support_velocity"] = support[..., 0]
+            carried = geometry.chord(support, dt)
+        validation.broadcast(**batches, normal_force=load[..., 0])
         to_patches = geometry.rotate(self._to_patches, angle[..., None]) if angle.any() else self._to_patches
         response = dt[..., None] * self._per_mass
-        pushed = twist + response * wrench
+        pushed = twist - carried + response * wrench
         free = np.einsum("...ij,...j->...i", to_patches, pushed)
         free = free.reshape(*free.shape[:-1], -1, 3)
         coupled = np.einsum("...im,...m,...jm->...ij", to_patches, response, to_patches)
         end = self.patches.step(state, HostStep(free, load, np.zeros(free.shape[-2:]), coupled), dt)
+        friction = np.einsum("...i,...im->...m", end.wrench.reshape(*end.wrench.shape[:-2], -1), to_patches)
+        step = BodyStep(end.state, pushed + response * friction + carried, friction)
         if not end.converged.all():
             count = f"{np.count_nonzero(~end.converged)} of {end.converged.size} bodies"
             most = f"off by {end.residual.max():.1e} m/s at dt up to {dt.max():.3g} s"
-            raise SolverError(f"the step of a body did not converge ({count}, {most})")
-        friction = np.einsum("...i,...im->...m", end.wrench.reshape(*end.wrench.shape[:-2], -1), to_patches)
-        return BodyStep(end.state, pushed + response * friction, friction)
+            message = f"the step of a body did not converge ({count}, {most})"
+            raise SolverError(message, step=step, converged=end.converged)
+        return step
 
     def largest_step(self, normal_force: ArrayLike) -> Any:
         """Return the time step [s] below which a loop around `step` of the models alone is stable, `[...]`.

@@ -177,6 +177,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "dt": 1e-3,
         "wrench": (0.0, 0.0, 0.0),
         "angle": 0.1,
+        "support_velocity": (0.0, 0.1, 0.2),
     },
     "Spring": {"stiffness": 10.0, "anchor": (0.0, 0.0, 0.0), "at": (0.0, 0.0)},
     "Slider": {"outline": SQUARE},

@@ -72,6 +72,17 @@ int run(int n, friction_real *state, const friction_real *twist, const friction_
     return code;
 }
 
+void run_bodies(int n, const friction_body *body, friction_real *state, friction_real *twist, const friction_real *load,
+    const friction_real *dt, const friction_real *push, friction_real *wrench, int *codes)
+{
+    int i;
+    for (i = 0; i < n; ++i) {
+        friction_real *z = state + (long)i * FRICTION_PATCHES * FRICTION_STATES;
+        codes[i] = friction_body_step(&friction_default, body, z, twist + 3 * i, load + (long)i * FRICTION_PATCHES, dt[i],
+            push + 3 * i, wrench + 3 * i);
+    }
+}
+
 int run_steady(int n, const friction_real *twist, const friction_real *load, friction_real *wrench)
 {
     int i, code = 0;

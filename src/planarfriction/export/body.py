@@ -11,7 +11,7 @@ from planarfriction.coupling import ITERATIONS, TOLERANCE
 from planarfriction.export.c_source import Writer
 from planarfriction.export.c_values import Array, Fixed, Record, Scalar
 from planarfriction.export.loops import Loops
-from planarfriction.kernels import coupling
+from planarfriction.kernels import coupling, coupling_steps
 from planarfriction.kernels.coupling_rows import Patches, layout
 from planarfriction.models.base import lever_of
 
@@ -34,19 +34,15 @@ def body_of(model: Any, precision: str, patches: int) -> dict[str, Any]:
     )
     writer, p = Writer(), Record("p", record)
     loops = Loops(writer, {record: "search_t"})
-    loops.replaced[coupling._step] = lambda given: _FUNCTIONS[given[2]]
-    loops.replaced[coupling._load_slopes] = lambda _: "(void)"  # the load is given
-    loops.add(coupling.prepare, (own, p))
-    loops.add(coupling.search, (own, p, Scalar("tolerance"), Fixed(ITERATIONS)))
+    loops.replaced[coupling_steps.step_patch] = lambda given: _FUNCTIONS[given[2]]
+    loops.replaced[coupling_steps.write_load_slopes] = lambda _: "(void)"  # the load is given
+    loops.add(coupling.find, (own, p, Fixed(ROUNDING[precision]), Scalar("most", "int"), Scalar("again", "int")))
     functions = re.sub(r"\breal\b", "double", "\n\n".join(loops.functions))
     functions = re.sub(r"\b(\w+_of_vectors)\b", r"\1_in_double", functions)  # others are in the other precision
     return {
         "fields": [f"{name}[{count}]" for name, count in counts.items() if f"p->{name}" in functions],
         "functions": functions,
-        "stages": coupling.STAGES,
-        "ratio": Writer(precision).constant(coupling.SHORTER),
-        "shortest": writer.constant(coupling.SHORTER**-coupling.STAGES),
         "levers": ", ".join([writer.constant(lever_of(model) or 1.0)] * patches),
+        "iterations": ITERATIONS,
         "tolerance": writer.constant(TOLERANCE),
-        "rounding": writer.constant(ROUNDING[precision]),
     }

@@ -9,6 +9,8 @@ unknown is W alone, and
 is its Newton step. Where P falls (`V.P V <= 0`) A dW leads downhill in energy, whatever A is: `A dW . s` falls from
 `dW.A dW - dV.P dV > 0` to 0 at the next root, so that its sign tells whether a step has gone too far. Where friction
 falls as the patch speeds up (Stribeck; a bristle that gives way within the step), rising directions are left out of P.
+Where steps that may pass a root then turn in circles, a careful search halves them until they pass none: each lowers
+the energy, of which the forces are, but for a small part, the slope, so that they come to rest at one of its minima.
 
 A problem is a row of words (`layout`), so that compiled hosts call `solve` with two addresses.
 """
@@ -22,10 +24,10 @@ import numpy as np
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import call, pointer
-from planarfriction.compiler.memory import Doubles, Integers, Place, arrays_at, at, doubles
+from planarfriction.compiler.memory import Doubles, Place, arrays_at, at, doubles
 from planarfriction.kernels.coupling_rows import INVALID, Patches, Problem, read
+from planarfriction.kernels.coupling_steps import step_all, write_load_slopes
 from planarfriction.kernels.following import follow
-from planarfriction.kernels.settle import factor_at, stepped
 from planarfriction.kernels.small_matrices import leave_out_rising, solved
 from planarfriction.kernels.vectors import clear, copy
 
@@ -39,17 +41,23 @@ JOINT, ROUND = 8, 24
 """Number of iterations at the start of a round in which loads move with the wrenches, and length of a round; in its
 others loads follow behind: where both turn against each other, one of the two ways gets on."""
 
-SHORTER, STAGES = 4.0, 8
-"""Ratio and number of the shorter steps that lead from damping alone to a step that is hard to solve."""
+HALVINGS = 40
+"""Times at most that a careful Newton step which passed a root is halved."""
+
+PATIENCE = 10
+"""Iterations of a careful search, in those of a search."""
 
 NEAR = 10.0
 """Misfit of the guess, over the tolerance, up to which a Newton step goes from there: rest need not be tried."""
 
-LOAD_STEP = 1e-6
-"""Share of a load over which wrenches of a fixed stiffness are compared for their slope."""
-
 ROUNDING = 1e-13
 """Error of a twist, in the largest speed that goes into it, below which no step gets."""
+
+NOISE = 1e-14
+"""Difference of a twist from that which wrenches cause, in the sum of what they add, that is their rounding."""
+
+PRECISION = 1e-9
+"""Error of a twist, in the largest speed that goes into it, with which a step has converged."""
 
 
 @kernel
@@ -61,72 +69,28 @@ def _applied(m: Doubles, i: int, n: int, x: Doubles, start: float) -> float:
 
 
 @kernel
-def _bring_back(step: Doubles, dx: float, dy: float) -> None:
-    """Bring the wrench of a shifted patch, and its slopes, to the twist and the wrench about the origin."""
-    for i in range(3):  # slopes by the spin: it moves the patch
-        row = at(step, 3 + 3 * i)
-        row[2] += dx * row[1] - dy * row[0]
-    step[2] += dx * step[1] - dy * step[0]
-    for j in range(3):
-        step[9 + j] += dx * step[6 + j] - dy * step[3 + j]
+def _size(patches: Patches, p: Problem, i: int) -> float:
+    """Return the sum of the magnitudes of all that goes into element i of the twists."""
+    size = abs(p.twist_0[i])
+    for j in range(3 * patches.count):
+        size += abs(p.response[3 * patches.count * i + j] * p.wrench[j])
+    return size
 
 
 @kernel
-def _step(patches: Patches, p: Problem, functions: Integers, k: int, load: float) -> None:
-    """Step patch k under a load, at the twist that it sees."""
-    first, reference = patches.firsts[k], patches.reference[k]
-    if reference > 0.0:
-        states, factor = patches.firsts[k + 1] - first, factor_at(reference, load)
-        bristles = patches.bristle[k], states, factor, at(p.state, first)
-        stepped(functions[k], p.acting[k], *bristles, p.seen, p.dt[0], at(p.new, first), p.step)
-    else:
-        call(functions[k], (p.acting[k], at(p.state, first), p.seen, p.dt[0], at(p.new, first), p.step))
-
-
-@kernel
-def _load_slopes(patches: Patches, p: Problem) -> None:
-    """Write the slopes of the wrenches by the loads; where stiffness is fixed, by a step under another load."""
+def _load(patches: Patches, p: Problem) -> None:
+    """Write the loads that follow from the wrenches."""
     for k in range(patches.count):
-        one, load = 3 * k, p.load[k]
-        for i in range(3):
-            p.unit_loaded[one + i] = p.unit[one + i]
-        if patches.reference[k] > 0.0 and p.acting[k] != 0 and load > 0.0:
-            p.seen[0], p.seen[1], p.seen[2] = p.twist[one], p.twist[one + 1], p.twist[one + 2]
-            _step(patches, p, patches.steps, k, (1.0 + LOAD_STEP) * load)
-            for i in range(3):
-                p.unit_loaded[one + i] += (p.step[i] - p.unit[one + i]) / LOAD_STEP
+        p.load[k] = xp.maximum(_applied(p.load_response, k, 3 * patches.count, p.wrench, p.load_0[k]), 0.0)
 
 
 @kernel
-def step_all(patches: Patches, p: Problem, functions: Integers) -> None:
-    """Step all patches at the twists of a problem: write the new state and wrenches per unit load.
-
-    `functions` are those of `Patches`: its `steps`, or its `slopes`, which write the slopes of the wrenches as well.
-    """
-    for k in range(patches.count):
-        seen, dx, dy, spin = p.seen, p.shift[2 * k], p.shift[2 * k + 1], p.twist[3 * k + 2]
-        if p.acting[k] == 0:
-            clear(p.step, 12)
-        else:
-            seen[0], seen[1], seen[2] = p.twist[3 * k] - spin * dy, p.twist[3 * k + 1] + spin * dx, spin
-            _step(patches, p, functions, k, p.load[k])
-            if dx != 0.0 or dy != 0.0:
-                _bring_back(p.step, dx, dy)
-        for i in range(3):
-            p.unit[3 * k + i] = p.step[i]
-        for i in range(9):
-            p.unit_slopes[9 * k + i] = p.step[3 + i]
-
-
-@kernel
-def _host(patches: Patches, p: Problem, keep_loads: bool) -> None:
-    """Write the twists and, unless they are kept, the loads that follow from the wrenches."""
+def _host(patches: Patches, p: Problem) -> None:
+    """Write the twists and loads that follow from the wrenches."""
     n = 3 * patches.count
     for i in range(n):
         p.twist[i] = _applied(p.response, i, n, p.wrench, p.twist_0[i])
-    if not keep_loads:
-        for k in range(patches.count):
-            p.load[k] = xp.maximum(_applied(p.load_response, k, n, p.wrench, p.load_0[k]), 0.0)
+    _load(patches, p)
 
 
 @kernel
@@ -173,11 +137,12 @@ def _newton(patches: Patches, p: Problem, keep_loads: bool, falling: bool) -> bo
     """Write the Newton step from the wrenches into `change` and `move`; return True if it leads downhill.
 
     `falling`: without the directions in which slopes rise. Twists and loads need not be those that the wrenches cause:
-    what they lack of these goes into the step.
+    what they lack of these goes into the step, but not rounding, which stiff bristles would multiply.
     """
     n = 3 * patches.count
     for i in range(n):
-        p.gap[i] = _applied(p.response, i, n, p.wrench, p.twist_0[i]) - p.twist[i]
+        gap = _applied(p.response, i, n, p.wrench, p.twist_0[i]) - p.twist[i]
+        p.gap[i] = gap if abs(gap) > NOISE * _size(patches, p, i) else 0.0
     for k in range(patches.count):
         slopes = at(p.slopes, 9 * k)
         for i in range(9):
@@ -224,21 +189,31 @@ def shortening_of(first: float, here: float) -> float:
 
 
 @kernel
-def _go(patches: Patches, p: Problem, keep_loads: bool, whole: bool) -> None:
-    """Go along the Newton step from the wrenches, and, unless it is to be `whole`, back where it goes too far."""
+def _go(patches: Patches, p: Problem, keep_loads: bool, whole: bool, careful: bool) -> None:
+    """Go along the Newton step from the wrenches, and, unless it is to be `whole`, back where it goes too far.
+
+    Twists change by what the step adds, which keeps digits that `V_0 + A W` has lost where patches stick. A `careful`
+    step goes too far where it passes a root.
+    """
     n, w, first, far = 3 * patches.count, p.wrench, _slope(patches, p), 1.0
     copy(w, p.start, n)
-    for shortening in range(SHORTENINGS + 1):
+    for i in range(n):
+        p.gap[i] += p.twist[i]
+    most = HALVINGS if careful else SHORTENINGS
+    for shortening in range(most + 1):
         for i in range(n):
             w[i] = p.start[i] + far * p.change[i]
-        _host(patches, p, keep_loads)
+            p.twist[i] = p.gap[i] + far * p.move[i]
+        if not keep_loads:
+            _load(patches, p)
         step_all(patches, p, patches.steps)
         here = _slope(patches, p)
-        if whole or not too_far(first, here) or shortening == SHORTENINGS:
+        passed = first > 0.0 and not here >= 0.0 if careful else too_far(first, here)
+        if whole or not passed or shortening == most:
             break
-        far *= shortening_of(first, here)
+        far *= 0.5 if careful else shortening_of(first, here)
     if keep_loads:
-        _host(patches, p, False)
+        _load(patches, p)
 
 
 @kernel
@@ -270,9 +245,21 @@ def prepare(patches: Patches, p: Problem) -> float:
 
 
 @kernel
+def _largest_speed(patches: Patches, p: Problem) -> float:
+    """Write the models' wrenches; return the largest sum of speeds [m/s] that they and the host put into a twist."""
+    largest = 0.0
+    for i in range(3 * patches.count):
+        p.wrench[i] = p.load[i // 3] * p.unit[i]
+    for i in range(3 * patches.count):
+        lever = patches.radius[i // 3] if i % 3 == 2 else 1.0
+        largest = xp.maximum(largest, lever * _size(patches, p, i))
+    return largest
+
+
+@kernel
 def _start(patches: Patches, p: Problem, tolerance: float) -> tuple[float, bool]:
     """Step at the better of the twists that the wrenches cause and of rest; return the misfit, and True for rest."""
-    _host(patches, p, False)
+    _host(patches, p)
     step_all(patches, p, patches.steps)
     misfit = _misfit(patches, p)
     if misfit > NEAR * tolerance:
@@ -281,7 +268,7 @@ def _start(patches: Patches, p: Problem, tolerance: float) -> tuple[float, bool]
         at_rest = _misfit(patches, p)
         if at_rest <= misfit:
             return at_rest, True
-        _host(patches, p, False)
+        _host(patches, p)
         step_all(patches, p, patches.steps)
     return misfit, False
 
@@ -290,30 +277,6 @@ def _start(patches: Patches, p: Problem, tolerance: float) -> tuple[float, bool]
 def _copy(patches: Patches, twist: Doubles, load: Doubles, to_twist: Doubles, to_load: Doubles) -> None:
     copy(twist, to_twist, 3 * patches.count)
     copy(load, to_load, patches.count)
-
-
-@kernel
-def _again(patches: Patches, p: Problem, patches_at: Place, problem_at: Place, best: float) -> float:
-    """Solve without a guess, then from the wrenches of ever longer steps; return the misfit of the better solution.
-
-    Bristles that have hardly moved only damp, which is easy to solve. The host's step keeps its length.
-    """
-    dt, iterations = p.dt[0], p.iterations[0]
-    _copy(patches, p.twist, p.load, p.kept_twist, p.kept_load)
-    p.again[0] = 0.0
-    for stage in range(-1, STAGES + 1):
-        if stage <= 0:
-            clear(p.wrench, 3 * patches.count)
-        p.dt[0] = dt if stage < 0 else dt / SHORTER ** (STAGES - stage)
-        call(patches.solve, (patches_at, problem_at))
-        iterations += p.iterations[0]
-        if stage < 0 and p.converged[0] > 0.0:
-            break
-    p.dt[0], p.again[0], p.iterations[0] = dt, 1.0, iterations
-    if p.residual[0] < best:
-        return p.residual[0]
-    _copy(patches, p.kept_twist, p.kept_load, p.twist, p.load)
-    return best
 
 
 @kernel
@@ -337,7 +300,7 @@ def _restrain(patches: Patches, p: Problem) -> None:
 
 
 @kernel
-def search(patches: Patches, p: Problem, tolerance: float, most: int) -> tuple[float, bool]:
+def _search(patches: Patches, p: Problem, tolerance: float, most: int, careful: bool) -> tuple[float, bool]:
     """Write the twists and loads of the least misfit; return that, and True if states and wrenches are those there."""
     misfit, rest = _start(patches, p, tolerance)
     best = math.inf
@@ -350,14 +313,42 @@ def search(patches: Patches, p: Problem, tolerance: float, most: int) -> tuple[f
             break
         keep_loads = iteration % ROUND >= JOINT
         step_all(patches, p, patches.slopes)  # dear: not before they are needed, which at rest they are not
-        _load_slopes(patches, p)
+        write_load_slopes(patches, p)
         if not _newton(patches, p, keep_loads, False):
             _newton(patches, p, keep_loads, True)
-        _go(patches, p, keep_loads, rest)
+        _go(patches, p, keep_loads, rest, careful)
         rest, misfit = False, _misfit(patches, p)
     if not misfit <= best:
         _copy(patches, p.best_twist, p.best_load, p.twist, p.load)
     return best, misfit <= best
+
+
+@kernel
+def find(patches: Patches, p: Problem, rounding: float, most: int, again: bool) -> tuple[float, float]:
+    """Solve from the wrenches, and `again` where that fails, with care and without them, for a longer time.
+
+    Return the misfit of the twists and loads, whose states and wrenches are written, and that which is accepted.
+    """
+    tolerance = xp.maximum(p.tolerance[0], rounding * prepare(patches, p))
+    best, current = _search(patches, p, tolerance, most, False)
+    accepted = tolerance
+    if best > tolerance:
+        if not current:
+            step_all(patches, p, patches.steps)
+        accepted = xp.maximum(tolerance, PRECISION * _largest_speed(patches, p))
+        current = True
+    if best > accepted and again:
+        taken, first = p.iterations[0], best
+        _copy(patches, p.twist, p.load, p.kept_twist, p.kept_load)
+        clear(p.wrench, 3 * patches.count)
+        best, current = _search(patches, p, tolerance, PATIENCE * most, True)
+        p.iterations[0] += taken
+        if not best <= first:
+            best, current = first, False
+            _copy(patches, p.kept_twist, p.kept_load, p.twist, p.load)
+    if not current:
+        step_all(patches, p, patches.steps)
+    return best, accepted
 
 
 @entry
@@ -369,22 +360,17 @@ def solve(patches_at: Place, problem_at: Place) -> None:
     if not _valid(patches, p, doubles(problem_at)):
         return
     follow(patches, p, problem_at)
-    tolerance = xp.maximum(p.tolerance[0], ROUNDING * prepare(patches, p))
-    best, current = search(patches, p, tolerance, int(p.most[0]))
-    lost = best > tolerance and p.again[0] > 0.0
-    if lost and p.most[0] > 0.0:
-        best = _again(patches, p, patches_at, problem_at, best)
-    if lost or not current:
-        step_all(patches, p, patches.steps)
+    again = p.again[0] > 0.0
+    best, accepted = find(patches, p, ROUNDING, int(p.most[0]), again)
     for i in range(3 * patches.count):
         p.wrench[i] = p.load[i // 3] * p.unit[i]
     for k in range(patches.count):
         if p.load[k] == 0.0:  # without load there is no memory
             for i in range(patches.firsts[k], patches.firsts[k + 1]):
                 p.new[i] = 0.0
-    if lost and best > tolerance:
+    if best > accepted and again:
         _restrain(patches, p)
-    p.residual[0], p.converged[0] = best, 1.0 if best <= tolerance else 0.0
+    p.residual[0], p.converged[0] = best, 1.0 if best <= accepted else 0.0
 
 
 @jit

@@ -20,6 +20,12 @@ ROUNDING = {"double": (coupling.ROUNDING,) * 2, "float": (3e-7, 1e-5)}
 """Errors of a twist, in the largest speed that goes into it, by precision: below the first no step gets, and below the
 second some do not get."""
 
+SHORTER = 4.0
+"""Ratio of the shorter steps that lead from damping alone to a step that is hard to solve."""
+
+STAGES = 8
+"""Number of those steps."""
+
 
 class Source(NamedTuple):
     """Native source, and the tables that it reads."""
@@ -51,7 +57,7 @@ def coupled_source_of(
     }
     starts = {name: np.cumsum([0, *each]).tolist() for name, each in counts.items()}
     writer = Writer(precision)
-    names = "SHORTENINGS", "JOINT", "ROUND", "STAGES", "SHORTER"
+    names = "SHORTENINGS", "JOINT", "ROUND"
     text = rendered(
         "planarfriction.warp",
         "coupled.cpp",
@@ -65,6 +71,8 @@ def coupled_source_of(
         rounding=list(map(writer.constant, ROUNDING[precision])),
         shortening="\n".join(writer.lines(traced(_shortening), ["too_far", "share"], indent=" " * 16)),
         systems=_systems(writer, 4 * len(which)),
+        stages=writer.constant(STAGES),
+        shorter=writer.constant(SHORTER),
         **{name.lower(): writer.constant(getattr(coupling, name)) for name in names},
     )
     return Source(text, numbers)

@@ -19,9 +19,10 @@ from planarfriction.adapters.mujoco.loops.responses import is_sparse, leaves_ran
 from planarfriction.compiler import callback, entry, jit, kernel
 from planarfriction.compiler.calls import address_of, c_address_of, call, call_c, pointer, shared_word
 from planarfriction.compiler.memory import Place, arrays_at, at, doubles, integers, integers32
-from planarfriction.kernels.coupling import shortening_of, step_all, too_far
+from planarfriction.kernels.coupling import shortening_of, too_far
 from planarfriction.kernels.coupling_rows import Problem
 from planarfriction.kernels.coupling_rows import read as read_patches
+from planarfriction.kernels.coupling_steps import step_all
 from planarfriction.kernels.following import hold
 from planarfriction.kernels.vectors import clear, copy
 
