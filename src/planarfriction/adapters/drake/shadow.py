@@ -22,7 +22,7 @@ _ORIGIN = np.zeros(3)
 
 
 class Shadow:
-    """The copy, with two contexts: where a step begins, and what it comes to."""
+    """The copy, with three contexts: where a step begins, what it comes to, and where it would come to backwards."""
 
     def __init__(self, plant: Any, scene_graph: Any, placed: Sequence[Placed]) -> None:
         from scipy.linalg.lapack import dposv  # pyright: ignore[reportAttributeAccessIssue]
@@ -35,8 +35,9 @@ class Shadow:
         poses = geometry.get_source_pose_port(plant.get_source_id())
         builder.Connect(self.plant.get_geometry_pose_output_port(), poses)
         self._diagram = builder.Build()
-        self._roots = self._diagram.CreateDefaultContext(), self._diagram.CreateDefaultContext()
-        self._begin, self._end = (self.plant.GetMyMutableContextFromRoot(root) for root in self._roots)
+        self._roots = [self._diagram.CreateDefaultContext() for _ in range(3)]
+        contexts = [self.plant.GetMyMutableContextFromRoot(root) for root in self._roots]
+        self._begin, self._end, self._backwards = contexts
         self._sampled, self.dt = plant.has_sampled_output_ports(), plant.time_step()
         self._results = self.plant.get_contact_results_output_port()
         force = self.plant.get_applied_generalized_force_input_port()
@@ -51,6 +52,8 @@ class Shadow:
                 self._pairs[other, own], self._pairs[own, other] = (p, 1.0), (p, -1.0)
         self._solve = dposv  # the one of NumPy takes as long as a contact
         self._world = self.plant.world_frame()
+        self._seen: list[Any] = [None] * len(placed)
+        """Origins of the patches in the world, and the maps `[3, 6]` from motions there to twists, as `rows` finds them."""
         self._points: list[tuple[int, int, float]] = []
         self._surfaces: list[tuple[int, int, float]] = []
         self._pressed: list[list[tuple[float, list[float]]]] = []
@@ -114,7 +117,36 @@ class Shadow:
         measured = JacobianWrtVariable.kV, self._frames[p], origin, self._others[p], self._world
         spatial = self.plant.CalcJacobianSpatialVelocity(self._begin, *measured)
         seen = np.array([[0.0, 0.0, 0.0, *x], [0.0, 0.0, 0.0, *y], [*normal, 0.0, 0.0, 0.0]])
+        self._seen[p] = place, seen
         return seen @ spatial, normal, [[*_cross(place, x), *x], [*_cross(place, y), *y]], x @ turned, ((c, -s), (s, c))
+
+    def bends(self, patches: Iterable[int]) -> list[np.ndarray]:
+        """Return what patches have moved in the step taken last, per dt, beyond their twists at its velocities `[3]`.
+
+        Positions go straight, `q_1 = q_0 + dt N(q_0) v`, and points of what turns along arcs: to second order,
+
+            x_1 - x_0 = dt J v + (x(q_0 + dt N v) + x(q_0 - dt N v) - 2 x(q_0)) / 2
+
+        What comes nearer along the normal, or leaves, does so along the normal that turns with the two.
+        """
+        now = self.plant.GetPositions(self._begin)
+        self.plant.SetPositions(self._backwards, 2.0 * now - self.plant.GetPositions(self._end))
+        return [self._bend(p) for p in patches]
+
+    def _bend(self, p: int) -> np.ndarray:
+        place, seen = self._seen[p]
+        (own, own_back), (other, other_back) = self._moves(self._frames[p], place), self._moves(self._others[p], place)
+        away, turn, normal = own - other, 0.5 * (own + other)[:3], seen[2, :3]
+        bend = 0.5 * (away + own_back - other_back)
+        bend[3:] -= away[3:] @ normal * np.cross(turn, normal)
+        return seen @ bend / self.dt
+
+    def _moves(self, frame: Any, place: Sequence[float]) -> list[np.ndarray]:
+        """Return how a frame turns and moves at a place of the world in the step, and in one backwards `[6]`."""
+        now = frame.CalcPoseInWorld(self._begin)
+        point, turned = now.inverse() @ np.array(place), now.rotation().matrix().T
+        poses = [frame.CalcPoseInWorld(context) for context in (self._end, self._backwards)]
+        return [np.array([*_vector(pose.rotation().matrix() @ turned), *(pose @ point - place)]) for pose in poses]
 
     def moved(self, jacobian: np.ndarray) -> tuple[np.ndarray, float]:
         """Return the velocities that wrenches cause in a step without contact `[nv, 3k]`: `dt (M + dt D)^-1 J'`.
@@ -158,6 +190,11 @@ class Shadow:
 def _cross(one: Sequence[float], other: Sequence[float]) -> list[float]:
     (a, b, c), (d, e, f) = one, other
     return [b * f - c * e, c * d - a * f, a * e - b * d]
+
+
+def _vector(matrix: np.ndarray) -> np.ndarray:
+    """Return the vector of the antisymmetric part of a matrix."""
+    return 0.5 * np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
 
 
 def _dot(one: Sequence[float], other: Sequence[float]) -> float:

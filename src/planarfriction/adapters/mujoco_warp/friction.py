@@ -181,6 +181,7 @@ class Friction:
         mjw.fwd_acceleration(m, d, factorize=True)
         mjw.solve(m, d)
         launch(geometry.follow_centres, patches, host, frames, problem)
+        launch(geometry.bend, patches, host, frames)
         if host.implicit == 2:
             mjw.deriv_smooth_vel(m, d, self._metric)
         for i in range(PASSES):
@@ -247,6 +248,7 @@ class Friction:
                 "inertia_column": m.M_colind, "damping": m.dof_damping, "implicit": self._implicit,
             }  # fmt: skip
             arrays |= {"root": m.body_rootid, "ancestor": m.body_isdofancestor, "centre": d.subtree_com, "axis": d.cdof}
+            arrays |= {"turned": d.cdof_dot, "velocity": d.cvel}
             self._arrays = _filled(geometry.Host(), arrays)
         return self._arrays
 
