@@ -32,45 +32,50 @@ POSES = 1e-5, 1e-4
 MODEL = shaken().model
 """Pads of mu = 1, whose kernels other tests compile too."""
 
-_BOX = """<body name="{0}" pos="{1}"><freejoint/><geom name="{0}" type="box" size="0.03 0.03 0.01" mass="0.1"
+_BOX = """<body name="{0}" pos="0 0 {1}"><freejoint/><geom name="{0}" type="box" size="0.03 0.03 0.01" mass="0.1"
   contype="0" conaffinity="1"/><site name="{0}" pos="0 0 -0.01"/></body>"""
 
-_DECK = '<geom name="{}" type="box" size="1 1 0.05" pos="0 0 -0.05" mass="{}" contype="1" conaffinity="0"/>'
+_DECK = """<geom name="{}" type="box" size="1 1 0.05" pos="0 0 -0.05" mass="10" contype="1" conaffinity="0"/>"""
 
-TABLE_AND_PLANE = f"""<mujoco><option timestep="{{dt}}"/><worldbody>
-  <body><joint name="table" axis="0 0 1"/>{_DECK.format("table", 10.0)}</body>{_BOX.format("box", "0 0 0.01")}
-  <geom name="plane" type="plane" size="2 2 0.1" pos="0 0 -5" surfacevel="0 0 0 0 0 {{spin}}" contype="1" conaffinity="0"/>
-  {_BOX.format("parcel", "0 0 -4.99")}
-  </worldbody></mujoco>"""
-"""A box on a hinged table, and one on a plane whose surface turns."""
 
-CAR_AND_TABLE = f"""<mujoco><option timestep="{{dt}}"/><worldbody>
-  <body><joint name="table" axis="0 0 1"/>{_DECK.format("table", 10.0)}</body>{_BOX.format("box", "0 0 0.01")}
-  <body pos="0 0 -5"><joint name="x" type="slide" axis="1 0 0"/><joint name="y" type="slide" axis="0 1 0"/>
-  <joint name="car" axis="0 0 1"/>{_DECK.format("car", 10.0)}</body>{_BOX.format("parcel", "0 0 -4.99")}
-  </worldbody><actuator><motor joint="x"/><motor joint="y"/></actuator></mujoco>"""
-"""A box on a hinged table, and one on a car that drives in a circle."""
+def plane(spin: float, height: float) -> str:
+    """Return a plane whose surface turns, with a box on it."""
+    name = f"plane {spin:g}"
+    return f"""<geom name="{name}" type="plane" size="2 2 .1" pos="0 0 {height}" surfacevel="0 0 0 0 0 {spin}"
+      contype="1" conaffinity="0"/>{_BOX.format(f"box {spin:g}", height + 0.01)}"""
 
-ARM = """<mujoco><option timestep="{dt}"/><worldbody>
-  <body><joint name="arm" axis="0 0 1"/><inertial pos="0 0 0" mass="10" diaginertia="1 1 1"/>
-  <geom name="left" type="box" size="0.008862 0.005 0.008862" pos="{place} -0.015 0" contype="1" conaffinity="0"/>
-  <body pos="{place} 0.015 0"><joint name="press" type="slide" axis="0 -1 0" damping="3"/>
+
+TABLE = f"""<body><joint name="table" axis="0 0 1"/>{_DECK.format("table")}</body>{_BOX.format("part", 0.01)}"""
+"""A hinged table with a box on it."""
+
+CAR = f"""<body pos="0 0 -4"><joint name="x" type="slide" axis="1 0 0"/><joint name="y" type="slide" axis="0 1 0"/>
+  <joint name="car" axis="0 0 1"/>{_DECK.format("car")}</body>{_BOX.format("parcel", -3.99)}"""
+"""A car that drives in a circle, with a box on it."""
+
+PLACE = 0.5
+"""Radius of the block on the arm [m]."""
+
+ARM = f"""<body pos="0 0 4"><joint name="arm" axis="0 0 1"/><inertial pos="0 0 0" mass="10" diaginertia="1 1 1"/>
+  <geom name="left" type="box" size="0.008862 0.005 0.008862" pos="{PLACE} -0.015 0" contype="1" conaffinity="0"/>
+  <body pos="{PLACE} 0.015 0"><joint name="press" type="slide" axis="0 -1 0" damping="3"/>
   <geom name="right" type="box" size="0.008862 0.005 0.008862" mass="0.05" contype="1" conaffinity="0"/></body></body>
-  <body name="block"><freejoint/>
+  <body name="block" pos="0 0 4"><freejoint/>
   <geom name="block" type="box" size="0.04 0.01 0.06" mass="0.2" contype="0" conaffinity="1"/>
-  <site name="left" pos="0 -0.01 0" zaxis="0 1 0"/><site name="right" pos="0 0.01 0" zaxis="0 -1 0"/></body>
-  </worldbody><actuator><motor joint="press"/></actuator></mujoco>"""
-"""A block at the end of an arm, pressed along its circle by one pad against another."""
+  <site name="left" pos="0 -0.01 0" zaxis="0 1 0"/><site name="right" pos="0 0.01 0" zaxis="0 -1 0"/></body>"""
+"""An arm that holds a block, pressed along its circle by one pad against another."""
+
+MOTORS = '<actuator><motor joint="press"/><motor joint="x"/><motor joint="y"/></actuator>'
 
 
 class Worlds:
     """Worlds of a scene with patches between sites and geoms."""
 
-    def __init__(self, text: str, pairs: list[tuple[str, tuple[str, str]]], worlds: int, **numbers: float) -> None:
-        spec = mujoco.MjSpec.from_string(text.format(**numbers))
-        patches = [PatchContact(MODEL, site=site, geoms=geoms) for site, geoms in pairs]
+    def __init__(self, bodies: str, sites: dict[str, tuple[str, str]], dt: float, worlds: int, more: str = "") -> None:
+        text = f"""<mujoco><option timestep="{dt}"/><worldbody>{bodies}</worldbody>{more}</mujoco>"""
+        spec = mujoco.MjSpec.from_string(text)
+        patches = [PatchContact(MODEL, site=site, geoms=geoms) for site, geoms in sites.items()]
         prepare(spec, patches)
-        self.m, self.dt = spec.compile(), numbers["dt"]
+        self.m, self.dt = spec.compile(), dt
         self.friction = Friction(self.m, patches, worlds=worlds, njmax=60, nconmax=20)
         self.q = np.tile(self.m.qpos0, (worlds, 1))
         self.v = np.zeros((worlds, self.m.nv))
@@ -116,23 +121,57 @@ def _check(found: tuple[Any, ...], times: np.ndarray, spins: np.ndarray, dt: flo
     radius, around, own = (np.ptp(each[chosen], axis=0) for each in found)
     size = found[0][0]
     elastic = 4e-7  # m: bristles of the third of a millionth of a metre, stretched by a fifth
-    print(radius / size, around, own)
     assert (radius < size * (1.5 * spins**4 * dt**3 * lasts / 8.0 + POSES[0]) + elastic).all()
     angle = 1.5 * spins**3 * dt**2 * lasts / 6.0 + POSES[1]
     assert (around < angle + elastic / size).all() and (own < angle + elastic / size).all()
 
 
-def _table(worlds: Worlds, spins: np.ndarray, x: Any) -> None:
-    worlds.put("table", 0.0, spins)
-    worlds.throw("box", spins, x)
-
-
 def test_parts_on_a_table_and_a_plane_keep_their_places():
     """Steps along tangents would take them 0.54 % further out in 0.3 s: by a factor of `exp(w^2 dt T / 2)`."""
     spins, dt = SPINS[2:3], 4e-3
-    worlds = Worlds(TABLE_AND_PLANE, [("box", ("table", "box")), ("parcel", ("plane", "parcel"))], 1, dt=dt, spin=spins[0])
-    _table(worlds, spins, RADII[2])
-    worlds.throw("parcel", spins, RADII[2])
+    sites = {"part": ("table", "part"), "box 3": ("plane 3", "box 3")}
+    worlds = Worlds(TABLE + plane(3.0, -4.0), sites, dt, 1)
+    worlds.put("table", 0.0, spins)
+    for body in ("part", "box 3"):
+        worlds.throw(body, spins, RADII[2])
     times, q = worlds.run(0.4)
-    _check(worlds.around(q, "box", q[..., 0]), times, spins, dt, 0.1)
-    _check(worlds.around(q, "parcel", times[:, None] * spins), times, spins, dt, 0.1)
+    _check(worlds.around(q, "part", q[..., 0]), times, spins, dt, 0.1)
+    _check(worlds.around(q, "box 3", times[:, None] * spins), times, spins, dt, 0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dt", [2e-3, 4e-3])
+def test_parts_on_planes_keep_their_places_for_long(dt):
+    sites = {f"box {spin:g}": (f"plane {spin:g}", f"box {spin:g}") for spin in SPINS}
+    worlds = Worlds("".join(plane(spin, -float(i)) for i, spin in enumerate(SPINS)), sites, dt, 1)
+    for name, spin, radius in zip(sites, SPINS, RADII, strict=True):
+        worlds.throw(name, spin, radius)
+    times, q = worlds.run(20.0)
+    for name, spin in zip(sites, SPINS, strict=True):
+        _check(worlds.around(q, name, times[:, None] * spin), times, np.array([spin]), dt, 1.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dt", [2e-3, 4e-3])
+def test_parts_on_a_table_a_car_and_an_arm_keep_their_places_for_long(dt):
+    sites = {"part": ("table", "part"), "parcel": ("car", "parcel")}
+    sites |= {side: (side, "block") for side in ("left", "right")}
+    worlds = Worlds(TABLE + CAR + ARM, sites, dt, len(SPINS), MOTORS)
+    for joint in ("table", "car", "arm"):
+        worlds.put(joint, 0.0, SPINS)
+    worlds.put("x", RADII, 0.0)
+    worlds.put("y", 0.0, SPINS * RADII)
+    worlds.throw("part", SPINS, RADII)
+    worlds.throw("parcel", SPINS, 1.3 * RADII, 0.2 * RADII)
+    worlds.throw("block", SPINS, PLACE)
+    x, y, car, arm = (worlds.m.joint(name).qposadr[0] for name in ("x", "y", "car", "arm"))
+
+    def control(q: np.ndarray) -> np.ndarray:
+        """Press with 30 N, and pull the car towards the middle of its circle."""
+        return np.stack([np.full(len(q), 30.0), *(-10.0 * SPINS**2 * q[:, place] for place in (x, y))], axis=1)
+
+    times, q = worlds.run(20.0, control)
+    table = np.unwrap(q[..., worlds.m.joint("table").qposadr[0]], axis=0)
+    _check(worlds.around(q, "part", table), times, SPINS, dt, 1.0)
+    _check(worlds.around(q, "parcel", q[..., car], q[..., x], q[..., y]), times, SPINS, dt, 1.0)
+    _check(worlds.around(q, "block", q[..., arm]), times, SPINS, dt, 1.0)

@@ -53,7 +53,7 @@ class Shadow:
         self._solve = dposv  # the one of NumPy takes as long as a contact
         self._world = self.plant.world_frame()
         self._seen: list[Any] = [None] * len(placed)
-        """Origins of the patches in the world, and the maps `[3, 6]` from motions there to twists, as `rows` finds them."""
+        """Maps `[3, 6]` of motions to twists, and the places of the patches on both of their bodies, as found by `rows`."""
         self._points: list[tuple[int, int, float]] = []
         self._surfaces: list[tuple[int, int, float]] = []
         self._pressed: list[list[tuple[float, list[float]]]] = []
@@ -117,7 +117,7 @@ class Shadow:
         measured = JacobianWrtVariable.kV, self._frames[p], origin, self._others[p], self._world
         spatial = self.plant.CalcJacobianSpatialVelocity(self._begin, *measured)
         seen = np.array([[0.0, 0.0, 0.0, *x], [0.0, 0.0, 0.0, *y], [*normal, 0.0, 0.0, 0.0]])
-        self._seen[p] = place, seen
+        self._seen[p] = seen, [self._place(each[p], place) for each in (self._frames, self._others)]
         return seen @ spatial, normal, [[*_cross(place, x), *x], [*_cross(place, y), *y]], x @ turned, ((c, -s), (s, c))
 
     def bends(self, patches: Iterable[int]) -> list[np.ndarray]:
@@ -134,17 +134,25 @@ class Shadow:
         return [self._bend(p) for p in patches]
 
     def _bend(self, p: int) -> np.ndarray:
-        place, seen = self._seen[p]
-        (own, own_back), (other, other_back) = self._moves(self._frames[p], place), self._moves(self._others[p], place)
+        seen, places = self._seen[p]
+        (own, own_back), (other, other_back) = map(self._moves, places)
         away, turn, normal = own - other, 0.5 * (own + other)[:3], seen[2, :3]
         bend = 0.5 * (away + own_back - other_back)
-        bend[3:] -= away[3:] @ normal * np.cross(turn, normal)
+        bend[3:] -= away[3:] @ normal * np.array(_cross(turn, normal))
         return seen @ bend / self.dt
 
-    def _moves(self, frame: Any, place: Sequence[float]) -> list[np.ndarray]:
-        """Return how a frame turns and moves at a place of the world in the step, and in one backwards `[6]`."""
-        now = frame.CalcPoseInWorld(self._begin)
-        point, turned = now.inverse() @ np.array(place), now.rotation().matrix().T
+    def _place(self, frame: Any, place: Sequence[float]) -> Any:
+        """Return a frame that moves, a place of the world, the same in the frame, and how the world lies in this."""
+        if frame.body().index() == self._world.body().index():
+            return None
+        pose = frame.CalcPoseInWorld(self._begin).inverse()
+        return frame, np.array(place), pose @ np.array(place), pose.rotation().matrix()
+
+    def _moves(self, at: Any) -> list[np.ndarray]:
+        """Return how a frame turns and moves at its place in the step, and in one backwards `[6]`."""
+        if at is None:
+            return [np.zeros(6), np.zeros(6)]
+        frame, place, point, turned = at
         poses = [frame.CalcPoseInWorld(context) for context in (self._end, self._backwards)]
         return [np.array([*_vector(pose.rotation().matrix() @ turned), *(pose @ point - place)]) for pose in poses]
 
@@ -192,9 +200,10 @@ def _cross(one: Sequence[float], other: Sequence[float]) -> list[float]:
     return [b * f - c * e, c * d - a * f, a * e - b * d]
 
 
-def _vector(matrix: np.ndarray) -> np.ndarray:
+def _vector(matrix: np.ndarray) -> tuple[float, float, float]:
     """Return the vector of the antisymmetric part of a matrix."""
-    return 0.5 * np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
+    (_, xy, xz), (yx, _, yz), (zx, zy, _) = matrix.tolist()
+    return 0.5 * (zy - yz), 0.5 * (xz - zx), 0.5 * (yx - xy)
 
 
 def _dot(one: Sequence[float], other: Sequence[float]) -> float:
