@@ -76,7 +76,7 @@ class Worlds:
         patches = [PatchContact(MODEL, site=site, geoms=geoms) for site, geoms in sites.items()]
         prepare(spec, patches)
         self.m, self.dt = spec.compile(), dt
-        self.friction = Friction(self.m, patches, worlds=worlds, njmax=60, nconmax=20)
+        self.friction = Friction(self.m, patches, worlds=worlds, njmax=200, nconmax=60)
         self.q = np.tile(self.m.qpos0, (worlds, 1))
         self.v = np.zeros((worlds, self.m.nv))
 

@@ -26,7 +26,7 @@ from planarfriction.adapters.mujoco.patches import (
     place_of_parameters,
     surface_velocities,
 )
-from planarfriction.adapters.mujoco_warp.loops import geometry, responses
+from planarfriction.adapters.mujoco_warp.loops import arcs, geometry, responses
 from planarfriction.coupling import HostStep
 from planarfriction.errors import InvalidValueError
 from planarfriction.models.base import lever_of
@@ -181,7 +181,7 @@ class Friction:
         mjw.fwd_acceleration(m, d, factorize=True)
         mjw.solve(m, d)
         launch(geometry.follow_centres, patches, host, frames, problem)
-        launch(geometry.bend, patches, host, frames)
+        launch(arcs.bend, patches, host, frames)
         if host.implicit == 2:
             mjw.deriv_smooth_vel(m, d, self._metric)
         for i in range(PASSES):
