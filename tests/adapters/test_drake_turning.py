@@ -146,8 +146,11 @@ def car(spin: float, dt: float) -> Turning:
     return Turning(made, part, support.body_frame())
 
 
-def arm(spin: float, dt: float) -> Turning:
-    """A block at the end of an arm, pressed along its circle by one pad against another."""
+def arm(spin: float, dt: float, reach: float = 0.014) -> Turning:
+    """A block at the end of an arm, pressed along its circle by one pad against another.
+
+    Pads press with 30 N where they are 6 mm in the block: they close if they begin further away.
+    """
     builder, plant, scene_graph = bare(dt)
     radius = 0.5 if spin < 10.0 else 0.1
     block = plant.AddRigidBody("block", SpatialInertia(0.2, [0, 0, 0], UnitInertia.SolidBox(0.08, 0.02, 0.12)))
@@ -158,7 +161,7 @@ def arm(spin: float, dt: float) -> Turning:
     for side, sign in (("left", -1.0), ("right", 1.0)):
         pad = plant.AddRigidBody(side + " pad", SpatialInertia(0.05, [0, 0, 0], UnitInertia.SolidSphere(0.01)))
         plant.RegisterCollisionGeometry(pad, RigidTransform(), Sphere(0.01), side + " pad", material("point"))
-        place = RigidTransform([radius, 0.014 * sign, 0.5])  # 6 mm into the block, where they press with 30 N
+        place = RigidTransform([radius, reach * sign, 0.5])
         base = plant.AddFrame(FixedOffsetFrame(side + " base", support.body_frame(), place))
         if side == "left":
             plant.WeldFrames(base, pad.body_frame())
@@ -196,6 +199,11 @@ def _check(made: Turning, spin: float, dt: float, seconds: float, start: float) 
 def test_what_is_held_keeps_its_place(scene):
     """Steps along tangents would take it 0.7 % further out in 0.4 s: by a factor of `exp(w^2 dt T / 2)`."""
     _check(scene(3.0, 4e-3), 3.0, 4e-3, 0.6, 0.2)
+
+
+def test_pads_that_close_while_they_turn_do_not_turn_what_they_hold():
+    """Along the normal, which turns with them: along one that stands still, 6 mm would turn the block by 0.01."""
+    assert np.ptp(arm(3.0, 4e-3, reach=0.02).path(0.2)[:, 3]) < 2e-4
 
 
 @pytest.mark.parametrize("options", [{"use_sampled_output_ports": False}, {"discrete_contact_approximation": "sap"}])
