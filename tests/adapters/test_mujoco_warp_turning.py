@@ -56,9 +56,9 @@ PLACE = 0.5
 """Radius of the block on the arm [m]."""
 
 ARM = f"""<body pos="0 0 4"><joint name="arm" axis="0 0 1"/><inertial pos="0 0 0" mass="10" diaginertia="1 1 1"/>
-  <geom name="left" type="box" size="0.008862 0.005 0.008862" pos="{PLACE} -0.015 0" contype="1" conaffinity="0"/>
-  <body pos="{PLACE} 0.015 0"><joint name="press" type="slide" axis="0 -1 0" damping="3"/>
-  <geom name="right" type="box" size="0.008862 0.005 0.008862" mass="0.05" contype="1" conaffinity="0"/></body></body>
+  <geom name="left" type="box" size="0.008862 0.005 0.008862" pos="{PLACE} -0.0147 0" contype="1" conaffinity="0"/>
+  <body pos="{PLACE} 0.0147 0"><joint name="press" type="slide" axis="0 -1 0" damping="30"/>
+  <geom name="right" type="box" size="0.008862 0.005 0.008862" mass="0.5" contype="1" conaffinity="0"/></body></body>
   <body name="block" pos="0 0 4"><freejoint/>
   <geom name="block" type="box" size="0.04 0.01 0.06" mass="0.2" contype="0" conaffinity="1"/>
   <site name="left" pos="0 -0.01 0" zaxis="0 1 0"/><site name="right" pos="0 0.01 0" zaxis="0 -1 0"/></body>"""
