@@ -205,7 +205,7 @@ def test_what_comes_out_otherwise_than_bristles_saw_is_owed_to_them(monkeypatch)
     monkeypatch.setattr("planarfriction.adapters.drake.asking.MISFIT", 1.0)
     shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
     asked = asking.step(np.zeros(6), *before, given, own[parts["axes"]], own[parts["answers"]])
-    came_out = asking._rows @ shadow.step(asked.force)
+    came_out = asking._twists(shadow.step(asked.force))
     assert abs(asked.owed).max() > 1e-5
     np.testing.assert_allclose(asked.twists, came_out, atol=1e-9)
     np.testing.assert_allclose(asking._row.twist + asked.owed, came_out + given, atol=1e-9)

@@ -57,7 +57,10 @@ def carried(mass: float, speed: float, dt: float, contact: str, approximation: s
 @pytest.mark.parametrize("approximation", ["lagged", "similar", "sap"])
 @pytest.mark.parametrize(("mass", "speed"), [(20.0, 2.0), (5.0, 0.5), (20.0, 0.0)])
 def test_a_box_comes_to_rest_on_a_carrier(mass, speed, approximation, contact):
-    """Drake's solver leaves open a share of all that moves: friction dies out as far as this allows."""
+    """Drake's solver leaves open a share of all that moves: friction dies out as far as this allows.
+
+    What one step leaves open the next one takes back, so that twists swing by twice as much.
+    """
     made = carried(mass, speed, 2e-3, contact, approximation)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -67,7 +70,7 @@ def test_a_box_comes_to_rest_on_a_carrier(mass, speed, approximation, contact):
     wrench = made.friction.get_wrenches_output_port().Eval(made.own)
     twist = made.friction.get_twists_output_port().Eval(made.own)
     open_end = 1e-6 * math.sqrt(mass / 0.5) * speed
-    assert abs(twist[:2]).max() < 1e-6 + open_end
+    assert abs(twist[:2]).max() < 1e-6 + 2.0 * open_end
     assert abs(wrench[:2]).max() < 1e-3 + 0.5 * 4.0 * open_end / 2e-3
     assert made.plant.GetVelocities(made.context)[0] == pytest.approx(speed - 0.05 / (mass + 0.5), abs=1e-3)
 

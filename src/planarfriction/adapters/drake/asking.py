@@ -104,7 +104,7 @@ class Asking:
                 if passes == 1:
                     self._answer_as_before(answers)
                 wrench, owed, solved, misfit = self._pressed(wrench), self._pressed(owed), False, np.inf
-            twist, load = self._rows @ velocity + owed, np.maximum((self._normals * pushes[:, :3]) @ _ONES, 0.0)
+            twist, load = self._twists(velocity) + owed, np.maximum((self._normals * pushes[:, :3]) @ _ONES, 0.0)
             if solved:
                 off = twist - row.twist
                 last, misfit = misfit, self._speed(off, load - row.load)
@@ -128,6 +128,14 @@ class Asking:
         report = passes, iterations, row.residual[0], misfit, row.converged[0]
         answers = np.concatenate([row.response.ravel(), row.load_response.ravel()])
         return Asked(row.new, wrench, force, off, axes, twist - owed, load, self._touching, answers, velocity, report)
+
+    def _twists(self, velocity: np.ndarray) -> np.ndarray:
+        """Return how far patches move in the step that the shadow took last, per dt: what is held keeps its place."""
+        twists = self._rows @ velocity
+        touching = [p for p, touches in enumerate(self._touching) if touches]
+        for p, bend in zip(touching, self._shadow.bends(touching), strict=True):
+            twists[3 * p : 3 * p + 3] += bend
+        return twists
 
     def _forget(self) -> None:
         self._touching = [False] * len(self._touching)

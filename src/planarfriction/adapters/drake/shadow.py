@@ -21,7 +21,7 @@ from planarfriction.kernels.coupling_rows import ALONG, FLAT
 
 
 class Shadow:
-    """The copy, with two contexts: where a step begins, and what it comes to."""
+    """The copy, with three contexts: where a step begins, what it comes to, and where it would come to backwards."""
 
     def __init__(self, plant: Any, scene_graph: Any, placed: Sequence[Placed]) -> None:
         from scipy.linalg.lapack import dposv  # pyright: ignore[reportAttributeAccessIssue]
@@ -34,8 +34,9 @@ class Shadow:
         poses = geometry.get_source_pose_port(plant.get_source_id())
         builder.Connect(self.plant.get_geometry_pose_output_port(), poses)
         self._diagram = builder.Build()
-        self._roots = self._diagram.CreateDefaultContext(), self._diagram.CreateDefaultContext()
-        self._begin, self._end = (self.plant.GetMyMutableContextFromRoot(root) for root in self._roots)
+        self._roots = [self._diagram.CreateDefaultContext() for _ in range(3)]
+        contexts = [self.plant.GetMyMutableContextFromRoot(root) for root in self._roots]
+        self._begin, self._end, self._backwards = contexts
         self._sampled, self.dt = plant.has_sampled_output_ports(), plant.time_step()
         self._results = self.plant.get_contact_results_output_port()
         force = self.plant.get_applied_generalized_force_input_port()
@@ -56,6 +57,8 @@ class Shadow:
                 self._pairs[other, own], self._pairs[own, other] = (p, 1.0), (p, -1.0)
         self._solve = dposv  # the one of NumPy takes as long as a contact
         self._world = self.plant.world_frame()
+        self._seen: list[Any] = [None] * len(placed)
+        """Maps `[3, 6]` of motions to twists, and places of the patches on both of their bodies, as `rows` finds them."""
         self._points: list[tuple[int, int, float]] = []
         self._surfaces: list[tuple[int, int, float]] = []
         self._pressed: list[list[tuple[float, list[float]]]] = []
@@ -127,7 +130,44 @@ class Shadow:
         measured = JacobianWrtVariable.kV, self._frames[p], origin, self._others[p], self._world
         spatial = self.plant.CalcJacobianSpatialVelocity(self._begin, *measured)
         seen = np.array([[0.0, 0.0, 0.0, *x], [0.0, 0.0, 0.0, *y], [*normal, 0.0, 0.0, 0.0]])
+        self._seen[p] = seen, [self._place(each[p], place) for each in (self._frames, self._others)]
         return seen @ spatial, normal, [[*_cross(place, x), *x], [*_cross(place, y), *y]], x @ turned, ((c, -s), (s, c))
+
+    def bends(self, patches: Iterable[int]) -> list[np.ndarray]:
+        """Return what patches have moved in the step taken last, per dt, beyond their twists at its velocities `[3]`.
+
+        Positions go straight, `q_1 = q_0 + dt N(q_0) v`, and points of what turns along arcs: to second order,
+
+            x_1 - x_0 = dt J v + (x(q_0 + dt N v) + x(q_0 - dt N v) - 2 x(q_0)) / 2
+
+        What comes nearer along the normal, or leaves, does so along the normal that turns with the two.
+        """
+        now = self.plant.GetPositions(self._begin)
+        self.plant.SetPositions(self._backwards, 2.0 * now - self.plant.GetPositions(self._end))
+        return [self._bend(p) for p in patches]
+
+    def _bend(self, p: int) -> np.ndarray:
+        seen, places = self._seen[p]
+        (own, own_back), (other, other_back) = map(self._moves, places)
+        away, turn, normal = own - other, 0.5 * (own + other)[:3], seen[2, :3]
+        bend = 0.5 * (away + own_back - other_back)
+        bend[3:] -= away[3:] @ normal * np.array(_cross(turn, normal))
+        return seen @ bend / self.dt
+
+    def _place(self, frame: Any, place: Sequence[float]) -> Any:
+        """Return a frame that moves, a place of the world, the same in the frame, and how the world lies in this."""
+        if frame.body().index() == self._world.body().index():
+            return None
+        pose = frame.CalcPoseInWorld(self._begin).inverse()
+        return frame, np.array(place), pose @ np.array(place), pose.rotation().matrix()
+
+    def _moves(self, at: Any) -> list[np.ndarray]:
+        """Return how a frame turns and moves at its place in the step, and in one backwards `[6]`."""
+        if at is None:
+            return [np.zeros(6), np.zeros(6)]
+        frame, place, point, turned = at
+        poses = [frame.CalcPoseInWorld(context) for context in (self._end, self._backwards)]
+        return [np.array([*_vector(pose.rotation().matrix() @ turned), *(pose @ point - place)]) for pose in poses]
 
     def moved(self, jacobian: np.ndarray) -> tuple[np.ndarray, float]:
         """Return the velocities that wrenches cause in a step without contact `[nv, 3k]`: `dt (M + dt D)^-1 J'`.
@@ -171,6 +211,12 @@ class Shadow:
 def _cross(one: Sequence[float], other: Sequence[float]) -> list[float]:
     (a, b, c), (d, e, f) = one, other
     return [b * f - c * e, c * d - a * f, a * e - b * d]
+
+
+def _vector(matrix: np.ndarray) -> tuple[float, float, float]:
+    """Return the vector of the antisymmetric part of a matrix."""
+    (_, xy, xz), (yx, _, yz), (zx, zy, _) = matrix.tolist()
+    return 0.5 * (zy - yz), 0.5 * (xz - zx), 0.5 * (yx - xy)
 
 
 def _dot(one: Sequence[float], other: Sequence[float]) -> float:

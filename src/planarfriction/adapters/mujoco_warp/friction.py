@@ -28,7 +28,7 @@ from planarfriction.adapters.mujoco.patches import (
     place_of_parameters,
     surface_velocities,
 )
-from planarfriction.adapters.mujoco_warp.loops import centres, geometry, responses
+from planarfriction.adapters.mujoco_warp.loops import arcs, centres, geometry, responses
 from planarfriction.coupling import HostStep
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import placing
@@ -205,6 +205,7 @@ class Friction:
         mjw.fwd_acceleration(m, d, factorize=True)
         mjw.solve(m, d)
         launch(centres.follow_centres, patches, host, frames, problem, self.coupled.parameters)
+        launch(arcs.bend, patches, host, frames)
         if host.implicit == 2:
             mjw.deriv_smooth_vel(m, d, self._metric)
         for i in range(PASSES):
@@ -273,6 +274,7 @@ class Friction:
                 "inertia_column": m.M_colind, "damping": m.dof_damping, "implicit": self._implicit,
             }  # fmt: skip
             arrays |= {"root": m.body_rootid, "ancestor": m.body_isdofancestor, "centre": d.subtree_com, "axis": d.cdof}
+            arrays |= {"turned": d.cdof_dot, "velocity": d.cvel}
             self._arrays = _filled(geometry.Host(), arrays)
         return self._arrays
 

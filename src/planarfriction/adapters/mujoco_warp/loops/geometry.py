@@ -64,6 +64,10 @@ class Host:
     ancestor: wp.array2d(dtype=int)
     centre: wp.array2d(dtype=wp.vec3)
     axis: wp.array2d(dtype=wp.spatial_vector)
+    turned: wp.array2d(dtype=wp.spatial_vector)
+    """Time derivatives of `axis` [E, nv]."""
+    velocity: wp.array2d(dtype=wp.spatial_vector)
+    """Spins of the bodies, and their velocities at `centre` [E, bodies]."""
     nefc: wp.array(dtype=int)
     type: wp.array2d(dtype=int)
     id: wp.array2d(dtype=int)
@@ -133,7 +137,8 @@ class Frames:
     axis: wp.array2d(dtype=wp.vec3)
     """x axes in the step [E, k]."""
     drift: wp.array2d(dtype=wp.vec3)
-    """Twists of the surfaces relative to the bodies, of the own one less those of the other [E, k]."""
+    """Twists of the surfaces relative to the bodies, and what points move beyond their velocities, per dt: of the own
+    one less those of the other [E, k]."""
 
 
 Places = wp.struct(type("Places", (), {"__annotations__": dict.fromkeys(Memory._fields, int)}))
