@@ -1,8 +1,9 @@
 """Make the pictures of the page on joints: `python docs/make_joint.py [FOLDER]`, by default in `docs/images`.
 
-`joint-torque.png` is the fit of the page's first example, `joint.png` that of the servo's logs. `joint-holds.png` is a joint that should hold at half its Coulomb level,
-under a load that swings at 5 Hz: MuJoCo's `frictionloss` and the bristles of its dcmotor, and elasto-plastic bristles.
-Angles are taken once in each swing, so that what bends back does not count.
+`joint-torque.png` is the fit of the page's first example, `joint.png` that of the servo's logs. `joint-holds.png` is a
+joint that should hold at half its Coulomb level, under a load that swings at 5 Hz: MuJoCo's `frictionloss` and the
+bristles of its dcmotor, and elasto-plastic bristles. Angles are taken once in each swing, so that what bends back does
+not count.
 """
 
 from __future__ import annotations

@@ -196,9 +196,7 @@ class Table:
         else:
             self._lines = itertools.chain(second, self._lines)
 
-    def numbers(
-        self, names: Sequence[str], spare: Sequence[str] = (), flags: Sequence[str] = ()
-    ) -> np.ndarray:
+    def numbers(self, names: Sequence[str], spare: Sequence[str] = (), flags: Sequence[str] = ()) -> np.ndarray:
         """Return the columns `names`, finite, `[rows, len(names)]`; raises FileError with the line and the column.
 
         Columns that are `spare` too hold NaN where a cell is no finite number, `flags` may hold true and false.

@@ -88,8 +88,8 @@ class SlidingBody(ByValue):
         world axes; the body's axes are at `angle` [rad], best half-way through the step. Leading axes broadcast.
 
         `support_velocity` `[..., 3]` is the twist of what the patches lie on, at the place of the centre of mass at the
-        start of the step; None if it stands still. A body that is held keeps its place on it, at any spin, if the caller
-        moves it by `dt V'`: patches slide relative to `geometry.chord(support_velocity, dt)`.
+        start of the step; None if it stands still. A body that is held keeps its place on it, at any spin, if the
+        caller moves it by `dt V'`: patches slide relative to `geometry.chord(support_velocity, dt)`.
 
         Raises InvalidValueError for shapes that do not fit, numbers that are not finite, and a load or time below zero;
         SolverError if a body did not converge (see `CoupledPatches.step`): its `step` has all bodies, those in

@@ -69,8 +69,14 @@ def wheel(shape: str, frame: str, velocity: list[float], centre: str = "auto") -
 
 @pytest.mark.parametrize(
     ("shape", "frame"),
-    [("sphere", "hub"), ("sphere", "tread"), ("cylinder", "hub"), ("cylinder", "contact"), ("capsule", "hub")]
-    + [("ellipsoid", "hub")],
+    [
+        ("sphere", "hub"),
+        ("sphere", "tread"),
+        ("cylinder", "hub"),
+        ("cylinder", "contact"),
+        ("capsule", "hub"),
+        ("ellipsoid", "hub"),
+    ],
 )
 def test_a_wheel_thrown_without_spin_rolls_on(shape, frame):
     """v = v0/(1 + I/(m r^2)): 5/7 for a sphere, 2/3 for a solid cylinder."""

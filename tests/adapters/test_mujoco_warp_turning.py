@@ -5,7 +5,6 @@ Worlds differ in the spin: 1, 2, 3 and 10 rad/s.
 
 from __future__ import annotations
 
-import logging
 from typing import Any
 
 import numpy as np

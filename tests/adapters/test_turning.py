@@ -17,7 +17,7 @@ mujoco = pytest.importorskip("mujoco")
 
 from planarfriction.adapters.mujoco import Friction, PatchContact, prepare  # noqa: E402
 from planarfriction.formulas import turning_mean  # noqa: E402
-from tests.support.turning import G, SPEEDS, STEPS, in_mjx, in_mujoco, turning  # noqa: E402
+from tests.support.turning import SPEEDS, STEPS, G, in_mjx, in_mujoco, turning  # noqa: E402
 
 pytestmark = pytest.mark.mujoco
 

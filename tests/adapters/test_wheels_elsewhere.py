@@ -139,7 +139,7 @@ def test_wheels_roll_on_and_a_box_topples(host):
 
 
 FAULTS = {
-    "beside": ('pos="0.5 0 0"', 'contact forces act beyond the patch: put the site into the contact, or use centre='),
+    "beside": ('pos="0.5 0 0"', "contact forces act beyond the patch: put the site into the contact, or use centre="),
     "upright": ('euler="0 90 0"', "its x axis lies along the normal of the contact, where its y axis takes its place"),
 }
 

@@ -239,10 +239,17 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "joints.Drive.duty": {"error": 0.1 * TIMES},
     "joints.Drive.voltage": {"duty": 0.1 * TIMES},
     "joints.JointFriction": {
-        "load_motor": 0.1, "load_external": 0.1, "sigma_2": 0.1, "asymmetry": 0.1, "viscous_asymmetry": 0.05,
+        "load_motor": 0.1,
+        "load_external": 0.1,
+        "sigma_2": 0.1,
+        "asymmetry": 0.1,
+        "viscous_asymmetry": 0.05,
     },
     "joints.JointFriction.along": {
-        "time": TIMES, "speed": 0.1 * TIMES, "tau_motor": 0.1 * TIMES, "tau_external": 0.1 * TIMES,
+        "time": TIMES,
+        "speed": 0.1 * TIMES,
+        "tau_motor": 0.1 * TIMES,
+        "tau_external": 0.1 * TIMES,
     },
     "joints.JointLog": {
         **{name: np.sin(20.0 * TIMES) for name in ("q", "torque", "dq", "goal", "voltage", "external")},

@@ -16,7 +16,9 @@ def read(tmp_path, heading, *columns, separator=","):
     return JointLog.from_csv(file)
 
 
-@pytest.mark.parametrize("heading", ["t,q,torque", "__time,position,effort", "time_s,angle,tau", "Time [s],theta [rad],torque [N m]"])
+@pytest.mark.parametrize(
+    "heading", ["t,q,torque", "__time,position,effort", "time_s,angle,tau", "Time [s],theta [rad],torque [N m]"]
+)
 def test_columns_of_other_tools_are_read(heading, tmp_path):
     log = read(tmp_path, heading, T, np.sin(T), np.cos(T))
     np.testing.assert_allclose(log.torque, np.cos(T))

@@ -80,7 +80,9 @@ def test_a_load_is_found_beside_gravity():
     hanging = Numbers(inertia=0.13, gravity=1.962, load=0.2, mu_c=0.3, sigma_2=0.1)
     fit = identify_joint(logs_of(hanging), Plant())
     assert {"gravity", "load"} <= set(fit.terms) <= {"gravity", "load", "bristles"}
-    assert fit.values["load"] == pytest.approx(0.2, rel=0.01) and holds(fit, "gravity", 1.962) and holds(fit, "mu_c", 0.3)
+    assert (
+        fit.values["load"] == pytest.approx(0.2, rel=0.01) and holds(fit, "gravity", 1.962) and holds(fit, "mu_c", 0.3)
+    )
 
 
 def test_an_external_torque_belongs_to_the_load_and_not_to_friction():
@@ -103,7 +105,9 @@ def test_a_term_that_was_asked_for_and_does_not_show_reaches_no_law(tmp_path):
 
 
 def test_terms_of_goals_are_refused_for_torques():
-    with pytest.raises(InvalidValueError, match="terms must be some of gravity, .* for logs of a torque, got directional"):
+    with pytest.raises(
+        InvalidValueError, match=r"terms must be some of gravity, .* for logs of a torque, got directional"
+    ):
         identify_joint(torque_log(), Plant(), terms=("load", "directional"))
 
 

@@ -58,7 +58,7 @@ REFUSED = {
     ),
     "one direction": (lambda: logs(kind="one way"), Plant(), "move in both directions"),
     "a torque that never changes": (
-        lambda: logs(lambda t, q, torque: (t, q, 0.0 * torque + 0.3)), Plant(), "torque of log 0 must vary, got 0.3 N m",
+        lambda: logs(lambda t, q, torque: (t, q, 0.0 * torque + 0.3)), Plant(), "torque of log 0 must vary, got 0.3",
     ),
     "a torque that freezes": (
         lambda: logs(lambda t, q, torque: (t, q, frozen(t, torque))), Plant(), "change while the joint moves",

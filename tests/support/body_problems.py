@@ -1,4 +1,4 @@
-"""Random steps of bodies on patches: 1 mg to 1000 t, 10 us to 1 s, one to six patches of all kinds, at rest and in slip.
+"""Random steps of bodies on patches: 1 mg to 1000 t, 10 us to 1 s, one to six patches of all kinds, stuck or slipping.
 
 Loads are a hundredth to ten thousand times the weight, pushes up to some tens of times the load.
 """
@@ -123,7 +123,7 @@ def tally(table: np.ndarray, mass: float, dt: np.ndarray, lost: np.ndarray) -> N
 
 
 def shown(table: np.ndarray) -> str:
-    """Return a table as text: a line for each decade of mass, failures of all steps for each decade of the time step."""
+    """Return a table as text: a line for each decade of mass, failures of all steps by decades of the time step."""
     lines = [" " * 12 + "".join(f"{f'1e{d} s':>16}" for d in range(-5, 0))]
     for m, row in enumerate(table):
         lines.append(f"1e{m - 6:<3} kg    " + "".join(f"{f'{lost} of {count}':>16}" for count, lost in row))

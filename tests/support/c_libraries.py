@@ -78,8 +78,8 @@ void run_bodies(int n, const friction_body *body, friction_real *state, friction
     int i;
     for (i = 0; i < n; ++i) {
         friction_real *z = state + (long)i * FRICTION_PATCHES * FRICTION_STATES;
-        codes[i] = friction_body_step(&friction_default, body, z, twist + 3 * i, load + (long)i * FRICTION_PATCHES, dt[i],
-            push + 3 * i, wrench + 3 * i);
+        codes[i] = friction_body_step(&friction_default, body, z, twist + 3 * i, load + (long)i * FRICTION_PATCHES,
+            dt[i], push + 3 * i, wrench + 3 * i);
     }
 }
 

@@ -27,6 +27,7 @@ from planarfriction.identify import (
     identify_lugre,
     identify_motion,
 )
+from planarfriction.joints import JointLog
 from planarfriction.online import FrictionObserver, Hinge, Hold, Measurement, Sensors, SlideBy, TurnBy
 from planarfriction.planning import (
     Pusher,

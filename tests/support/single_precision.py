@@ -28,7 +28,9 @@ PATCHES = {
     "many points": pf.ContactPatch.points(_grid(9, 9)),
     "few discs": pf.ContactPatch.disc(0.01).discs(8),
     "24 discs": pf.ContactPatch.rectangle(0.02, 0.02).discs(24),
-    "discs with a metric": pf.ContactPatch.rectangle(0.02, 0.01).with_friction_metric([[1.0, 0.2], [0.2, 1.5]]).discs(12),
+    "discs with a metric": pf.ContactPatch.rectangle(0.02, 0.01)
+    .with_friction_metric([[1.0, 0.2], [0.2, 1.5]])
+    .discs(12),
     "steep pressure": pf.ContactPatch.rectangle(0.04, 0.01, (9, 5), pressure=pf.LinearGradient((8.0, -20.0))),
 }
 

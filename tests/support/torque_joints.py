@@ -162,9 +162,7 @@ def draw(seed: int) -> Joint:
     filtered = rng.choice([0.0, 0.004], p=[0.7, 0.3])
     late = rng.choice([0.0, rng.uniform(0.002, 0.02)], p=[0.7, 0.3])
     gain, noise = rng.choice([1.0, 1.1], p=[0.8, 0.2]), 0.01 * rng.uniform(0.5, 2.0)
-    numbers = Numbers(
-        inertia, moment, hangs, mu_c, rise, v_s, sigma_2, sigma_0, sigma_1, share, uneven, uneven_viscous
-    )
+    numbers = Numbers(inertia, moment, hangs, mu_c, rise, v_s, sigma_2, sigma_0, sigma_1, share, uneven, uneven_viscous)
     sensors = Sensors(rate, bits, noise, filtered, late, gain)
     logs = [recorded(numbers, kind, sensors, rng, gap) for kind in ("sines", "levels", "sines", "ripples")]
     terms = frozenset(name for name, there in zip(NAMES, SETS[seed % len(SETS)], strict=True) if there)

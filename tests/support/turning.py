@@ -80,10 +80,10 @@ def _yaw(quaternions: np.ndarray) -> np.ndarray:
 def turning(support: str, w: float, dt: float, integrator: str = "Euler") -> Turning:
     """Return a box on a "surface" or a "table", in the gripper of an "arm", or on a "car", that turn by w [rad/s]."""
     grip, mu = support == "arm", 0.3 if support in ("surface", "table") else 1.0
-    x, y = (0.5, 0.0) if grip else (min(0.25, 0.7 * mu * G / w**2), 0.0)
+    x = 0.5 if grip else min(0.25, 0.7 * mu * G / w**2)
     middle = np.zeros(2)
     if support == "car":  # on a circle of its own, about the axis from which the box is that far
-        middle, (x, y) = np.array([0.0, -0.6 * x]), (0.8 * x, 0.0)
+        middle, x = np.array([0.0, -0.6 * x]), 0.8 * x
     body = {"surface": SURFACE, "table": TABLE, "car": CAR}.get(support, "") + ON_TOP
     text = (ARM if grip else body).format(w=w, x=x, y=middle[1])
     motor = '<actuator><motor joint="press"/></actuator>' if grip else ""

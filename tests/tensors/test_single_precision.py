@@ -30,6 +30,7 @@ def in_torch(patch, precision: str):
 
     return of_numbers
 
+
 def in_jax(patch, precision: str):
     """Return a function of numbers: derivatives of wrenches by twist, load and moments, and the wrenches."""
     jax = pytest.importorskip("jax", reason="needs the extra [jax]")
@@ -45,6 +46,7 @@ def in_jax(patch, precision: str):
 
     return of_numbers
 
+
 def pulled_by(model):
     """Return a function of one contact: the wrench of a step, twice."""
 
@@ -53,6 +55,7 @@ def pulled_by(model):
         return wrench, wrench
 
     return pulled
+
 
 def compare(front, name: str, count: int, seed: int) -> tuple[float, float]:
     """Return the largest errors of wrenches and of derivatives of a patch in single precision."""
@@ -70,16 +73,18 @@ def compare(front, name: str, count: int, seed: int) -> tuple[float, float]:
         bent = max(bent, (off / np.maximum(size, 0.1 * size.max())).max())
     return single.error(model, inputs, wrenches), bent
 
+
 @pytest.mark.torch
 @pytest.mark.parametrize("name", single.PATCHES)
 def test_steps_of_torch(name):
     wrench, slope = compare(in_torch, name, 200, seed=1)
     assert wrench < LIMIT and slope < BENDING
 
+
 @pytest.mark.torch
 @pytest.mark.parametrize("name", ["few discs", "table"])
 def test_rollouts_and_gradients_of_torch(name):
-    """States, wrenches and gradients of six steps, by all methods; gradients have the steep slopes of stiff bristles."""
+    """States, wrenches and gradients of six steps, by all methods; gradients have steep slopes of stiff bristles."""
     torch = pytest.importorskip("torch", reason="needs the extra [torch]")
     import planarfriction.torch as pt
 
@@ -105,6 +110,7 @@ def leaves(value):
 def test_steps_of_jax(name):
     wrench, slope = compare(in_jax, name, 200, seed=2)
     assert wrench < LIMIT and slope < BENDING
+
 
 FRONTS = [pytest.param(in_torch, marks=pytest.mark.torch), pytest.param(in_jax, marks=pytest.mark.jax)]
 

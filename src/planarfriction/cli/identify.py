@@ -260,7 +260,12 @@ def _known(
 @click.option("--gain", type=float, default=1.0, show_default=True, help="Duty per rad at a gain of 1.")
 @click.option("--supply", type=float, help="Voltage of the servo in V.")
 @click.option("--sag", type=float, default=0.0, show_default=True, help="Voltage lost at full duty in V.")
-@click.option("--terms", default="auto", show_default=True, help="gravity,stribeck,load,bristles,asymmetry for torques; load,stribeck,bristles,directional for goals and voltages; none; or auto.")
+@click.option(
+    "--terms",
+    default="auto",
+    show_default=True,
+    help="gravity,stribeck,load,bristles,asymmetry for torques, load,stribeck,bristles,directional for goals; or auto.",
+)
 @click.option("--out", type=FILE, help="Folder for the estimates (JSON), the picture (PNG) and C source.")
 def joint(
     logs: tuple[Path, ...],

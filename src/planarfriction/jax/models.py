@@ -31,7 +31,8 @@ class DistributedModel(FrictionPytree, CellsModel):
     """The distributed model (`planarfriction.DistributedModel`) as a pytree, for small patches.
 
     `W = sum w_i f_N [t_i ; rho_i x t_i]`. State: deflections `[2, N]` [m]. Leaves: the law's parameters, the cells'
-    positions, the digits of these that single precision leaves out, and weights. A patch whose shape depends on the load keeps that of `normal_force` [N].
+    positions, the digits of these that single precision leaves out, and weights. A patch whose shape depends on the
+    load keeps that of `normal_force` [N].
 
     Raises InvalidValueError for a parameter that breaks its rule.
     """

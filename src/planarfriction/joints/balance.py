@@ -134,7 +134,9 @@ class _Scaled:
         }  # fmt: skip
         self.names = names
         self.scale = np.array([1.0 if each in FACTORS else max(abs(values[each]), least[each]) for each in names])
-        self.start = np.array([np.log(values[each]) if each in FACTORS else values[each] for each in names]) / self.scale
+        self.start = (
+            np.array([np.log(values[each]) if each in FACTORS else values[each] for each in names]) / self.scale
+        )
 
     def values(self, x: np.ndarray) -> dict[str, float]:
         """Return numbers by name, within their ranges."""
@@ -159,8 +161,8 @@ def refine(
 ) -> Refined:
     """Minimise the errors of the model, softened by Huber's function, with a delay or a low pass of the torque.
 
-    Rows near reversals and others count by the `scatter` of each, which is estimated unless it is given. Standard errors
-    are those of a sandwich over blocks, whose errors may be correlated.
+    Rows near reversals and others count by the `scatter` of each, which is estimated unless it is given. Standard
+    errors are those of a sandwich over blocks, whose errors may be correlated.
     """
     from scipy.optimize import least_squares
 

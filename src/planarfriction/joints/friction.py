@@ -172,8 +172,8 @@ def to_mjcf(
 def apply_to_spec(friction: JointFriction, spec: Any, joint: str, *, armature: float | None = None) -> None:
     """Set the friction of a joint of a `mujoco.MjSpec`: damping and frictionloss, or the `lugre` of its dcmotor.
 
-    Raises InvalidValueError for a joint that is not there, for bristles without a dcmotor on the joint, and for friction
-    that MuJoCo cannot hold, as `to_mjcf`.
+    Raises InvalidValueError for a joint that is not there, for bristles without a dcmotor on the joint, and for
+    friction that MuJoCo cannot hold, as `to_mjcf`.
     """
     friction = _representable(friction)
     found = spec.joint(validation.text("joint", joint))
@@ -196,8 +196,8 @@ def apply_to_spec(friction: JointFriction, spec: Any, joint: str, *, armature: f
 def set_level(friction: JointFriction, model: Any, data: Any, dof: int, motor: int | None = None) -> None:
     """Set the level of a MuJoCo model to the load of the step before; call it in front of each `mj_step`.
 
-    `dof` is that of the joint, `motor` the number of its dcmotor, of gear 1, if the friction has bristles. Bristles that
-    a falling level has left beyond their limit, `mu_s/sigma_0`, come back onto it.
+    `dof` is that of the joint, `motor` the number of its dcmotor, of gear 1, if the friction has bristles. Bristles
+    that a falling level has left beyond their limit, `mu_s/sigma_0`, come back onto it.
     """
     outside = data.qfrc_applied[dof] - data.qfrc_bias[dof]
     if motor is None:

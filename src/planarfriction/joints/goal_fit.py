@@ -81,7 +81,7 @@ class Trial:
         return float(falls.mean()), float(scatter), [float(each.mean()) for each in halves]
 
     def shifts(self, others: Sequence[Mapping[str, float]]) -> dict[str, float]:
-        """Compute the largest shift of each estimate to those of other fits, which missing terms move by other amounts."""
+        """Compute the largest shift of each estimate to those of other fits, which missing terms move differently."""
         return {name: max(abs(each[name] - value) for each in others) for name, value in self.values.items()}
 
     @property
@@ -190,6 +190,7 @@ def improves(more: Trial, less: Trial) -> bool:
     gain, scatter, halves = more.gains(less)
     return gain > scatter and min(gain, *halves) > LEAST
 
+
 VAGUE = 0.5
 """Standard error over the value from which on the number of a term is not known."""
 
@@ -211,9 +212,7 @@ def _is_vague(
     return intervals[name] is None or not spread[name] < VAGUE * values[name]
 
 
-def fit_goals(
-    base: Problem, chosen: Sequence[str], auto: bool, progress: Callable[[str], None]
-) -> JointFit:
+def fit_goals(base: Problem, chosen: Sequence[str], auto: bool, progress: Callable[[str], None]) -> JointFit:
     """Fit the positions that runs from goal or voltage give, with the `chosen` terms, or with those that they ask for.
 
     Raises InvalidValueError for logs that no run from their goals resembles.

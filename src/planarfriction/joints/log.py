@@ -285,7 +285,9 @@ def _check_sensors(log: JointLog) -> None:
     before = speed[max(first - 5, 0)]
     if first > 5 and seconds > FROZEN and before > SUDDEN * speed.max():
         found = f"still for {seconds:.2g} s from t = {log.time[first]:g} s on, right after {before:.2g} rad/s"
-        raise InvalidValueError(f"q of {log.name}", "come to rest gradually (a dead sensor, or a stop: cut it out)", found)
+        raise InvalidValueError(
+            f"q of {log.name}", "come to rest gradually (a dead sensor, or a stop: cut it out)", found
+        )
 
 
 def _longest_run(values: np.ndarray) -> tuple[int, int]:

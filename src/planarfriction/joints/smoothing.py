@@ -115,9 +115,7 @@ def derivatives(log: EvenLog, width: float) -> tuple[np.ndarray, np.ndarray, np.
     bend = (x**2 - mean @ x**2) * mean
     bend *= 2.0 / (bend @ x**2) / log.dt**2
     first = log.angle[0]
-    angle, speed, acceleration = (
-        correlate1d(log.angle - first, each, mode="nearest") for each in (mean, slope, bend)
-    )
+    angle, speed, acceleration = (correlate1d(log.angle - first, each, mode="nearest") for each in (mean, slope, bend))
     return angle + first, speed, acceleration
 
 

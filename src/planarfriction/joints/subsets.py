@@ -105,9 +105,7 @@ def _sums(rows: Sequence[Rows], grid: Grid, loads: list[np.ndarray]) -> np.ndarr
     for bent in sliding:
         level, falls, load = bent[:, :1], bent[:, 1 : 1 + speeds], bent[:, 1 + speeds :]
         for i in range(speeds):
-            table = np.column_stack(
-                [linear[:, :3], level, linear[:, 3:5], falls[:, i], load, linear[:, 5:], torques]
-            )
+            table = np.column_stack([linear[:, :3], level, linear[:, 3:5], falls[:, i], load, linear[:, 5:], torques])
             sums.append([table[mask].T @ table[mask] for mask in masks])
     size = len(COLUMNS) + len(DELAYS)
     return np.array(sums).reshape(len(sliding), speeds, len(masks), size, size)

@@ -189,7 +189,7 @@ def _as_good(fit: Refined, best: Refined) -> bool:
 
 
 def seen(data: Data, fit: Refined, told: Sequence[str]) -> tuple[str, ...]:
-    """Return the terms that a fit shows: with their sign, within the range of the logs, clear of zero, and not small."""
+    """Return the terms that a fit shows: of their sign, within the range of the logs, clear of zero, and not small."""
     return tuple(term for term in fit.terms if term in told or not doubt(data, fit, term))
 
 
@@ -265,20 +265,20 @@ def _lagging(data: Data, fit: Refined) -> Refined:
 
 
 def _low_passed_error(data: Data, fit: Refined, time_constant: float) -> np.ndarray:
-    """Compute the error of a fit with a delay behind a low pass, which removes as much of the angle's noise as another."""
+    """Compute the error of a fit with a delay behind a low pass, which removes as much of the angle's noise."""
     found = predict(data.rows, fit.values, fit.terms)
     return np.concatenate(
         [
-            rows.low_passed(torque - np.interp(rows.time + fit.values["delay"], rows.even.time, rows.torque), time_constant)[
-                rows.fitted
-            ]
+            rows.low_passed(
+                torque - np.interp(rows.time + fit.values["delay"], rows.even.time, rows.torque), time_constant
+            )[rows.fitted]
             for torque, rows in zip(found, data.rows, strict=True)
         ]
     )
 
 
 def _widened(data: Data, fit: Refined) -> Refined:
-    """Add to the spreads what another kernel, and even weights, move: a term that reversals alone support moves then."""
+    """Add to the spreads what another kernel and even weights move: a term that reversals alone support moves then."""
     late = "low_pass" if "low_pass" in fit.values else "delay"
     even = np.full(2, fit.scatter.max())
     others = [

@@ -149,7 +149,9 @@ def _on_terms(data: Data, fit: Refined, gains: Mapping[str, float]) -> Iterator[
 
 def _on_rest(rest: Rest) -> Iterator[Verdict]:
     if rest.share > INCOMPLETE:
-        text = f"{rest.share:.0%} of friction is not explained, {rest.error / max(rest.noise, 1e-12):.0f} times the noise"
+        text = (
+            f"{rest.share:.0%} of friction is not explained, {rest.error / max(rest.noise, 1e-12):.0f} times the noise"
+        )
         yield Verdict("fit", False, f"{text}: backlash, heat, place or another load; intervals need not hold the truth")
 
 
@@ -164,7 +166,9 @@ def _on_scale(
     if plant.inertia is not None and arm is not None:
         known["inertia"] = plant.inertia + (plant.mass + arm / 3.0) * plant.length**2
     if "gravity" in known and "gravity" not in fit.terms:
-        yield Verdict("gravity", False, f"{known['gravity']:.3g} N m of gravity were told, and do not show in the torque")
+        yield Verdict(
+            "gravity", False, f"{known['gravity']:.3g} N m of gravity were told, and do not show in the torque"
+        )
     if "gravity" in fit.terms and not plant.mass:
         text = f"{values['gravity']:.3g} N m of gravity show, hanging at {values['offset']:.3g} rad; none was told"
         yield Verdict("gravity", False, text)

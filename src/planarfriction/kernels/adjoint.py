@@ -57,7 +57,6 @@ from planarfriction.kernels.step_control import fitted, judged
 from planarfriction.kernels.tangent import MOST, Drives, partial_of, wrench_by_input
 from planarfriction.kernels.vectors import Vector, applied_back, dot, plus, put, three, times
 
-
 PER_STEP = 2.0
 """Most steps of the adjoint for each step of the motion, on average; half of one is usual."""
 

@@ -58,7 +58,7 @@ class Shadow:
         self._solve = dposv  # the one of NumPy takes as long as a contact
         self._world = self.plant.world_frame()
         self._seen: list[Any] = [None] * len(placed)
-        """Maps `[3, 6]` of motions to twists, and places of the patches on both of their bodies, as `rows` finds them."""
+        """Maps `[3, 6]` of motions to twists, and places of the patches on both bodies, as `rows` finds them."""
         self._points: list[tuple[int, int, float]] = []
         self._surfaces: list[tuple[int, int, float]] = []
         self._pressed: list[list[tuple[float, list[float]]]] = []

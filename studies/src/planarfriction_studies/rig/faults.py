@@ -147,7 +147,8 @@ class Batch:
         for name in ("normal_force", "centre", "angle", "slip"):
             setattr(gripper, name, getattr(gripper, name)[index])
         gripper._past = gripper._past[:, index]
-        arrays = "mass inertia centre mu_c radius delay bias tap tap_time tilt tilt_time".split()
+        arrays = ["mass", "inertia", "centre", "mu_c", "radius", "delay", "bias"]
+        arrays += ["tap", "tap_time", "tilt", "tilt_time"]
         gripper.parts = dataclasses.replace(gripper.parts, **{n: getattr(gripper.parts, n)[index] for n in arrays})
         controller.state, controller.observer.state = controller.state[index], controller.observer.state[index]
         self.rows = {name: each[index] for name, each in self.rows.items()}

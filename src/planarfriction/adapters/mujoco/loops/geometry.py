@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 
+from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call_c
 from planarfriction.compiler.memory import at, doubles, integers, integers32

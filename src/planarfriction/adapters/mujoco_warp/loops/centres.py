@@ -24,9 +24,7 @@ def speed_of(host: Host, frames: Frames, w: int, p: int) -> float:
 
 
 @wp.kernel(enable_backward=False)
-def follow_centres(
-    patches: Patches, host: Host, frames: Frames, problem: Problem, parameters: wp.array2d(dtype=float)
-):
+def follow_centres(patches: Patches, host: Host, frames: Frames, problem: Problem, parameters: wp.array2d(dtype=float)):
     """Move origins towards the centres of the contact forces, as far as bodies move on each other, and note them.
 
     Note patches that lie beside these forces, too.
