@@ -102,9 +102,9 @@ def test_bad_numbers(change):
 
 
 def test_a_step_that_does_not_converge_says_so():
-    """Single precision ends below the speed of a body of 1e-30 kg under 1e8 N."""
+    """Single precision ends below the speed of a body of 1e-35 kg under 1e6 N."""
     made = library("few", "float")
     state, twist, wrench, code = step(
-        made, (1e-30, 1e-30, 0.0, 0.0, 0.0), made.model.rest(), (0.1, 0.0, 0.0), 1e8, 1.0, (1e10, 2.0, 3.0)
+        made, (1e-35, 1e-35, 0.0, 0.0, 0.0), made.model.rest(), (0.1, 0.0, 0.0), 1e6, 1.0, (1e6, 2.0, 3.0)
     )
     assert code == NOT_CONVERGED and not state.any() and twist[0] == np.float32(0.1) and np.all(wrench == 7.0)

@@ -142,7 +142,8 @@ def _newton(patches: Patches, p: Problem, keep_loads: bool, falling: bool) -> bo
     n = 3 * patches.count
     for i in range(n):
         gap = _applied(p.response, i, n, p.wrench, p.twist_0[i]) - p.twist[i]
-        p.gap[i] = gap if abs(gap) > NOISE * _size(patches, p, i) else 0.0
+        rounded = abs(gap) <= NOISE * abs(p.twist_0[i]) or abs(gap) <= NOISE * _size(patches, p, i)
+        p.gap[i] = 0.0 if rounded else gap
     for k in range(patches.count):
         slopes = at(p.slopes, 9 * k)
         for i in range(9):
