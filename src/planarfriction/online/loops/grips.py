@@ -171,6 +171,8 @@ def _follow(c, e, least_load, quantum, turns):
     if e.normal_force != c.felt:
         c.felt, c.sent, c.still = e.normal_force, c.grip, 0.0
     frozen = c.still >= PAUSE and abs(c.grip - c.sent) > FOLLOWS * c.sent
+    if frozen:
+        c.sent = 0.0  # until the sensor says something else
     bears = e.seen > 0 and not frozen and (c.age < SETTLED or c.pulls >= HALF * c.weighed)
     c.mute = 0.0 if bears else c.mute + dt
     if e.seen > 0:  # filtered as the gauge is, else a grip that falls fast seems to lose load
