@@ -144,7 +144,11 @@ def test_loops_and_calls_end(name):
     counts = r"(\w+) = [^;<>]+; (?:\1 < [^;]+; \+\+\1|\1 > [^;]+; --\1)"
     assert len(loops) > 5 and all(re.fullmatch(counts, each) for each in loops)
     ends = {end for each in loops for end in re.findall(r"\b[a-zA-Z]\w*", each.split(";")[1])[1:]}
-    assert all(re.fullmatch(r"FRICTION_\w+|[cknr]|count", each) for each in ends)  # counters of outer loops, and n
+    # counters of outer loops, n, and the iterations of the step of a body, which its callers count by numbers
+    assert all(re.fullmatch(r"FRICTION_\w+|[cknr]|count|most", each) for each in ends)
+    assert all(re.fullmatch(r"\(\w+ \? \d+ : \d+\)", each) for each in re.findall(r"int most = ([^;]+);", code))
+    searches = re.findall(r"(?:find|search)_of_coupling\(p, (?:tolerance, )?([^,]+), [^;{]*\);", code)
+    assert searches and all(re.fullmatch(r"\d+|most|\(\d+ \* most\)", each) for each in searches)
     counted = "|".join(re.findall(r"(\w+)\([^()]*, int count\)", code)) or "none"
     for call in re.findall(rf"^ +(?:{counted})\((.*)\);", code, re.MULTILINE):
         assert re.fullmatch(r"\d+|n", call.rpartition(", ")[2]), call

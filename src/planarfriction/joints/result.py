@@ -64,7 +64,7 @@ class JointFit:
     errors: np.ndarray
     """Mean absolute error of each group [rad] or [N m]: that of a fit without it for logs without a torque."""
     baseline_errors: np.ndarray
-    """Same for Coulomb and viscous friction alone."""
+    """Mean absolute errors [rad] or [N m] for Coulomb and viscous friction alone."""
     series: tuple[Series, ...]
     """Course of each log as measured and fitted."""
     unclear: Mapping[str, str]

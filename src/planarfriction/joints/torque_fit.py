@@ -296,14 +296,3 @@ def _widened(data: Data, fit: Refined) -> Refined:
             least = EXACT * abs(value)
         spread[name] = float(np.sqrt(error**2 + np.sum(np.square(moves)) + least**2))
     return fit._replace(spread=spread)
-
-
-def residual(data: Data, fit: Refined) -> np.ndarray:
-    """Return model less measured torque of each log at its fitted rows."""
-    return np.split(fit.error, np.cumsum([len(each.fitted) for each in data.rows])[:-1])
-
-
-def modelled(data: Data, fit: Refined) -> list[np.ndarray]:
-    """Compute the model's torque of each log at its fitted rows [N m]."""
-    found = predict(data.rows, fit.values, fit.terms)
-    return [torque[rows.fitted] for torque, rows in zip(found, data.rows, strict=True)]
