@@ -107,7 +107,7 @@ def test_spreads_intervals_and_words_have_their_numbers():
     assert kept.jackknife["mu_c"] == pytest.approx(0.02 / np.sqrt(3.0), rel=1e-12)
     far = 4.30265 * 0.02 / np.sqrt(3.0)
     assert kept.interval("mu_c", 0.0) == pytest.approx((1e-9, 0.02 + far), rel=1e-5)  # not below the least value
-    assert kept.interval("mu_c", 0.03)[1] == pytest.approx(0.02 + np.hypot(far, 0.03), rel=1e-5)
+    assert kept.interval("mu_c", 0.03)[1] == pytest.approx(0.02 + np.hypot(far, 4.30265 * 0.03), rel=1e-5)
     assert kept.interval("sigma_0", 0.0) == pytest.approx(100.0 * np.exp([-50.0 * far, 50.0 * far]), rel=1e-4)
     gain, scatter, halves = kept.gains(Trial(None, {}, (), {}, less, less, ()))
     assert (gain, scatter) == pytest.approx((0.3, 2.91999 * 0.1 / np.sqrt(3.0)), rel=1e-5) and halves == []

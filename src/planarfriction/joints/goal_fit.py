@@ -100,7 +100,7 @@ class Trial:
         from scipy.stats import t
 
         value, kind = self.values[name], PARAMETERS[name]
-        reach = float(np.hypot(t.ppf(0.975, len(self.folds) - 1) * self.jackknife[name], shift))
+        reach = float(t.ppf(0.975, len(self.folds) - 1) * np.hypot(self.jackknife[name], shift))
         if kind.logarithmic:
             if min(np.log(value / kind.low), np.log(kind.high / value)) < AT_BOUND:
                 return None
