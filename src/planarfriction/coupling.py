@@ -103,7 +103,7 @@ class CoupledPatches(ByValue):
     """Friction models with compiled steps, one for each patch."""
 
     def __post_init__(self) -> None:
-        if isinstance(self.models, FrictionModel) or not isinstance(self.models, Iterable):
+        if isinstance(self.models, FrictionModel | np.ndarray) or not isinstance(self.models, Iterable):
             raise InvalidValueError("models", "be a list of friction models, one for each patch", self.models)
         self._set(models=tuple(self.models))
         for model in self.models:

@@ -13,7 +13,7 @@ def test_it_gives_what_was_recorded(name):
 
 
 @pytest.mark.mujoco
-@pytest.mark.parametrize("name", ["mujoco", "called"])
+@pytest.mark.parametrize("name", ["called"])
 def test_with_mujoco_it_gives_what_was_recorded(name):
     if name not in SUBJECTS:
         pytest.skip("needs mujoco")

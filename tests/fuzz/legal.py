@@ -35,6 +35,7 @@ SKIPPED = {
     "planning.plan_push": "plans for seconds; tests/planning/test_pushing.py attacks it",
     "identify.identify_lugre": "fits for seconds; its logs are attacked as files",
     "identify.current_estimate": "takes what a fit returns",
+    "joints.identify_joint": "fits for a second; tests/joints attacks it",
     "joints.apply_to_spec": "takes a model of MuJoCo; see tests/joints/test_joint_hosts.py",
     "joints.set_level": "takes a model of MuJoCo; see tests/joints/test_joint_hosts.py",
     "sweeps.finished_runs": "reads a folder of `sweep`; tests/sweeps attacks it",
@@ -55,7 +56,7 @@ are checked where they are used."""
 PROTOCOL = """
     direction direction_slope sums lever_coordinates packed relative ever_loaded only repeated shape_at shapes_at
     parts_at pieces check_non_negative packed_parts plan bristle_traction functions
-    contact frame_of pressures place
+    contact frame_of labelled pressures place
 """
 """Methods that the library calls, with what it has checked."""
 
@@ -202,7 +203,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
         for name in (f"{each}.update" for each in MEASURING)
     },
     **{
-        f"online.{name}": {"observer": Fresh(lambda: objects()["FrictionObserver"]), "goal": 0.02}
+        f"online.{name}": {"observer": Fresh(lambda: objects()["FrictionObserver"]), "goal": 0.02, "start": 20.0}
         for name in ("Hold", "Hinge", "SlideBy", "TurnBy")
     },
     "PressureMaps": {"values": np.ones((2, 3))},

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import os
 import re
-import shutil
 import tempfile
 import zlib
 from collections.abc import Callable
@@ -302,8 +301,8 @@ def _text(words: str) -> dict[str, Any]:
     return {"blocks": " ".join(f"x{each:x}" for each in blocks), "numbers": numbers}
 
 
-NEEDED = {torch: "torch", jax: "jax", warp: "warp-lang", mujoco: "mujoco", drake: "drake"}
-ENGINES = {"mujoco": "4.0.", "drake": "1.51."}
+NEEDED = {torch: "torch", jax: "jax", warp: "warp-lang", drake: "drake"}
+ENGINES = {"drake": "1.51."}
 """Versions of engines whose steps are recorded: others find other contact forces."""
 
 
@@ -316,6 +315,3 @@ def _found(package: str) -> bool:
 
 SUBJECTS = {each.__name__: each for each, package in NEEDED.items() if _found(package)}
 """Name of a file -> function that computes what it holds, for packages that are here."""
-
-if shutil.which("gcc"):
-    SUBJECTS["exported"] = exported

@@ -365,6 +365,6 @@ SUBJECTS: dict[str, Callable[[], Any]] = {
     "replayed": replayed,
     "rig": rig,
     "referee": referee,
-    **({"mujoco": mujoco, "called": commands} if importlib.util.find_spec("mujoco") else {}),
+    **({"called": commands} if importlib.util.find_spec("mujoco") else {}),
 }
 """Name of a file -> function that computes what it holds."""

@@ -30,7 +30,7 @@ SUBJECTS: dict[str, Callable[[], Any]] = {
     "fits": each_of(fits.SOURCES),
     "surfaces": each_of(surfaces.SOURCES),
     **{each.__name__: each for each in (
-        computed.patches, computed.pushes, computed.grips, computed.online, computed.scenes, computed.films,
+        computed.patches, computed.grips, computed.scenes, computed.films,
         replies.replies, replies.swept, replies.explored, refused.refused,
     )},
     **bridged.SUBJECTS,

@@ -197,8 +197,10 @@ VAGUE = 0.5
 
 def _check_related(problem: Problem, kept: Trial) -> None:
     """Raise InvalidValueError if runs from the goals resemble none of the logs."""
-    deviation = float(np.mean([np.abs(log.q - log.q.mean()).mean() for log in problem.logs]))
-    error = float(problem.costs(kept.values).mean())
+    runs = zip(problem.simulated(kept.values, problem.logs), problem.logs, strict=True)
+    error, deviation = np.median(
+        [[np.abs(run[:, 0] - log.q).mean(), np.abs(log.q - log.q.mean()).mean()] for run, log in runs], axis=0
+    )
     if error > UNRELATED * deviation:
         rule = "follow from goal or voltage: check units, signs, gains, and that all belong to one joint"
         found = f"{error:.2g} rad left of a mean swing of {deviation:.2g} rad about its mean"

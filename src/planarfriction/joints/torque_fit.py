@@ -204,7 +204,11 @@ def doubt(data: Data, fit: Refined, term: str) -> str:
         if bend <= 0.5 * data.least_bend:
             return f"its bend of {bend:.2g} rad is below the {data.least_bend:.2g} rad that these logs show"
         vague = spread["sigma_0"] >= SURE_FACTOR
-        return f"sigma_0 is only known within a factor of {np.exp(2.0 * spread['sigma_0']):.2g}" if vague else ""
+        return (
+            f"sigma_0 is only known within a factor of {np.exp(min(2.0 * spread['sigma_0'], 700.0)):.2g}"
+            if vague
+            else ""
+        )
     least = {"gravity": MATTERS * level, "load": MATTERS, "asymmetry": MATTERS * level / data.fastest}[term]
     names = TERMS[term]
     size = float(np.hypot(*(values[name] for name in names))) if term == "gravity" else values[names[0]]
@@ -222,7 +226,7 @@ def _doubt_of_fall(data: Data, values: dict[str, float], spread: dict[str, float
         reach = f"{data.slowest_fall:.2g} to {data.fastest:.2g} rad/s"
         return f"its speed of {speed:.2g} rad/s lies outside of those that these logs show, {reach}"
     if spread["v_s"] >= SURE_FACTOR:
-        return f"v_s is only known within a factor of {np.exp(2.0 * spread['v_s']):.2g}"
+        return f"v_s is only known within a factor of {np.exp(min(2.0 * spread['v_s'], 700.0)):.2g}"
     clear = rise > max(SURE * spread["rise"], MATTERS * level)
     return "" if clear else f"mu_s exceeds mu_c by {rise:.2g} N m, which is not clear of zero, or does not matter"
 

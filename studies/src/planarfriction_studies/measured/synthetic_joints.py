@@ -14,7 +14,7 @@ import numpy as np
 
 from planarfriction.joints import JointLog
 from planarfriction.joints.loops.runs import run_plant
-from planarfriction.joints.problem import TERMS, Problem
+from planarfriction.joints.problem import TERMS, Problem, friction_of
 from planarfriction_studies.measured.joints import PENDULUM, read_logs
 
 STEP = 1e-4
@@ -76,7 +76,7 @@ def _moved(
     warm, supply = rng.normal(1.0, scatter[:2])
     here = values | {name: values[name] * warm for name in ("mu_c", "sigma_2", "rise") if name in values}
     here["torque_gain"] *= supply
-    joint, plant = problem.friction(here).rigid_numbers, problem.plant_numbers(here, log)
+    joint, plant = friction_of(here).rigid_numbers, problem.plant_numbers(here, log)
     wander, steps = np.zeros(len(log.time)), np.diff(log.time)
     kick = scatter[2] * (values["mu_c"] + 0.3 * plant.moment * values.get("load", 0.0))
     for i, step in enumerate(steps):
