@@ -115,7 +115,9 @@ def test_spreads_intervals_and_words_have_their_numbers(monkeypatch):
     wide = dataclasses.replace(
         kept, problem=kept.problem.with_terms(["load", "bristles"]), values=values | {"mu_c": 0.05, "load": 0.1}
     )
-    fit = result_of(kept, kept, {"load": (wide, kept)})
+    halves = errors, errors
+    pair = dataclasses.replace(wide, halves=halves), dataclasses.replace(kept, halves=halves)
+    fit = result_of(kept, kept, {"load": pair})
     assert fit.spread["sigma_2"] == pytest.approx(0.001, rel=1e-9)
     assert fit.spread["mu_c"] == pytest.approx(np.hypot(0.02 / np.sqrt(3.0), 0.03), rel=1e-12)  # by one term more
     said = words(fit)

@@ -31,7 +31,7 @@ FINE = 1e-5
 MOST = 40
 """Most steps of a search."""
 
-UNRELATED = 0.5
+UNRELATED = 0.7
 """Mean error over the mean deviation of the angle from its mean from which on a run has nothing to do with the log."""
 
 AT_BOUND = 1e-3
