@@ -46,7 +46,7 @@ class Rest(NamedTuple):
     error: float
     """Root mean square of the error [N m]."""
     noise: float
-    """What the logs' own noise explains of it [N m]."""
+    """Share of it that the noise of the logs explains [N m]."""
     friction: float
     """Root mean square of friction [N m]."""
 
