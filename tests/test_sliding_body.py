@@ -221,3 +221,9 @@ def test_bad_steps(change, words):
     given = {"state": body.rest(), "twist": np.zeros(3), "normal_force": np.ones(4), "dt": 1e-3}
     with pytest.raises(pf.FrictionError, match=words):
         body.step(**given | change)
+
+
+def test_an_empty_batch_is_an_empty_step():
+    body = pf.SlidingBody(0.2, 1e-4, pf.ReducedModel(pf.ContactPatch.disc(0.01), pf.LuGre(0.3)))
+    step = body.step(body.rest(0), np.zeros((0, 3)), np.zeros(0), 1e-3)
+    assert step.twist.shape == step.wrench.shape == (0, 3)

@@ -111,10 +111,12 @@ class SlidingBody(ByValue):
         response = dt[..., None] * self._per_mass
         pushed = twist - carried + response * wrench
         free = np.einsum("...ij,...j->...i", to_patches, pushed)
-        free = free.reshape(*free.shape[:-1], -1, 3)
+        free = free.reshape(*free.shape[:-1], len(self.patches.models), 3)
         coupled = np.einsum("...im,...m,...jm->...ij", to_patches, response, to_patches)
         end = self.patches.step(state, HostStep(free, load, np.zeros(free.shape[-2:]), coupled), dt)
-        friction = np.einsum("...i,...im->...m", end.wrench.reshape(*end.wrench.shape[:-2], -1), to_patches)
+        friction = np.einsum(
+            "...i,...im->...m", end.wrench.reshape(*end.wrench.shape[:-2], len(self._to_patches)), to_patches
+        )
         step = BodyStep(end.state, pushed + response * friction + carried, friction)
         if not end.converged.all():
             count = f"{np.count_nonzero(~end.converged)} of {end.converged.size} bodies"
