@@ -60,10 +60,12 @@ class Body(ByValue):
 
 def _pose(name: str, value: Any) -> Signal:
     """Return `value` as a signal of poses; the angle of points `(x, y)` is zero."""
-    signal = value if isinstance(value, Signal) else Signal.constant(value)
-    if signal.columns == 2:
-        signal = Signal(signal.times, np.pad(signal.values, ((0, 0), (0, 1))), signal.hold)
-    return as_signal(name, signal, 3)
+    if not isinstance(value, Signal):
+        value = validation.finite_numbers(name, value, largest=np.inf)
+        value = np.append(value, 0.0) if value.shape == (2,) else value
+    elif value.columns == 2:
+        value = Signal(value.times, np.pad(value.values, ((0, 0), (0, 1))), value.hold)
+    return as_signal(name, value, 3)
 
 
 @dataclass(frozen=True, eq=False)
