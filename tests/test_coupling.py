@@ -10,11 +10,11 @@ from scipy.linalg import block_diag
 from scipy.optimize import fsolve
 
 import planarfriction as pf
-from planarfriction.compiler import jit
-from planarfriction.compiler.calls import address_of, call
-from planarfriction.compiler.memory import place_of
+from planarfriction._engine.compiler import jit
+from planarfriction._engine.compiler.calls import address_of, call
+from planarfriction._engine.compiler.memory import place_of
+from planarfriction._engine.protocol import SLOPES
 from planarfriction.coupling import CoupledPatches, CoupledStep, HostStep
-from planarfriction.kernels.steps import SLOPES
 from planarfriction.patch import friction_metric
 from tests.support.coupling_problems import random_bodies, random_patches, random_run
 from tests.support.rate_laws import BoucWen

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from numba import njit
 
 from planarfriction import formulas
-from planarfriction.compiler import compiled_math
+from planarfriction._engine.bristles.law import law_of as read_law
+from planarfriction._engine.compiler import compiled_math
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels.law import law_of as read_law
 
 LAW = {"mu_c": 0.7, "mu_s": 1.1, "v_s": 2e-3}
 GAMMAS = (1.0, 1.5, 2.0, 3.0)

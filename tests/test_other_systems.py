@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from planarfriction import writing
-from planarfriction.compiler.threads import processors
+from planarfriction._engine.compiler.threads import processors
 from planarfriction.errors import FileError
 from planarfriction_studies.bench import workflows
 

@@ -17,7 +17,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction import warm
-from planarfriction.compiler import notice, threads
+from planarfriction._engine.compiler import notice, threads
 from planarfriction.families import MODELS
 
 COUNTING = """
@@ -100,8 +100,8 @@ class Terminal(io.StringIO):
 @pytest.mark.parametrize(
     ("stream", "module", "lines"),
     [
-        (Terminal, "planarfriction.kernels.steps", 1),
-        (io.StringIO, "planarfriction.kernels.steps", 0),
+        (Terminal, "planarfriction._engine.coupled.steps", 1),
+        (io.StringIO, "planarfriction._engine.coupled.steps", 0),
         (Terminal, "mine", 0),
         (Terminal, None, 0),
     ],

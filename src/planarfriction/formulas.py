@@ -1,7 +1,7 @@
 """The physics, once: every formula as `f(xp, ...)` for scalars and for tensors.
 
 `xp` is the namespace that supplies `exp`, `expm1`, `log`, `sin`, `cos`, `power`, `where`, `minimum` and `maximum`:
-NumPy, torch and jax.numpy pass themselves, compiled loops pass `planarfriction.compiler.compiled_math`. A formula is
+NumPy, torch and jax.numpy pass themselves, compiled loops pass `compiled_math` of the engine's compiler. A formula is
 assignments and one return; it has no loop and no branch, and chooses what to divide rather than whether to: of that,
 compilers make a branch, and processors do not foresee it. Symbols as in Waltersson and Karayiannidis 2024, sections III
 and IV; each formula names the section of docs/physics.md, or the page of docs, where it stands and comes from.

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from planarfriction import coupling, derivatives, joints, limit_surface, models
-from planarfriction.compiler import threads, together
-from planarfriction.compiler.notice import expect_compilation, watched
+from planarfriction._engine.compiler import threads, together
+from planarfriction._engine.compiler.notice import expect_compilation, watched
 from planarfriction.families import MODELS
 from planarfriction.laws import LuGre
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, friction_metric

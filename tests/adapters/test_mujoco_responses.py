@@ -13,10 +13,10 @@ import planarfriction as pf
 
 mujoco = pytest.importorskip("mujoco")
 
+from planarfriction._engine.compiler.memory import doubles, place_of  # noqa: E402
 from planarfriction.adapters.mujoco import Friction, PatchContact, prepare  # noqa: E402
 from planarfriction.adapters.mujoco.loops import responses  # noqa: E402
 from planarfriction.adapters.mujoco.loops.records import read  # noqa: E402
-from planarfriction.compiler.memory import doubles, place_of  # noqa: E402
 
 pytestmark = pytest.mark.mujoco
 

@@ -20,13 +20,13 @@ from PIL import Image
 
 import planarfriction as pf
 from planarfriction import __version__, scenes
+from planarfriction._engine.body import rosenbrock
 from planarfriction.cli import main, output
 from planarfriction.cli.app import ELSEWHERE, GROUP, app
 from planarfriction.cli.options import find_patch
 from planarfriction.cli.run import build_scenes, largest_differences
 from planarfriction.errors import SimulationInterrupted, SolverError
 from planarfriction.families import SCENES
-from planarfriction.kernels import rosenbrock
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.plots import animation
 from tests.support import synthetic

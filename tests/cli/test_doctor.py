@@ -9,8 +9,8 @@ import pytest
 from numba.core import config
 from packaging.requirements import Requirement
 
+from planarfriction._engine.compiler import SOURCES, machine_code
 from planarfriction.cli import doctor, main
-from planarfriction.compiler import SOURCES, machine_code
 from tests.support.repository import ROOT
 
 

@@ -1,6 +1,6 @@
 """Traces of functions that write to lists."""
 
-from planarfriction.kernels.trace import Branch, Number, Trace
+from planarfriction._engine.codegen.trace import Branch, Number, Trace
 
 
 def test_lists_are_written_once():

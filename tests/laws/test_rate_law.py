@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import planarfriction as pf
+from planarfriction._engine.cells.rate_law import fingerprint
 from planarfriction.derivatives import scene_gradient, scene_sensitivities
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.rate_law import fingerprint
 from planarfriction.laws.rate_law import norm, plus
 from planarfriction.patch import friction_metric
 from planarfriction.scenes import SolverOptions

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.kernels import surfaces as kernels
+from planarfriction._engine.published import surfaces as kernels
 from planarfriction.limit_surface import LimitSurface
 
 DISC = pf.ContactPatch.disc(0.01, 9)

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import planarfriction as pf
+from planarfriction._engine.published import surfaces as kernels
 from planarfriction.errors import InvalidValueError, MissingExtraError
-from planarfriction.kernels import surfaces as kernels
 from planarfriction.limit_surface import quartic as quartic_fit
 from planarfriction.patch import PUBLISHED_PATCHES
 

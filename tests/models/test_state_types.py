@@ -69,7 +69,7 @@ every_form = pytest.mark.parametrize("form", FORMS)
 
 def compiled() -> dict[str, int]:
     """Return the number of compilations of each kernel."""
-    modules = [module for name, module in sys.modules.items() if name.startswith("planarfriction.kernels")]
+    modules = [module for name, module in sys.modules.items() if name.startswith("planarfriction._engine")]
     found = {id(value): value for module in modules for value in vars(module).values() if isinstance(value, Dispatcher)}
     return {f"{each.__module__}.{each.__name__}": len(each.signatures) for each in found.values()}
 

@@ -7,11 +7,11 @@ import pytest
 import shapely
 
 import planarfriction as pf
-from planarfriction.compiler import jit
-from planarfriction.compiler.memory import doubles, place_of
+from planarfriction._engine.cells.edge_cells import covered_part
+from planarfriction._engine.compiler import jit
+from planarfriction._engine.compiler.memory import doubles, place_of
 from planarfriction.derivatives import scene_sensitivities
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.edge_cells import covered_part
 from planarfriction.scenes import in_hand
 from planarfriction.scenes.files import rectangle_outline
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.compiled import packed as limits
+from planarfriction._engine.records import packed as limits
 from planarfriction.scenes import packing
 from planarfriction.scenes.packing import MOST_PIECES, SegmentBatches, Segments
 

@@ -10,9 +10,9 @@ from numba import njit
 from scipy.integrate import solve_ivp
 
 import planarfriction as pf
-from planarfriction.compiler.calls import call
-from planarfriction.kernels import body, rosenbrock
-from planarfriction.kernels.body import right_hand_side
+from planarfriction._engine.body import body, rosenbrock
+from planarfriction._engine.body.body import right_hand_side
+from planarfriction._engine.compiler.calls import call
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.scenes.packing import MOST_PIECES, SegmentBatches
 from planarfriction.solvers import RODAS3, RODAS4

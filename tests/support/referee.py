@@ -17,10 +17,10 @@ import numpy as np
 from mpmath import mpf
 from numba import njit
 
-from planarfriction.compiler import compiled_math
-from planarfriction.kernels import vectors
-from planarfriction.kernels.derive import Derivative
-from planarfriction.kernels.rules import per
+from planarfriction._engine.codegen import vectors
+from planarfriction._engine.codegen.derive import Derivative
+from planarfriction._engine.codegen.rules import per
+from planarfriction._engine.compiler import compiled_math
 
 DIGITS = 60
 _STEP = mpf(10) ** -24
@@ -74,7 +74,7 @@ def _exact(function: Any, known: dict[int, Any]) -> Callable:
     used = set(plain.__code__.co_names)
     names.update(_exchanged(plain.__globals__, used, known))
     for name, value in names.items():
-        if isinstance(value, types.ModuleType) and value.__name__.startswith("planarfriction.kernels"):
+        if isinstance(value, types.ModuleType) and value.__name__.startswith("planarfriction._engine"):
             names[name] = types.SimpleNamespace(**_exchanged(vars(value), used, known))
     return found
 

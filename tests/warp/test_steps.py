@@ -112,7 +112,7 @@ def test_moments(name):
         state = own.rest()
         for _ in range(3):
             state, expected = own.step(state, twist[i], load[i], 1e-3, moments=moments[i])
-        # the softness of `kernels.tilt` magnifies rounding where no three cells have the centre between them
+        # the softness of `cells.tilt` magnifies rounding where no three cells have the centre between them
         assert wrench.numpy()[i] == pytest.approx(expected, rel=1e-9, abs=1e-8)
 
 

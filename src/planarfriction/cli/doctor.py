@@ -116,8 +116,8 @@ def state_of(requirement: Requirement) -> tuple[str, bool]:
 
 def processor() -> list[tuple[str, str]]:
     """Return lines about the processor, for which LLVM compiles."""
-    from planarfriction.compiler.machine_code import target
-    from planarfriction.compiler.threads import processors
+    from planarfriction._engine.compiler.machine_code import target
+    from planarfriction._engine.compiler.threads import processors
 
     name, have = target()
     return [
@@ -128,8 +128,8 @@ def processor() -> list[tuple[str, str]]:
 
 def machine_code() -> list[tuple[str, str]]:
     """Return lines about the machine code on disk that belongs to these sources."""
-    from planarfriction.compiler import SOURCES
-    from planarfriction.compiler.machine_code import folders, whole
+    from planarfriction._engine.compiler import SOURCES
+    from planarfriction._engine.compiler.machine_code import folders, whole
 
     rows = []
     for folder in folders(SOURCES):

@@ -3,7 +3,7 @@
 `rollout` steps a model through given twists and loads. `rollout_vjp` is its discrete adjoint, `rollout_jvp` its
 directional derivative, and `rollout_jacobian` gives the derivatives of each wrench with respect to the parameters. All
 are derivatives of the steps themselves, not of the continuous model, so they agree with finite differences of `rollout`
-to rounding. Kinks are described in `planarfriction.kernels.bristle_step`.
+to rounding. Kinks are described in `planarfriction._engine.bristles.bristle_step`.
 """
 
 from planarfriction.derivatives.parameters import PARAMETERS, parameter_names, parameters_of

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.compiler import threads
+from planarfriction._engine.cells.rollouts import Inputs, ShapesByLoad
+from planarfriction._engine.compiler import threads
 from planarfriction.derivatives.parameters import Packed, pack
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.rollouts import Inputs, ShapesByLoad
 
 _WORTH_A_THREAD = 20_000
 """Steps [-] below which starting a thread costs more than it saves."""

@@ -9,15 +9,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.compiled.packed import cells_by_load
+from planarfriction._engine.bristles.law import LAW
+from planarfriction._engine.cells import cells_rollout
+from planarfriction._engine.cells.cell_kinds import rollouts_of_cells
+from planarfriction._engine.cells.rollouts import ShapesByLoad
+from planarfriction._engine.published import published_step
+from planarfriction._engine.published.published_rollouts import gradient, rollout, sensitivities, tangent
+from planarfriction._engine.records.packed import cells_by_load
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
-from planarfriction.kernels import cells_rollout, published_step
-from planarfriction.kernels.cell_kinds import rollouts_of_cells
-from planarfriction.kernels.law import LAW
-from planarfriction.kernels.published_rollouts import gradient, rollout, sensitivities, tangent
-from planarfriction.kernels.rollouts import ShapesByLoad
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModelPublished
 from planarfriction.models.reduced_published import axes_of
@@ -41,9 +42,9 @@ class Family(NamedTuple):
     gradient: Callable[..., None]
     sensitivities: Callable[..., None]
     tangent: Callable[..., None]
-    """Compiled loops (see `kernels.rollouts`), which add to their outputs but write the state."""
+    """Compiled loops (see `cells.rollouts`), which add to their outputs but write the state."""
     shares: Callable[..., None] | None = None
-    """Derivatives by the weights of cells (see `kernels.cells_rollout`)."""
+    """Derivatives by the weights of cells (see `cells.cells_rollout`)."""
 
 
 _COLUMNS = np.array([published_step.NAMES.index(name) for name in PARAMETERS])

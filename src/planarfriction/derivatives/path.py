@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
+from planarfriction._engine.body import adjoint, rosenbrock, tangent
+from planarfriction._engine.body import path as paths
+from planarfriction._engine.body.body import System
+from planarfriction._engine.body.integration import Output
+from planarfriction._engine.body.path import Path, Stretch, Tolerances
+from planarfriction._engine.body.sdirk import workspace_for
+from planarfriction._engine.body.tangent import Drives
 from planarfriction.derivatives.scene_inputs import SceneInputs
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError, SolverError
-from planarfriction.kernels import adjoint, rosenbrock, tangent
-from planarfriction.kernels import path as paths
-from planarfriction.kernels.body import System
-from planarfriction.kernels.integration import Output
-from planarfriction.kernels.path import Path, Stretch, Tolerances
-from planarfriction.kernels.sdirk import workspace_for
-from planarfriction.kernels.tangent import Drives
 from planarfriction.scenes.packing import SegmentBatches
 from planarfriction.scenes.scene import Scene, SolverOptions
 from planarfriction.solvers import RODAS4
@@ -82,7 +82,7 @@ class MotionPath:
         self.batches = SegmentBatches(scene, plan.end, times=plan.times, sensitivities=True, marks=inputs.marks)
         for contact, model in zip(scene.contacts, self.batches.models, strict=True):
             if None in model.functions:
-                rule = "have all functions of kernels.contacts.ModelFunctions for derivatives of scenes"
+                rule = "have all functions of protocol.ModelFunctions for derivatives of scenes"
                 raise InvalidValueError(f"model of contact {contact.name!r}", rule, type(contact.model).__name__)
         self.instants, contacts = len(plan.times), len(scene.contacts)
         self._rtol, self._atol, self.scale = plan.rtol, plan.atol * self.batches.state_scale, self.batches.state_scale

@@ -8,14 +8,14 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.compiler import threads
+from planarfriction._engine.cells.cell_blocks import divided
+from planarfriction._engine.cells.rollouts import Bars, Derivatives, Inputs, ShapesByLoad
+from planarfriction._engine.compiler import threads
 from planarfriction.derivatives.inputs import RolloutInputs, checked, rows_of, sequences, share, sum_to
 from planarfriction.derivatives.parameters import Packed, is_compiled, pack
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
-from planarfriction.kernels.cell_blocks import divided
-from planarfriction.kernels.rollouts import Bars, Derivatives, Inputs, ShapesByLoad
 from planarfriction.models import FrictionModel
 
 ArrayT = TypeVar("ArrayT")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.compiler import threads
+from planarfriction._engine.compiler import threads
 from planarfriction.derivatives.path import RTOL, KeptMotion
 from planarfriction.derivatives.scene_inputs import SCENE_PARAMETERS, STATES, SceneInputs
 from planarfriction.derivatives.scenes import scene_sensitivities

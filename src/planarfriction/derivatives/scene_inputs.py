@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
+from planarfriction._engine.body import tangent
+from planarfriction._engine.body.body import System
+from planarfriction._engine.body.tangent import Drives
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import tangent
-from planarfriction.kernels.body import System
-from planarfriction.kernels.tangent import Drives
 from planarfriction.laws.base import refuse_rate_law
 from planarfriction.scenes.packing import SegmentBatches
 from planarfriction.scenes.scene import Scene

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
+from planarfriction._engine.body import path as paths
+from planarfriction._engine.body import tangent
+from planarfriction._engine.body.body import System
+from planarfriction._engine.body.path import Path, Stretch, Tolerances
+from planarfriction._engine.body.sdirk import workspace_for
+from planarfriction._engine.body.tangent import Drives
 from planarfriction.derivatives.path import KeptMotion, MotionPath, SceneDerivatives, pieces_of
 from planarfriction.derivatives.scene_inputs import SceneInputs
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import path as paths
-from planarfriction.kernels import tangent
-from planarfriction.kernels.body import System
-from planarfriction.kernels.path import Path, Stretch, Tolerances
-from planarfriction.kernels.sdirk import workspace_for
-from planarfriction.kernels.tangent import Drives
 from planarfriction.scenes.scene import Scene, SolverOptions
 
 

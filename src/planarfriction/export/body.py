@@ -1,4 +1,4 @@
-"""The search of `kernels.coupling` in C, for a body on patches of one model."""
+"""The search of `coupled.coupling` in C, for a body on patches of one model."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from planarfriction._engine.coupled import coupling, coupling_steps
+from planarfriction._engine.coupled.coupling_rows import Patches, layout
 from planarfriction.coupling import ITERATIONS, TOLERANCE
 from planarfriction.export.c_source import Writer
 from planarfriction.export.c_values import Array, Fixed, Record, Scalar
 from planarfriction.export.loops import Loops
-from planarfriction.kernels import coupling, coupling_steps
-from planarfriction.kernels.coupling_rows import Patches, layout
 from planarfriction.models.base import lever_of
 
 _STEP, _SLOPES = Fixed(0), Fixed(1)

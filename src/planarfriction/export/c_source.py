@@ -12,8 +12,8 @@ from collections.abc import Iterator, Sequence
 from itertools import compress
 from typing import Any, NamedTuple
 
-from planarfriction.kernels.trace import Block, Branch, Number, Operation, traced
-from planarfriction.kernels.twins import twin
+from planarfriction._engine.codegen.trace import Block, Branch, Number, Operation, traced
+from planarfriction._engine.codegen.twins import twin
 
 TYPES = {"real": "real", "index": "int", "wide": "long long", "bool": "int"}
 """C types by the kind of a number; `real` is a typedef."""

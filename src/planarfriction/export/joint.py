@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from planarfriction import validation, writing
+from planarfriction._engine.codegen.trace import Number, Trace, traced
+from planarfriction._engine.codegen.twins import twin
 from planarfriction.export.c_source import Writer, rendered
 from planarfriction.export.library import checked_name
 from planarfriction.joints import JointFriction
 from planarfriction.joints.loops.runs import joint_step
-from planarfriction.kernels.trace import Number, Trace, traced
-from planarfriction.kernels.twins import twin
 
 
 def export_joint_c(friction: JointFriction, folder: Any, *, name: str = "friction") -> tuple[Path, ...]:

@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation, writing
-from planarfriction.compiler import compiled_math
+from planarfriction._engine.cells import tilt
+from planarfriction._engine.compiler import compiled_math
+from planarfriction._engine.published.surfaces import CELLS
 from planarfriction.errors import InvalidValueError
 from planarfriction.export.body import body_of
 from planarfriction.export.c_source import SQRT, Writer, comment, of_compiled, passes_of, rendered
@@ -20,8 +22,6 @@ from planarfriction.export.loops import Loops
 from planarfriction.export.pieces import Pieces, pieces_of
 from planarfriction.export.slip import samples_of, slip_of
 from planarfriction.formulas import LARGEST
-from planarfriction.kernels import tilt
-from planarfriction.kernels.surfaces import CELLS
 from planarfriction.online.loops import friction_filter, grips
 
 

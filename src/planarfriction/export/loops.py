@@ -18,8 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.compiler import compiled_math
-from planarfriction.compiler.memory import at
+from planarfriction._engine.codegen.definitions import definition_of
+from planarfriction._engine.codegen.trace import Number, Table, Trace, traced
+from planarfriction._engine.codegen.twins import twin
+from planarfriction._engine.compiler import compiled_math
+from planarfriction._engine.compiler.memory import at
+from planarfriction._engine.published import surfaces
 from planarfriction.export.c_source import Writer
 from planarfriction.export.c_values import (
     LEAVES,
@@ -33,10 +37,6 @@ from planarfriction.export.c_values import (
     mapped,
     plain,
 )
-from planarfriction.kernels import surfaces
-from planarfriction.kernels.definitions import definition_of
-from planarfriction.kernels.trace import Number, Table, Trace, traced
-from planarfriction.kernels.twins import twin
 
 _OPERATORS: dict[type, tuple[str, Callable[..., Any]]] = {
     ast.Add: ("+", operator.add), ast.Sub: ("-", operator.sub), ast.Mult: ("*", operator.mul),

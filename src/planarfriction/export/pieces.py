@@ -10,19 +10,22 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import formulas
-from planarfriction.compiler import compiled_math as xp
+from planarfriction._engine.bristles import discs, points
+from planarfriction._engine.bristles.law import grip
+from planarfriction._engine.bristles.settle import within
+from planarfriction._engine.cells import cells, cells_rollout
+from planarfriction._engine.codegen.derive import derive
+from planarfriction._engine.codegen.rewriting import Rewriting
+from planarfriction._engine.codegen.rules import ratio
+from planarfriction._engine.codegen.trace import Block, Mathematics, Number, Table, Trace, traced
+from planarfriction._engine.codegen.twins import NAMES, SYMBOLS, finished, twin
+from planarfriction._engine.codegen.vectors import norm, times
+from planarfriction._engine.compiler import compiled_math as xp
+from planarfriction._engine.published import published_contact, published_step
+from planarfriction._engine.published.published_contact import PublishedContact, PublishedPatch, Root
+from planarfriction._engine.published.surfaces import CELLS
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, cells_rollout, discs, points, published_step
-from planarfriction.kernels.derive import derive
-from planarfriction.kernels.law import grip
-from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, Root
-from planarfriction.kernels.rules import ratio
-from planarfriction.kernels.settle import within
-from planarfriction.kernels.surfaces import CELLS
-from planarfriction.kernels.trace import Block, Mathematics, Number, Table, Trace, traced
-from planarfriction.kernels.twins import twin
-from planarfriction.kernels.vectors import norm, times
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
@@ -174,7 +177,7 @@ LIGHTEST = {"double": formulas.LIGHTEST, "float": 1e-6}
 
 
 def _settled(cell: Any, reference: float, lightest: float) -> Any:
-    """Return the step of a cell with a fixed stiffness under a load (see `kernels.settle`)."""
+    """Return the step of a cell with a fixed stiffness under a load (see `bristles.settle`)."""
 
     def settled(law: Any, z: Any, u: Any, dt: Any, load: Any) -> Any:
         factor = reference / xp.maximum(load, lightest)
@@ -247,7 +250,7 @@ def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
     if surface.kind == CELLS:
         raise InvalidValueError("surface", "be an ellipsoid or a table", type(found.surface).__name__)
     root = Root(float(root[0, 0]), float(root[0, 1]), float(root[1, 1]))
-    steps = twin(published_step)
+    steps = Rewriting((*SYMBOLS, (published_contact.read, lambda record: record)), NAMES, finished)(published_step)
 
     def contact(trace: Trace) -> PublishedContact:
         data: Any = Table(trace, "surface", surface.data)

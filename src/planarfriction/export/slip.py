@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction._engine.codegen.trace import Mathematics, Number, Table, Trace, traced
+from planarfriction._engine.codegen.twins import twin
 from planarfriction.export.c_source import Writer
-from planarfriction.kernels.trace import Mathematics, Number, Table, Trace, traced
-from planarfriction.kernels.twins import twin
 from planarfriction.limit_surface import LimitSurfaceTable
 from planarfriction.limit_surface.base import CERTIFIED
 from planarfriction.limit_surface.loops import twists

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.compiler import threads
+from planarfriction._engine.compiler import threads
 from planarfriction.derivatives import PARAMETERS, rollout, rollout_jacobian
 from planarfriction.identify.decimation import DecimatedLog
 from planarfriction.identify.logs import EVEN, Log

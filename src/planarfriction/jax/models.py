@@ -63,7 +63,7 @@ class PublishedParameters(namedtuple("PublishedParameters", PARAMETERS)):
 @functools.partial(jax.tree_util.register_dataclass, data_fields=["data", "root"], meta_fields=["kind", "size"])
 @dataclass(frozen=True, eq=False)
 class Surface(ByValue):
-    """The numbers of a limit surface in scaled coordinates (see `planarfriction.kernels.surfaces`)."""
+    """The numbers of a limit surface in scaled coordinates (see `planarfriction._engine.published.surfaces`)."""
 
     kind: int
     size: int

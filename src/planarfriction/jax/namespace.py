@@ -10,13 +10,13 @@ import numpy as np
 from jax.core import Tracer
 
 from planarfriction import validation
+from planarfriction._engine.cells.tilt import OVERSHOT, SHORTENINGS, SOFTNESS, STEPS
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.tilt import OVERSHOT, SHORTENINGS, SOFTNESS, STEPS
 from planarfriction.tensors.namespace import Namespace
 
 
 class _Tilt(NamedTuple):
-    """Cells in scaled coordinates about their centre of pressure, as `kernels.tilt.Scaled`."""
+    """Cells in scaled coordinates about their centre of pressure, as `cells.tilt.Scaled`."""
 
     corners: jax.Array
     """`(1, u, v)` of each cell `[N, 3]`."""

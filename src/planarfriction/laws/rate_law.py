@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.compiler.calls import address_of
-from planarfriction.compiler.memory import place_of, row_of
+from planarfriction._engine.cells import cells, rate_law
+from planarfriction._engine.codegen import rules, vectors
+from planarfriction._engine.compiler.calls import address_of
+from planarfriction._engine.compiler.memory import place_of, row_of
+from planarfriction._engine.coupled import steps
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, rate_law, rules, steps, vectors
 from planarfriction.laws.base import FrictionLaw
 
 __all__ = ["RateLaw", "dot", "norm", "plus", "ratio", "times"]

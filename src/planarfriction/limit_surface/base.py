@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
+from planarfriction._engine.published import surfaces as kernels
 from planarfriction.equality import ByValue, by_parts, unusual
 from planarfriction.errors import FrictionError, InvalidValueError, SolverError
 from planarfriction.geometry import transformed
-from planarfriction.kernels import surfaces as kernels
 from planarfriction.limit_surface.loops.twists import StoredPotential, table_twists
 from planarfriction.limit_surface.stored import across, descend, table_of
 from planarfriction.patch import ContactPatch
@@ -46,7 +46,7 @@ _ROUNDING = 16.0 * np.finfo(float).eps
 
 @by_parts
 class SurfaceNumbers(NamedTuple):
-    """A limit surface as compiled loops see it: `kernels.surfaces` says what the numbers mean."""
+    """A limit surface as compiled loops see it: `published.surfaces` says what the numbers mean."""
 
     kind: int
     size: int
@@ -318,7 +318,7 @@ class LimitSurface(ByValue):
 
 
 class CompiledLimitSurface(LimitSurface):
-    """A limit surface of one of the kinds of `kernels.surfaces`: it gives its `numbers`, the loops do the rest."""
+    """A limit surface of one of the kinds of `published.surfaces`: it gives its `numbers`, the loops do the rest."""
 
     def direction(self, units: np.ndarray) -> np.ndarray:
         h, (kind, size, data) = np.empty_like(units), self.numbers

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planarfriction.kernels import surfaces as kernels
+from planarfriction._engine.published import surfaces as kernels
 from planarfriction.limit_surface.base import CompiledLimitSurface, SurfaceNumbers
 from planarfriction.limit_surface.loops.twists import ellipsoid_twists
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import surfaces
+from planarfriction._engine.published import surfaces
 from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers
 from planarfriction.limit_surface.cells import LimitSurfaceCells
 from planarfriction.limit_surface.loops import closed_forms as kernels

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planarfriction.kernels import surfaces
+from planarfriction._engine.published import surfaces
 from planarfriction.limit_surface.loops import cell_twists as loops
 from planarfriction.limit_surface.loops.twists import StoredPotential
 
@@ -27,7 +27,7 @@ def cell_sums(rows: tuple[np.ndarray, np.ndarray, np.ndarray], units: np.ndarray
 
 
 def stored_potential(sums: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray | None]], segments: int) -> np.ndarray:
-    """Return the numbers of `kernels.surfaces.POTENTIAL`: at the nodes `phi` less the tilt and its derivatives along
+    """Return the numbers of `published.surfaces.POTENTIAL`: at the nodes `phi` less the tilt and its derivatives along
     both angles and mixed, then the tilt.
 
     `sums` returns `h` `[M, 3]` at unit scaled twists `[M, 3]`, and `dh/dV_S` `[M, 3, 3]`, or None to take mixed

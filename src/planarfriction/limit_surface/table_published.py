@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planarfriction.kernels import spin_sums
-from planarfriction.kernels import surfaces as kernels
+from planarfriction._engine.published import spin_sums
+from planarfriction._engine.published import surfaces as kernels
 from planarfriction.limit_surface.base import CompiledLimitSurface, SurfaceNumbers
 from planarfriction.limit_surface.loops.published_twists import published_twists
 from planarfriction.limit_surface.stored import cell_sums

@@ -1,6 +1,6 @@
 """Friction models of a contact patch: parameters, and pure functions of (state, twist, load)."""
 
-from planarfriction.compiled import PackedModel, StepJacobians
+from planarfriction._engine.records import PackedModel, StepJacobians
 from planarfriction.families import MODELS
 from planarfriction.models.base import FrictionModel, ModelJacobians
 from planarfriction.models.distributed import DistributedModel

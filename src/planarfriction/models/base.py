@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.compiled.base import CompiledModel, StepJacobians
-from planarfriction.compiled.packed import PackedModel
+from planarfriction._engine.records.base import CompiledModel, StepJacobians
+from planarfriction._engine.records.packed import PackedModel
 from planarfriction.equality import ByValue, by_parts, unusual
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw

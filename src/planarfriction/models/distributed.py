@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.compiled.distributed import CompiledDistributed
-from planarfriction.compiled.rate_cells import CompiledRateCells
+from planarfriction._engine.records.distributed import CompiledDistributed
+from planarfriction._engine.records.rate_cells import CompiledRateCells
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LIGHTEST
 from planarfriction.laws.base import is_rate_law, refuse_creep, refuse_rate_law

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.compiled.base import CompiledModel
+from planarfriction._engine.records.base import CompiledModel
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import is_rate_law

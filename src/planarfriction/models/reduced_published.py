@@ -10,11 +10,11 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.compiled.published import CompiledPublished
+from planarfriction._engine.published.published_contact import slopes_in
+from planarfriction._engine.published.surfaces import ELLIPSOID
+from planarfriction._engine.records.published import CompiledPublished
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.published_contact import slopes_in
-from planarfriction.kernels.surfaces import ELLIPSOID
 from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import refuse_fixed_stiffness, refuse_rate_law
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished

@@ -284,7 +284,7 @@ def _arrangements(period: _Period, n: int) -> list[tuple[int, int, int, int]]:
 
 def _partitions(period: _Period, n: int) -> list[_Partition]:
     """Return the partitions into n clusters that cost little more than the best, the best first."""
-    from planarfriction.kernels import clusters  # compiled code, which a patch alone does not need
+    from planarfriction._engine.cells import clusters  # compiled code, which a patch alone does not need
 
     points, weights = period.points, period.weights
     ways = [way for way in _arrangements(period, n) if 0 < sum(way) <= len(points)]
@@ -350,7 +350,7 @@ def _chosen(period: _Period, points: np.ndarray, weights: np.ndarray, squares: n
 
 def _finished(period: _Period, chosen: _Partition) -> _Clusters:
     """Return the discs of a partition and of its images."""
-    from planarfriction.kernels import clusters
+    from planarfriction._engine.cells import clusters
 
     points, weights = period.points, period.weights
     k, on_axes, centres = len(chosen.centres), chosen.on_axes, chosen.centres.copy()

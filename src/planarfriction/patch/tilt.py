@@ -1,4 +1,4 @@
-"""Pressure that follows the moments of the load (the rule: `kernels.tilt`)."""
+"""Pressure that follows the moments of the load (the rule: `cells.tilt`)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def moments_of(value: Any) -> np.ndarray:
 
 def centre_of(moments: np.ndarray, load: np.ndarray) -> np.ndarray:
     """Return the centre of pressure `(-m_y, m_x)/f_N` `[..., 2]` [m]; 0 without load."""
-    from planarfriction.kernels.tilt import REACH  # compiled code, which a patch alone does not need
+    from planarfriction._engine.cells.tilt import REACH  # compiled code, which a patch alone does not need
 
     loaded = load > 0.0
     with np.errstate(over="ignore"):
@@ -28,18 +28,10 @@ def centre_of(moments: np.ndarray, load: np.ndarray) -> np.ndarray:
     return np.where(loaded[..., None], np.clip(np.stack([x, y], -1), -REACH, REACH), 0.0)
 
 
-def tilted(positions: np.ndarray, weights: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """Return weights `[B, N]` of cells at `positions` `[N, 2]` times planes that bring their centres to `[B, 2]`."""
-    from planarfriction.kernels.tilt import tilt_many
-
-    x, y = (np.array(each)[None] for each in positions.T)  # writable, all of them: compiled once
-    out = np.empty(weights.shape)
-    tilt_many(x, y, np.array(weights, order="C"), np.array(centre, order="C"), out)
-    return out
-
-
 def weights_under(patch: Any, normal_force: Any, moments: Any) -> np.ndarray:
     """Return the weights `[..., N]` of the cells of a patch under a load and its moments."""
+    from planarfriction._engine.cells.tilt import tilted
+
     if normal_force is None:
         raise InvalidValueError("normal_force", "be given with moments: they are of its size", "None")
     load, moments = validation.non_negative_numbers("normal_force", normal_force), moments_of(moments)

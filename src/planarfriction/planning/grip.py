@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.compiler import threads
+from planarfriction._engine.compiler import threads
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.pictures import picture

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.compiler import threads
+from planarfriction._engine.compiler import threads
 from planarfriction.derivatives import scene_sensitivities
 from planarfriction.derivatives.scene_inputs import STATES
 from planarfriction.equality import ByValue

@@ -111,7 +111,7 @@ class Spring(ByValue):
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Constants in the order of `kernels.springs`."""
+        """Constants in the order of `body.springs`."""
         return self.stiffness, self.damping, self.torsion, self.torsion_damping, *self.at
 
 

@@ -8,12 +8,13 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from planarfriction.compiled.packed import PackedModel
-from planarfriction.compiled.under_body import STATES, following, under_edge
-from planarfriction.compiler.memory import places_of
+from planarfriction._engine.body.body import Motion, System
+from planarfriction._engine.body.contacts import BODY, BODY_AXES, WORLD, Contacts
+from planarfriction._engine.compiler.memory import places_of
+from planarfriction._engine.protocol import calls_of
+from planarfriction._engine.records.packed import PackedModel
+from planarfriction._engine.records.under_body import STATES, following, under_edge
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.body import Motion, System
-from planarfriction.kernels.contacts import BODY, BODY_AXES, WORLD, Contacts, calls_of
 from planarfriction.laws.base import refuse_fixed_stiffness
 from planarfriction.scenes.contact import Contact
 from planarfriction.scenes.signal import SAME_TIME, Signal, breaks_between, displacement
@@ -26,7 +27,7 @@ SHAPE_INTERVAL = 1e-3
 """Longest time [s] that a patch keeps its shape while the load it depends on changes; held loads need no limit."""
 
 BATCH = 4096
-"""Segments that are packed at a time; fewer where their shapes take more than `compiled.packed.MAX_PACK_BYTES`."""
+"""Segments that are packed at a time; fewer where their shapes take more than `records.packed.MAX_PACK_BYTES`."""
 
 MOST_PIECES = 10**12
 """Segments of a motion, each of which the solver has to stop at."""
@@ -225,7 +226,7 @@ class SegmentBatches:
             ]
         )
         """Natural scale of each state: mu_c/sigma_0 for deflections and positions, a share of v_s for velocities (that
-        of a creep, `compiled.PackedModel.velocity_scale`), angles over r.
+        of a creep, `records.PackedModel.velocity_scale`), angles over r.
 
         The least of all contacts. Velocities are not measured against v_s itself: below it friction hardly changes with
         speed, but it does with direction.

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from planarfriction import validation
+from planarfriction._engine.body.integration import Method, Output
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
-from planarfriction.kernels.integration import Method, Output
 from planarfriction.scenes.packing import SegmentBatches, centres_of_pressure
 from planarfriction.scenes.scene import MAX_STEPS, Scene, SolverOptions
 from planarfriction.scenes.solution import History, Solution

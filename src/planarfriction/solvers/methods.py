@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from planarfriction._engine.body.integration import Method
 from planarfriction.equality import by_parts
-from planarfriction.kernels.integration import Method
 
 by_parts(Method)  # kernels hold loops and nothing else
 

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planarfriction.compiler import missing, threads, together
-from planarfriction.compiler.calls import address_of, signature_of
+from planarfriction._engine.body import rosenbrock as kernels
+from planarfriction._engine.body.body import System
+from planarfriction._engine.body.integration import Method, Output, Progress
+from planarfriction._engine.compiler import missing, threads, together
+from planarfriction._engine.compiler.calls import address_of, signature_of
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import rosenbrock as kernels
-from planarfriction.kernels.body import System
-from planarfriction.kernels.integration import Method, Output, Progress
 from planarfriction.solvers.statistics import Statistics
 
 _STATES_PER_SLICE = 400_000

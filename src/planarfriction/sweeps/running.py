@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planarfriction import validation
-from planarfriction.compiler import threads
+from planarfriction._engine.compiler import threads
 from planarfriction.described import described
 from planarfriction.errors import InvalidValueError, SweepError, SweepInterrupted
 from planarfriction.scenes import Scene, Solution

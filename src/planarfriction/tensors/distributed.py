@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction._engine.bristles import discs, leaning_cells, points, settle
+from planarfriction._engine.bristles.leaning_cells import Leaning
+from planarfriction._engine.cells import cells
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import cells, discs, leaning_cells, points, settle
-from planarfriction.kernels.leaning_cells import Leaning
 from planarfriction.models import DistributedModel
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors.elements import Vector, joined, split
@@ -45,7 +46,7 @@ class Cells(NamedTuple):
     """A patch as arrays."""
 
     levers: Any
-    """Numbers of the cells as their levers read them: see `kernels.cells.Lever`, `[numbers, N]`."""
+    """Numbers of the cells as their levers read them: see `cells.cells.Lever`, `[numbers, N]`."""
     weights: Any
     """Share of the load that each cell carries [-], `[N]`."""
     remainder: Any
@@ -87,7 +88,7 @@ def _bristle(xp, name: str, law: Any, shape: Cells, z, u, *dt):
 
 
 def middle(xp, law: LawNumbers, shape: Cells):
-    """Return the middle of the limit of every bristle at rest `[..., d, N]`, or 0.0 (see `kernels.settle`)."""
+    """Return the middle of the limit of every bristle at rest `[..., d, N]`, or 0.0 (see `bristles.settle`)."""
     _, asymmetry = _numbers(shape)
     if asymmetry is None:
         return 0.0
@@ -116,7 +117,7 @@ def drive(xp, law: LawNumbers, shape: Cells, twist) -> tuple[Any]:
 
 
 def limited(xp, law: LawNumbers, shape: Cells, z):
-    """Return bristles brought back onto their limits (see `kernels.settle`)."""
+    """Return bristles brought back onto their limits (see `bristles.settle`)."""
     seen_from = middle(xp, law, shape)
     return seen_from + xp.over(settle.within)(law, Vector(z - seen_from)).array
 

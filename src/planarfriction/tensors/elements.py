@@ -3,7 +3,7 @@
 What is written once for one cell, of numbers, is also what a tensor library needs for all cells at once. Numbers become
 arrays `[..., 1, N]`, with the cells along the last axis; a vector is a `Vector`, or a tuple where the source names its
 components. Only functions that are not straight lines, or whose slopes at a kink have a rule of their own (see
-`kernels.rules`), have forms for arrays here.
+`codegen.rules`), have forms for arrays here.
 """
 
 from __future__ import annotations
@@ -15,9 +15,11 @@ from types import SimpleNamespace
 from typing import Any
 
 from planarfriction import formulas
-from planarfriction.compiler import compiled_math
-from planarfriction.kernels import bristle_step, published_contact, rules, surfaces, vectors
-from planarfriction.kernels.rewriting import Rewriting
+from planarfriction._engine.bristles import bristle_step
+from planarfriction._engine.codegen import rules, vectors
+from planarfriction._engine.codegen.rewriting import Rewriting
+from planarfriction._engine.compiler import compiled_math
+from planarfriction._engine.published import published_contact, surfaces
 
 ROUNDING = 256.0
 """Excess of a deflection over its cap, in units of the rounding error, that counts as rounding: see `bristle_step`."""

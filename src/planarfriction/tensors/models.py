@@ -51,7 +51,7 @@ class PublishedModel(TensorModel):
 
     equations = published
     surface: Any
-    """Numbers of the limit surface: `kind`, `size` and `data` (see `planarfriction.kernels.surfaces`)."""
+    """Numbers of the limit surface: `kind`, `size` and `data` (see `planarfriction._engine.published.surfaces`)."""
     root: Any
     """Symmetric root of the friction metric `[2, 2]`, if the patch has one."""
 

@@ -1,4 +1,4 @@
-"""Pressure that follows the moments of the load over `xp`: `kernels.tilt` in operations with derivatives.
+"""Pressure that follows the moments of the load over `xp`: `cells.tilt` in operations with derivatives.
 
 A front end finds which cells press, without derivatives (`Namespace.pressing`). With these the plane has a closed form,
 whose derivatives are those of the rule: cells that are about to lift press with nothing.
@@ -10,8 +10,8 @@ import math
 from functools import partial
 from typing import Any, NamedTuple
 
-from planarfriction.kernels import tilt
-from planarfriction.kernels.tilt import FARTHEST, NARROW, SOFTNESS
+from planarfriction._engine.cells import tilt
+from planarfriction._engine.cells.tilt import FARTHEST, NARROW, SOFTNESS
 from planarfriction.tensors.distributed import Cells, positions_of
 
 

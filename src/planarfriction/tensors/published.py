@@ -1,4 +1,4 @@
-"""The published reduced model over `xp`: a bristle `[..., 3]` that steps as `kernels.bristle_step` says.
+"""The published reduced model over `xp`: a bristle `[..., 3]` that steps as `bristles.bristle_step` says.
 
 State and twist are `[..., 3]`; the parameters of law and shape and time steps are `[..., 1, 1]`, or plain numbers.
 """
@@ -10,10 +10,11 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from planarfriction import formulas, models
+from planarfriction._engine.bristles import bristle_step
+from planarfriction._engine.bristles.law import grip
+from planarfriction._engine.published import published_contact
+from planarfriction._engine.published.published_contact import PublishedPatch, Root
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import bristle_step, published_contact
-from planarfriction.kernels.law import grip
-from planarfriction.kernels.published_contact import PublishedPatch, Root
 from planarfriction.laws import FrictionLaw
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models.reduced_published import PublishedShape

@@ -7,10 +7,10 @@ from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
 
 from planarfriction import validation
+from planarfriction._engine.bristles import settle
 from planarfriction.derivatives.parameters import PARAMETERS, check_range
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import settle
 from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import refuse_creep, refuse_rate_law
 from planarfriction.patch import ContactPatch
@@ -61,7 +61,7 @@ def step(xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, load
 def advance(xp: Any, equations: Any, contact: Contact, z: Any, by: Any, load: Any, dt: Any) -> tuple[Any, Any]:
     """Return the bristles `[..., d, N]` after `dt`, zeros of contacts without load, and the tractions per unit load.
 
-    With a fixed stiffness the step is the published one of another deflection and time (see `kernels.settle`).
+    With a fixed stiffness the step is the published one of another deflection and time (see `bristles.settle`).
     """
     (law, shape, reference), loaded, dt = contact, inner(load > 0.0), inner(dt)
     if reference is None:

@@ -1,6 +1,6 @@
-"""Limit surfaces over `xp`: the source of `kernels.surfaces`, whose sums over cells are sums of arrays here.
+"""Limit surfaces over `xp`: the source of `published.surfaces`, whose sums over cells are sums of arrays here.
 
-`kind`, `size` and `data` are the numbers of a surface. Derivatives are those of `kernels.surfaces`: at rest the
+`kind`, `size` and `data` are the numbers of a surface. Derivatives are those of `published.surfaces`: at rest the
 ellipsoid's, at the edge of a table's cell that of the cell in use, and close to the spin axis the one at `_AXIS`.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from planarfriction.kernels import surfaces as kernel
+from planarfriction._engine.published import surfaces as kernel
 from planarfriction.tensors.elements import Placed
 
 _ROUNDING = 2.0**-52

@@ -83,7 +83,7 @@ class DistributedModel(FrictionModule, CellsModel):
 
 
 class SurfaceBuffers(nn.Module):
-    """The numbers of a limit surface in buffers (see `planarfriction.kernels.surfaces`)."""
+    """The numbers of a limit surface in buffers (see `planarfriction._engine.published.surfaces`)."""
 
     data: Tensor
     form: Tensor

@@ -20,7 +20,7 @@ class _Pressing(torch.autograd.Function):
 
     @staticmethod
     def forward(u, v, share, x, y, narrow):
-        from planarfriction.kernels.tilt import tilt_many
+        from planarfriction._engine.cells.tilt import tilt_many
 
         rows = [np.array(each.detach().cpu().double().reshape(-1, each.shape[-1]).numpy()) for each in (u, v, share)]
         centres = torch.cat([x, y], -1).detach().cpu().double().reshape(-1, 2).contiguous().numpy()

@@ -7,14 +7,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction._engine.codegen import small_matrices
+from planarfriction._engine.codegen.trace import Block, Number, Trace, traced
+from planarfriction._engine.codegen.twins import twin
+from planarfriction._engine.coupled import coupling
 from planarfriction.export.c_source import Writer, rendered
 from planarfriction.export.c_values import Array, Fixed
 from planarfriction.export.library import PARAMETERS, PRECISIONS, tilt_of
 from planarfriction.export.loops import Loops
 from planarfriction.export.pieces import Pieces
-from planarfriction.kernels import coupling, small_matrices
-from planarfriction.kernels.trace import Block, Number, Trace, traced
-from planarfriction.kernels.twins import twin
 
 ROUNDING = {"double": (coupling.ROUNDING,) * 2, "float": (3e-7, 1e-5)}
 """Errors of a twist, in the largest speed that goes into it, by precision: below the first no step gets, and below the

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planarfriction._engine.coupled.coupling import solve_batch
 from planarfriction.adapters.drake.shadow import Shadow
 from planarfriction.coupling import CoupledPatches, HostStep
-from planarfriction.kernels.coupling import solve_batch
 from planarfriction.models.base import lever_of
 
 PASSES = 12
@@ -210,7 +210,7 @@ class Asking:
 
 
 class CouplingRow(SimpleNamespace):
-    """Arrays of a `kernels.coupling_rows.Problem`, solved in place: a step of Drake has no time for more."""
+    """Arrays of a `coupled.coupling_rows.Problem`, solved in place: a step of Drake has no time for more."""
 
     def __init__(self, coupled: CoupledPatches, shadow: Shadow) -> None:
         words, k = coupled._blank_problem(shadow.follows), len(coupled.models)

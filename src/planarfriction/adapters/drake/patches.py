@@ -13,10 +13,10 @@ from pydrake.multibody.plant import CoulombFriction
 from pydrake.multibody.tree import BodyIndex, FrameIndex
 
 from planarfriction import validation
+from planarfriction._engine.coupled import placing
 from planarfriction.coupling import follows
 from planarfriction.equality import Checked
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import placing
 from planarfriction.models import FrictionModel
 
 CENTRES, PRESSURES = ("auto", "frame", "contact"), ("auto", "follows", "fixed")

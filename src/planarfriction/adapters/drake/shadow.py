@@ -14,10 +14,10 @@ import numpy as np
 from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.framework import DiagramBuilder
 
+from planarfriction._engine.coupled import placing
+from planarfriction._engine.coupled.coupling_rows import ALONG, FLAT
 from planarfriction.adapters.drake.patches import Placed
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import placing
-from planarfriction.kernels.coupling_rows import ALONG, FLAT
 
 
 class Shadow:

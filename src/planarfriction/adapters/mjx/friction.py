@@ -15,6 +15,7 @@ import numpy as np
 from mujoco import mjx
 
 from planarfriction import models, validation
+from planarfriction._engine.coupled import placing
 from planarfriction.adapters.mjx import newton, responses
 from planarfriction.adapters.mujoco.friction import Report
 from planarfriction.adapters.mujoco.patches import (
@@ -35,7 +36,6 @@ from planarfriction.formulas import LIGHTEST
 from planarfriction.jax import DistributedModel, ReducedModelPublished
 from planarfriction.jax.base import FrictionPytree
 from planarfriction.jax.namespace import xp
-from planarfriction.kernels import placing
 from planarfriction.models.base import lever_of
 from planarfriction.tensors.pressure import twist_at, wrench_from
 from planarfriction.tensors.steps import LAW

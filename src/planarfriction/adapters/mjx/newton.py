@@ -1,6 +1,6 @@
 """The step in contact space of `planarfriction.coupling`, written with JAX operations and with derivatives.
 
-The same steps of Newton's method as `kernels.coupling` takes, which says why; here as one flat loop with one evaluation
+The same steps of Newton's method as `coupled.coupling` takes, which says why; here as one flat loop with one evaluation
 of the models a round, so that environments side by side wait for each other as little as they can, and little is
 compiled. Derivatives are those of the equation that is solved, at its solution.
 """
@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from planarfriction.kernels.coupling import DOWNHILL, JOINT, ROUND, ROUNDING, SHORTENINGS
+from planarfriction._engine.coupled.coupling import DOWNHILL, JOINT, ROUND, ROUNDING, SHORTENINGS
 
 _GUESS, _REST, _SEARCH = range(3)
 """Kinds of evaluation: the twists that the guess causes, twists at rest, or a point along a Newton step."""

@@ -15,12 +15,12 @@ import jax
 import jax.numpy as jnp
 from mujoco import mjx
 
+from planarfriction._engine.coupled import placing
+from planarfriction._engine.coupled.coupling_rows import ALONG, FLAT
 from planarfriction.adapters.mjx.newton import HostResponse
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
 from planarfriction.formulas import turning_mean
 from planarfriction.jax.namespace import xp
-from planarfriction.kernels import placing
-from planarfriction.kernels.coupling_rows import ALONG, FLAT
 from planarfriction.tensors.pressure import centre_of
 
 

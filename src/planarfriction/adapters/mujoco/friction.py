@@ -16,6 +16,9 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
+from planarfriction._engine.compiler.calls import address_of
+from planarfriction._engine.compiler.memory import place_of, row_of
+from planarfriction._engine.coupled import coupling as kernels
 from planarfriction.adapters.mujoco.draw import draw_patch
 from planarfriction.adapters.mujoco.library import layout, same
 from planarfriction.adapters.mujoco.loops import step as loops
@@ -30,12 +33,9 @@ from planarfriction.adapters.mujoco.patches import (
     parameters_in,
     place_of_parameters,
 )
-from planarfriction.compiler.calls import address_of
-from planarfriction.compiler.memory import place_of, row_of
 from planarfriction.coupling import CoupledPatches
 from planarfriction.environments import check
 from planarfriction.errors import FrictionError, InvalidValueError
-from planarfriction.kernels import coupling as kernels
 from planarfriction.laws.base import is_rate_law
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import warp as wp
 
 from planarfriction import validation
+from planarfriction._engine.coupled import placing
 from planarfriction.adapters.mujoco.friction import Report
 from planarfriction.adapters.mujoco.patches import (
     PatchContact,
@@ -31,7 +32,6 @@ from planarfriction.adapters.mujoco.patches import (
 from planarfriction.adapters.mujoco_warp.loops import arcs, centres, geometry, responses
 from planarfriction.coupling import HostStep
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import placing
 from planarfriction.models.base import lever_of
 from planarfriction.warp import CoupledPatches
 

@@ -11,8 +11,8 @@ import math
 from typing import Any, NamedTuple
 
 from planarfriction import formulas
-from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import jit, kernel
+from planarfriction._engine.compiler import compiled_math as xp
+from planarfriction._engine.compiler import jit, kernel
 from planarfriction.formulas import LawNumbers
 
 

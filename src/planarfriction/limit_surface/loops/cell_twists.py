@@ -10,10 +10,10 @@ import math
 
 import numpy as np
 
-from planarfriction.compiler import jit, kernel
-from planarfriction.kernels.derive import derive
-from planarfriction.kernels.discs import sliding
-from planarfriction.kernels.vectors import dot, norm, plus, times
+from planarfriction._engine.bristles.discs import sliding
+from planarfriction._engine.codegen.derive import derive
+from planarfriction._engine.codegen.vectors import dot, norm, plus, times
+from planarfriction._engine.compiler import jit, kernel
 from planarfriction.limit_surface.loops.twists import lean_of, newton_move, of_each, plane
 
 _BALANCED = 1e-13

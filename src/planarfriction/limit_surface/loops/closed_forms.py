@@ -24,9 +24,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction import formulas
-from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import jit, kernel
-from planarfriction.kernels.vectors import accumulate, clear, plus, put_all
+from planarfriction._engine.codegen.vectors import accumulate, clear, plus, put_all
+from planarfriction._engine.compiler import compiled_math as xp
+from planarfriction._engine.compiler import jit, kernel
 
 POINTS, SEGMENTS, QUADS = 1, 2, 4
 """Kinds of elements by their number of corners; a triangle is a quad with two corners in one place."""
@@ -81,7 +81,7 @@ _ON_SEGMENT = 1e-15
 # Stands for a distance of zero in a denominator whose numerator is zero.
 _TINY = 1e-150
 
-# As in `kernels.surfaces`: a point slower than this share of the twist stands in the centre of rotation.
+# As in `published.surfaces`: a point slower than this share of the twist stands in the centre of rotation.
 _AT_REST = 1e-14
 
 

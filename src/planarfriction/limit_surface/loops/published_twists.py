@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import jit, kernel
-from planarfriction.kernels.surfaces import BILINEAR, sliding
-from planarfriction.kernels.vectors import dot, times
+from planarfriction._engine.codegen.vectors import dot, times
+from planarfriction._engine.compiler import compiled_math as xp
+from planarfriction._engine.compiler import jit, kernel
+from planarfriction._engine.published.surfaces import BILINEAR, sliding
 from planarfriction.limit_surface.loops.twists import of_each, plane
 
 _SAME_ANSWER = 1e-12

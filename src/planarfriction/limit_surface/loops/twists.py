@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import jit, kernel
-from planarfriction.kernels.surfaces import POTENTIAL, sliding, sliding_jacobian
-from planarfriction.kernels.vectors import dot, norm, plus, put_all, times
+from planarfriction._engine.codegen.vectors import dot, norm, plus, put_all, times
+from planarfriction._engine.compiler import compiled_math as xp
+from planarfriction._engine.compiler import jit, kernel
+from planarfriction._engine.published.surfaces import POTENTIAL, sliding, sliding_jacobian
 from planarfriction.limit_surface.loops import closed_forms
 
 BAD_WRENCH = -1.0
@@ -58,7 +58,7 @@ class StoredPotential(NamedTuple):
     """A surface of kind `POTENTIAL`."""
 
     data: np.ndarray
-    """Numbers of the surface (see `kernels.surfaces`)."""
+    """Numbers of the surface (see `published.surfaces`)."""
     size: int
     """Segments of a quadrant."""
     duals: np.ndarray

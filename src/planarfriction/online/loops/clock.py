@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import kernel
+from planarfriction._engine.compiler import compiled_math as xp
+from planarfriction._engine.compiler import kernel
 from planarfriction.online.loops import filter_state as at
 
 RESTART = 10.0

@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import jit, kernel
-from planarfriction.kernels.surfaces import sliding, sliding_jacobian
-from planarfriction.kernels.vectors import clear
+from planarfriction._engine.codegen.vectors import clear
+from planarfriction._engine.compiler import compiled_math as xp
+from planarfriction._engine.compiler import jit, kernel
+from planarfriction._engine.published.surfaces import sliding, sliding_jacobian
 from planarfriction.online.loops import filter_state as at
 from planarfriction.online.loops.clock import time_step
 from planarfriction.online.loops.square_root import ROOT, N, measure, reset, spread, variance_of

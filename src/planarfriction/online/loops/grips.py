@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import jit, kernel
+from planarfriction._engine.compiler import compiled_math as xp
+from planarfriction._engine.compiler import jit, kernel
 from planarfriction.formulas import LARGEST
 from planarfriction.online.loops.friction_filter import NO_SIGN, SEEN_TIME
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from planarfriction.compiler import kernel
-from planarfriction.kernels.vectors import clear
+from planarfriction._engine.codegen.vectors import clear
+from planarfriction._engine.compiler import kernel
 
 N = 12
 """Number of unknowns."""

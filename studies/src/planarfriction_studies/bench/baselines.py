@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels.body import System
-from planarfriction.kernels.integration import Method, Output
+from planarfriction._engine.body.body import System
+from planarfriction._engine.body.integration import Method, Output
 from planarfriction.scenes import Scene
 from planarfriction.scenes.packing import MOST_PIECES, SegmentBatches
 from planarfriction.solvers import RODAS4, Statistics, integrate
@@ -91,7 +91,7 @@ class Window:
         """Solve with a method of SciPy's `solve_ivp`, restarted at every jump; `atol` in the units of the states."""
         from scipy.integrate import solve_ivp
 
-        from planarfriction.kernels.body import right_hand_side
+        from planarfriction._engine.body.body import right_hand_side
 
         system, y = self.packed.system, self.packed.state.copy()
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from planarfriction.compiler.threads import processors
+from planarfriction._engine.compiler.threads import processors
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.reading import read_text
 from planarfriction_studies.bench.measurement import Measurement

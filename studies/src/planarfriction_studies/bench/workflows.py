@@ -10,7 +10,7 @@ import time
 import numpy as np
 
 from planarfriction import planning, sweeps
-from planarfriction.compiler.threads import processors
+from planarfriction._engine.compiler.threads import processors
 from planarfriction.derivatives import rollout
 from planarfriction.identify import FitOptions, Log, identify_lugre
 from planarfriction.laws import ElastoPlastic, LuGre

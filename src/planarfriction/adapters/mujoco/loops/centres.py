@@ -9,6 +9,11 @@ from __future__ import annotations
 
 import math
 
+from planarfriction._engine.codegen.vectors import dot, plus, square, three
+from planarfriction._engine.compiler import compiled_math as xp
+from planarfriction._engine.compiler import kernel
+from planarfriction._engine.compiler.memory import at, doubles, integers
+from planarfriction._engine.coupled import placing
 from planarfriction.adapters.mujoco.loops.geometry import (
     across,
     axes,
@@ -19,11 +24,6 @@ from planarfriction.adapters.mujoco.loops.geometry import (
     places_of,
 )
 from planarfriction.adapters.mujoco.loops.models import displacement_of, scale_of
-from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import at, doubles, integers
-from planarfriction.kernels import placing
-from planarfriction.kernels.vectors import dot, plus, square, three
 
 FOLLOWS = 1e-3
 """Angle [rad] by which bodies roll on each other, and displacement in lever arms of the patch by which they slide, in a

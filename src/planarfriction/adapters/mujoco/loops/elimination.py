@@ -6,7 +6,7 @@ trees keep their zeros, and so do those of trees in contact as far as their cont
 
 from __future__ import annotations
 
-from planarfriction.compiler import kernel
+from planarfriction._engine.compiler import kernel
 
 
 @kernel

@@ -15,14 +15,14 @@ from __future__ import annotations
 
 import math
 
-from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import kernel
-from planarfriction.compiler.calls import call_c
-from planarfriction.compiler.memory import at, doubles, integers, integers32
+from planarfriction._engine.codegen.vectors import clear, dot, norm, plus, square, three, times, zeros
+from planarfriction._engine.compiler import compiled_math as xp
+from planarfriction._engine.compiler import kernel
+from planarfriction._engine.compiler.calls import call_c
+from planarfriction._engine.compiler.memory import at, doubles, integers, integers32
+from planarfriction._engine.coupled import placing
+from planarfriction._engine.coupled.coupling_rows import ALONG, FLAT
 from planarfriction.formulas import turning_mean
-from planarfriction.kernels import placing
-from planarfriction.kernels.coupling_rows import ALONG, FLAT
-from planarfriction.kernels.vectors import clear, dot, norm, plus, square, three, times, zeros
 
 onto_plane = kernel(placing.onto_plane)
 across = kernel(placing.across)

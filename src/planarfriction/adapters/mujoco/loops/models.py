@@ -7,11 +7,11 @@ patch in the model's own size: twists `(v, scale omega)`, torques over scale.
 
 from __future__ import annotations
 
-from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import at, doubles, integers, integers32
+from planarfriction._engine.codegen.vectors import copy
+from planarfriction._engine.compiler import compiled_math as xp
+from planarfriction._engine.compiler import kernel
+from planarfriction._engine.compiler.memory import at, doubles, integers, integers32
 from planarfriction.formulas import PARAMETERS, LawNumbers
-from planarfriction.kernels.vectors import copy
 
 LONGEST = 0.01
 """Longest time step [s] where MuJoCo makes contacts softer for it, and the integrator is implicit."""

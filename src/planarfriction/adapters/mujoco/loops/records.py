@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from planarfriction.compiler.memory import Doubles, Integers, Layout, offsets_of, reader
+from planarfriction._engine.compiler.memory import Doubles, Integers, Layout, offsets_of, reader
 
 
 def _integers(name: str, fields: str) -> Any:

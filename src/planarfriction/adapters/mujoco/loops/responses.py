@@ -7,13 +7,13 @@ twists answer with `A = dt J Mh^-1 M X`, loads with `B = -sum D Jc X` over the r
 
 from __future__ import annotations
 
+from planarfriction._engine.codegen.vectors import copy
+from planarfriction._engine.compiler import compiled_math as xp
+from planarfriction._engine.compiler import kernel
+from planarfriction._engine.compiler.calls import call_c
+from planarfriction._engine.compiler.memory import at, doubles, integers, integers32
 from planarfriction.adapters.mujoco.loops.elimination import backward, eliminate, multiply
 from planarfriction.adapters.mujoco.loops.geometry import owners_of, places_of
-from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import kernel
-from planarfriction.compiler.calls import call_c
-from planarfriction.compiler.memory import at, doubles, integers, integers32
-from planarfriction.kernels.vectors import copy
 
 MISFIT = 3e-9
 """Speed [m/s] by which a constraint may leave its range without a new solution."""

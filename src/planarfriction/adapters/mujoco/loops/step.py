@@ -11,20 +11,20 @@ from typing import NamedTuple
 
 from numba import types
 
+from planarfriction._engine.codegen.vectors import clear, copy
+from planarfriction._engine.compiler import callback, entry, jit, kernel
+from planarfriction._engine.compiler.calls import address_of, c_address_of, call, call_c, pointer, shared_word
+from planarfriction._engine.compiler.memory import Place, arrays_at, at, doubles, integers, integers32
+from planarfriction._engine.coupled.coupling import shortening_of, too_far
+from planarfriction._engine.coupled.coupling_rows import Problem
+from planarfriction._engine.coupled.coupling_rows import read as read_patches
+from planarfriction._engine.coupled.coupling_steps import step_all
+from planarfriction._engine.coupled.following import hold
 from planarfriction.adapters.mujoco.loops.centres import follow_centres
 from planarfriction.adapters.mujoco.loops.geometry import place
 from planarfriction.adapters.mujoco.loops.models import displacement_of, fits, scale_of, serves, write_laws
 from planarfriction.adapters.mujoco.loops.records import Host, Remembered, Scratch, read
 from planarfriction.adapters.mujoco.loops.responses import is_sparse, leaves_range, respond
-from planarfriction.compiler import callback, entry, jit, kernel
-from planarfriction.compiler.calls import address_of, c_address_of, call, call_c, pointer, shared_word
-from planarfriction.compiler.memory import Place, arrays_at, at, doubles, integers, integers32
-from planarfriction.kernels.coupling import shortening_of, too_far
-from planarfriction.kernels.coupling_rows import Problem
-from planarfriction.kernels.coupling_rows import read as read_patches
-from planarfriction.kernels.coupling_steps import step_all
-from planarfriction.kernels.following import hold
-from planarfriction.kernels.vectors import clear, copy
 
 PASSES = 10
 """Largest number of solutions of a step, again after it has activated other constraints."""

@@ -7,9 +7,9 @@ As `planarfriction.adapters.mujoco.loops.centres`, one thread a world.
 
 import warp as wp
 
+from planarfriction._engine.coupled import placing
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
 from planarfriction.adapters.mujoco_warp.loops.geometry import Frames, Host, Patches, Problem
-from planarfriction.kernels import placing
 
 excess = wp.func(placing.excess)
 

@@ -8,9 +8,9 @@ As `planarfriction.adapters.mujoco.loops.geometry`, one thread a world.
 import mujoco
 import warp as wp
 
+from planarfriction._engine.coupled import placing
+from planarfriction._engine.coupled.coupling_rows import ALONG, FLAT
 from planarfriction.adapters.mujoco.loops.records import Memory
-from planarfriction.kernels import placing
-from planarfriction.kernels.coupling_rows import ALONG, FLAT
 
 FRICTIONLESS = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS))
 

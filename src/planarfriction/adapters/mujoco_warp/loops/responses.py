@@ -9,8 +9,8 @@ exact for these constraints: `H a = f + Jp' W_0 + Jc' (D a_ref + c)`. One thread
 import mujoco
 import warp as wp
 
+from planarfriction._engine.coupled import placing
 from planarfriction.adapters.mujoco_warp.loops.geometry import Frames, Host, Patches, Places, Problem
-from planarfriction.kernels import placing
 
 EQUALITY = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_EQUALITY))
 DOF_LOSS = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF))

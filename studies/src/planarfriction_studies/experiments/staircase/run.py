@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.kernels import spin_sums
+from planarfriction._engine.published import spin_sums
 from planarfriction.limit_surface import LimitSurfaceCells
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction.plots.style import LINE_STYLES, PlotFigure

@@ -1,0 +1,34 @@
+"""The bristle of a point: two components, driven by the velocity `u` of the point.
+
+    z' = u - k z,     t = -(sigma_0 z + sigma_1 z' + sigma_2 u),     k = bristle_decay (docs/physics.md, "Bristles")
+
+Functions are straight lines: loops over cells and derivatives are written from them (see `cell_passes`).
+"""
+
+from __future__ import annotations
+
+from planarfriction import formulas
+from planarfriction._engine.bristles import bristle_step
+from planarfriction._engine.bristles.law import grip, traction
+from planarfriction._engine.codegen.rules import ratio
+from planarfriction._engine.codegen.vectors import Vector, dot, norm, plus
+from planarfriction._engine.compiler import compiled_math as xp
+from planarfriction._engine.compiler import kernel
+from planarfriction.formulas import LawNumbers
+
+
+@kernel
+def evaluate(law: LawNumbers, z: Vector, u: Vector) -> tuple[Vector, Vector]:
+    """Compute z' and the traction of a point that moves at u."""
+    speed, size = norm(u), norm(z)
+    q = grip(law, speed)
+    rate = plus(u, -formulas.bristle_decay(xp, size * q, ratio(dot(z, u), size), speed, q, law), z)
+    return rate, traction(law, z, rate, u)
+
+
+@kernel
+def step(law: LawNumbers, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
+    """Compute the bristle after dt and its traction (see `bristle_step`)."""
+    speed = norm(u)
+    new, k = bristle_step.step(law, z, u, speed, 1.0, grip(law, speed), dt)
+    return new, traction(law, new, plus(u, -k, new), u)

@@ -1,0 +1,100 @@
+"""Cells in blocks, so that loops over them are vector code without a remainder.
+
+A block holds up to `LANES` cells, field after field. The cells of a contact are spread evenly over its blocks (see
+`divided`); the last one is filled up with cells without load. See `cell_passes` for loops over them.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from planarfriction._engine.codegen.vectors import Vector, plus
+from planarfriction._engine.compiler import kernel
+from planarfriction._engine.compiler.memory import Doubles, at
+
+VECTOR = 8
+"""Numbers of the longest vectors that processors have."""
+
+LANES = 64
+"""Most cells of a block: several of the longest vectors of processors, so that constants are read once for all."""
+
+Z, WEIGHT, BY_LOAD, BAR, OUT = (LANES * n for n in (8, 11, 12, 13, 16))
+"""Fields of a block behind the numbers of the levers and an asymmetry: state, weights, their slopes by the load,
+cotangent or change of the state, and the wrench with its change, which add up over the cells; three fields for a state,
+of which points use two. Blocks share nothing, so that each is seen to be free of dependences."""
+
+BLOCK = LANES * 23
+"""Numbers of a block: an odd number of fields, for if it were a power of two, blocks would drive each other out of the
+cache."""
+
+
+@kernel
+def divided(count: int) -> tuple[int, int]:
+    """Return the number of blocks of so many cells and the number of cells in each, a multiple of `VECTOR`."""
+    blocks = -(-count // LANES)
+    return blocks, -(-count // (blocks * VECTOR)) * VECTOR
+
+
+class Limit(NamedTuple):
+    """Compiled functions of the limit of a bristle with a fixed stiffness (see `settle`)."""
+
+    within: Any
+    """`(law, z)`: return the bristle brought back onto its limit, if it is beyond."""
+    forth: Any
+    back: Any
+    """Forth and back of `within` (see `derive`), by z, `sigma_0` and `mu_s`."""
+    pushed: Any
+    """`(law, z, changes)`: bring back a bristle and its changes."""
+
+
+class Kind(NamedTuple):
+    """Compiled functions of a kind of cells in blocks."""
+
+    lever: Any
+    size: int
+    """Components of a bristle."""
+    advance: Any
+    """`(law, twist, (dt,), block, lanes)`: step the cells of a block, and return their wrench."""
+    retreat: Any
+    """`(law, twist, (dt, load, 1 or 0 without load, pull[3]), block, lanes)`: carry the cotangent of the state over a
+    step; return the sums of `cell_passes.backward_passes`."""
+    shares: Any
+    """Arguments as of `retreat`: add the derivatives of `load pull . wrench` of a step by the weights to `OUT`."""
+    pushed: Any
+    """`(law, z, u, dt, dz, du, changes of the law)`: step a cell and its change."""
+    law: Any
+    """`(law, block, i)`: return the law of cell i, with its asymmetry if there is one."""
+    limit: Limit
+    vector: Any
+    """`(row, first, stride)`: return the components of a bristle."""
+
+
+@kernel
+def totals(w: Doubles, blocks: int, field: int, lanes: int) -> Vector:
+    """Return the sums of three fields over all cells."""
+    total = (0.0, 0.0, 0.0)
+    for k in range(blocks):
+        block = at(w, k * BLOCK + field)
+        for i in range(lanes):
+            total = plus(total, 1.0, (block[i], block[LANES + i], block[2 * LANES + i]))
+    return total
+
+
+@intrinsic(prefer_literal=True)
+def scratch(typingctx: Any, count: types.Type) -> Any:
+    """Return memory for a constant count of doubles, which lasts until the function returns it is inlined into."""
+    if not isinstance(count, types.IntegerLiteral):
+        return None
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind = ir.ArrayType(ir.DoubleType(), count.literal_value)
+        with builder.goto_entry_block():
+            place = builder.alloca(kind)
+            place.align = 8 * VECTOR
+        return builder.bitcast(place, ir.DoubleType().as_pointer())
+
+    return types.CPointer(types.float64)(count), generate

@@ -1,0 +1,51 @@
+"""Rollouts of kinds of cells, their adjoint and their derivatives (see `cells_rollout`)."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+from planarfriction._engine.bristles.leaning_cells import Leaning
+from planarfriction._engine.cells import cells_rollout, cells_sensitivities
+from planarfriction._engine.cells.cell_blocks import LANES, Kind, Limit
+from planarfriction._engine.cells.cell_passes import KINDS, backward_passes, forward_passes, share_passes
+from planarfriction._engine.codegen.derive import derive
+from planarfriction._engine.codegen.forward import forward
+from planarfriction._engine.codegen.vectors import reader_of
+from planarfriction._engine.compiler import kernel
+from planarfriction._engine.compiler.memory import Doubles
+from planarfriction.formulas import LawNumbers
+
+
+@kernel
+def _shared(law: LawNumbers, block: Doubles, i: int) -> LawNumbers:
+    return law
+
+
+def _leaning_at(first: int) -> Any:
+    """Return `cell_blocks.Kind.law` of cells whose asymmetry lies in two fields of a block, from one on."""
+
+    @kernel
+    def law_of_cell(law: LawNumbers, block: Doubles, i: int) -> Leaning:
+        return Leaning(law, (block[first + i], block[first + LANES + i]))
+
+    return law_of_cell
+
+
+@functools.cache
+def rollouts_of_cells(size: int, turned: bool, leans: bool) -> tuple:
+    """Return rollout, gradient, sensitivities, tangent and shares of a kind of cells (see `KINDS`)."""
+    kind = KINDS[size, turned, leans]
+    path, law = ("lean.law", _leaning_at(LANES * kind.numbers)) if leans else ("law", _shared)
+    step, within, by = kind.element.step, kind.element.within, ("z", f"{path}.sigma_0", f"{path}.mu_s")
+    limited = derive(within, by, ("z",))
+    limit = Limit(within, limited.forth, limited.back, forward(within, by, ("z",)))
+    pushed = forward(step, cells_rollout.by_of(path), ("z", "u"))
+    loops = forward_passes(kind).run, backward_passes(kind).run, share_passes(kind).run
+    functions = Kind(kind.lever, size, *loops, pushed, law, limit, reader_of(size))
+    sensitivities = cells_sensitivities.bound(functions, step, within, path, kind.name)
+    rollout, gradient, tangent, shares = (
+        cells_rollout.entry_of(each, functions, kind.name)
+        for each in (cells_rollout.rollout, cells_rollout.gradient, cells_rollout.tangent, cells_rollout.shares)
+    )
+    return rollout, gradient, sensitivities, tangent, shares

@@ -1,0 +1,190 @@
+"""Contacts of cells as solver and steps call them (see `cell_passes` for their loops).
+
+A cell sees the velocity `u = B V` of its lever B (see `cells.Lever`) and adds `w B' t` to the wrench, t being its
+traction (docs/physics.md, "Distributed model").
+
+A bristle whose stiffness does not grow with the load (docs/physics.md, "Stiffness and load") moves as one of the
+published law at `l z` with `l = f_ref/f` (see `settle`), and besides returns to its limit where a falling load has left
+it beyond. The factor l comes behind the twist.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+from planarfriction._engine.bristles import leaning_cells
+from planarfriction._engine.bristles.leaning_cells import Leaning
+from planarfriction._engine.bristles.settle import recovery
+from planarfriction._engine.cells import cells, general_cells
+from planarfriction._engine.cells.cell_blocks import LANES, divided, scratch
+from planarfriction._engine.cells.cell_passes import (
+    DISC,
+    KINDS,
+    CellKind,
+    Element,
+    Rows,
+    rate_passes,
+    slope_passes,
+    step_passes,
+)
+from planarfriction._engine.cells.cells import CellsContact
+from planarfriction._engine.codegen.vectors import Vector, clear, copy, norm, plus, put, three, times
+from planarfriction._engine.compiler import kernel
+from planarfriction._engine.compiler.memory import Doubles, Place, at
+from planarfriction._engine.protocol import ModelFunctions, StepFunctions, functions_of, step_functions
+from planarfriction.formulas import LawNumbers
+
+RESULTS = LANES * 4 * DISC.size**2
+"""Numbers of the results of a block of cells: derivatives of rates and tractions, or rates or bristles, row by row."""
+
+BLOCK = RESULTS + LANES * 12
+"""Numbers of a block of cells: results, and copies of up to eight numbers, of the bristle and of the weight."""
+
+
+@kernel
+def _in_place(contact: CellsContact, z: Doubles, first: int, lanes: int, out: Doubles, block: Doubles) -> Any:
+    """Return the rows of cells of a contact from one on, and their number."""
+    rows = Rows(at(contact.cells, first), at(z, first), at(contact.weights, first), out, contact.count)
+    return rows, min(lanes, contact.count - first)
+
+
+def _filled(numbers: int, size: int) -> Any:
+    """Return a function like `_in_place` that copies cells into a block, filled up with cells without load.
+
+    Loops over it need not ask which of their rows overlap: that takes as long as a loop over a few dozen cells.
+    """
+    bristle, weight = RESULTS + numbers * LANES, RESULTS + (numbers + size) * LANES
+
+    @kernel
+    def filled(contact: CellsContact, z: Doubles, first: int, lanes: int, out: Doubles, block: Doubles) -> Any:
+        n, count = contact.count, min(lanes, contact.count - first)
+        for m in range(numbers + size + 1):
+            clear(at(block, RESULTS + m * LANES + count), lanes - count)
+        for m in range(numbers):
+            copy(at(contact.cells, m * n + first), at(block, RESULTS + m * LANES), count)
+        for m in range(size):
+            copy(at(z, m * n + first), at(block, bristle + m * LANES), count)
+        copy(at(contact.weights, first), at(block, weight), count)
+        return Rows(at(block, RESULTS), at(block, bristle), at(block, weight), out, LANES), lanes
+
+    return filled
+
+
+@kernel
+def _through(
+    record: CellsContact, z: Doubles, v: Vector, shared: Vector, out: Doubles, cell_rows: Any, run: Any, copied: int
+) -> Vector:
+    """Run passes over all cells, which write `copied` rows to `out`, or any number if it is 0; return their sums."""
+    total, block, n, (_, lanes) = (0.0, 0.0, 0.0), scratch(BLOCK), record.count, divided(record.count)
+    for first in range(0, n, lanes):
+        rows, count = cell_rows(record, z, first, lanes, block if copied > 0 else at(out, first), block)
+        total = plus(total, 1.0, run(record.law, v, shared, rows, count))
+        for m in range(copied):
+            copy(at(block, m * LANES), at(out, m * n + first), min(lanes, n - first))
+    return total
+
+
+def evaluate(
+    contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, *, cell_rows: Any, rate: Any, copied: int,
+    fixed: bool, read: Any,
+) -> None:  # fmt: skip
+    """Write `z'`, and `W`; behind V is the factor of a `fixed` stiffness."""
+    factor = v[3] if fixed else 0.0
+    put(w, _through(read(contact), z, three(v), (factor,), zdot, cell_rows, rate, copied))
+
+
+def linearise(
+    contact: Place, z: Doubles, v: Doubles, lin: Doubles, *, bristle: Any, cell_rows: Any, slope: Any, fixed: bool,
+    read: Any,
+) -> None:  # fmt: skip
+    """Write A and F of each cell, and C and E unless tractions are linear (see `general_cells`)."""
+    record, twist, factor, block = read(contact), three(v), v[3] if fixed else 0.0, scratch(BLOCK)
+    n, (_, lanes) = record.count, divided(record.count)
+    for first in range(0, n, lanes):
+        rows, count = cell_rows(record, z, first, lanes, block, block)
+        slope(record.law, twist, (factor,), rows, count)
+        square = bristle.size * bristle.size
+        for m in range(2 * square if bristle.linear else 4 * square):
+            row = m if m < 2 * square else m + square  # behind the inverse
+            copy(at(block, m * LANES), at(lin, row * n + first), min(lanes, n - first))
+
+
+def step(
+    contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, cell_rows: Any, advance: Any,
+    copied: int, read: Any,
+) -> None:  # fmt: skip
+    """Advance the bristles by `dt` at a held twist, and write the wrench at the end."""
+    put(out, _through(read(contact), z, three(v), (dt,), new, cell_rows, advance, copied))
+
+
+@functools.cache
+def functions_of_cells(size: int, turned: bool, leans: bool) -> tuple[ModelFunctions, StepFunctions]:
+    """Return the functions of contacts of a kind of cells (see `KINDS`); they are written on first use."""
+    kind = KINDS[size, turned, leans]
+    return rates_of(kind, cells.read), steps_of(kind, cells.read)
+
+
+def _model_of(kind: CellKind, read: Any) -> dict[str, Any]:
+    """Return the arguments of templates that rates and steps of a kind of cells share."""
+    size, numbers = kind.element.size, kind.numbers + 2 * kind.leans
+    copied = size if size == DISC.size else 0  # points come by the hundred
+    cell_rows = _filled(numbers, size) if copied else _in_place
+    bristle = general_cells.bristle(size, kind.linear)
+    return {"lever": kind.lever, "bristle": bristle, "read": read, "copied": copied, "cell_rows": cell_rows}
+
+
+def rates_of(kind: CellKind, read: Any) -> ModelFunctions:
+    """Return the functions of the solver for contacts of a kind of cells whose records `read` reads."""
+    loops = {"rate": rate_passes(kind).run, "slope": slope_passes(kind).run, "fixed": kind.fixed}
+    return functions_of(kind.name, (evaluate, linearise, *general_cells.FUNCTIONS), **_model_of(kind, read), **loops)
+
+
+def steps_of(kind: CellKind, read: Any) -> StepFunctions:
+    """Return the steps of contacts of a kind of cells whose records `read` reads."""
+    slopes = general_cells.slopes_of(kind.element.step, kind.element.size)
+    loops = {"advance": step_passes(kind).run, "linearise": slopes}
+    return step_functions(kind.name, (step, general_cells.slopes), **_model_of(kind, read), **loops)
+
+
+# ---------------------------------------------------------------------- of a fixed stiffness
+
+
+@kernel
+def _itself(law: LawNumbers) -> LawNumbers:
+    return law
+
+
+@kernel
+def _law_of(lean: Leaning) -> LawNumbers:
+    return lean.law
+
+
+@kernel
+def _bent(law: LawNumbers, z: Vector) -> Vector:
+    return z
+
+
+def _recovering(kind: CellKind) -> Element:
+    """Return the bristle that recovers from beyond its limit, from the rate and the traction of the published one."""
+    published, numbers, out = kind.element.evaluate, _itself, _bent  # seen from the middle of its limit
+    if kind.leans:
+        numbers, out = _law_of, leaning_cells.out if kind.element.size == 2 else leaning_cells.out_of_disc
+
+    @kernel
+    def evaluate(law: LawNumbers | Leaning, z: Vector, u: Vector, factor: float) -> tuple[Vector, Vector]:
+        bent = times(factor, z)
+        rate, traction = published(law, bent, u)
+        plain, beyond = numbers(law), out(law, bent)
+        k = recovery(plain, beyond, norm(u))
+        return plus(rate, -k, beyond), plus(traction, plain.sigma_1 * k, beyond)
+
+    return Element(f"recovering {kind.element.name}", kind.element.size, evaluate, None)
+
+
+@functools.cache
+def fixed_rates_of(size: int, turned: bool, leans: bool) -> ModelFunctions:
+    """Return the functions of the solver for contacts of a kind of cells (see `KINDS`) with a fixed stiffness."""
+    kind = KINDS[size, turned, leans]
+    fixed = kind._replace(name=f"fixed_{kind.name}", element=_recovering(kind), linear=False, fixed=True)
+    return rates_of(fixed, cells.read)

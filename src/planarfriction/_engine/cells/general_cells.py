@@ -1,0 +1,256 @@
+"""A contact of n cells, cell by cell, whose bristles follow any law, `z' = f(z, u)` with the traction `t(z, u)`.
+
+A bristle has d components, two of a point or three of a disc; the state of the contact is `z [d, n]`. With `u = B V`
+of a cell (see `cells.Lever`) and the derivatives `A = df/dz`, `F = df/du`, `C = dt/dz`, `E = dt/du`, each [d, d],
+`D = shift I - A` is inverted cell by cell; `W = sum w B' t`. The functions are described at
+`protocol.ModelFunctions` and `protocol.StepFunctions`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from planarfriction._engine.bristles.law import traction
+from planarfriction._engine.cells.cells import Lever
+from planarfriction._engine.codegen.derive import derive, run_source, text_of
+from planarfriction._engine.codegen.small_matrices import inverse
+from planarfriction._engine.codegen.vectors import (
+    Vector,
+    matrix_applied,
+    matrix_applied_back,
+    matrix_product,
+    plus,
+    put,
+    put_all,
+    reader_of,
+    scatter,
+    three,
+    times,
+)
+from planarfriction._engine.compiler import kernel
+from planarfriction._engine.compiler.memory import Doubles, Place, arrays_at, at
+from planarfriction._engine.protocol import ROWS, SLOPES
+
+MATRICES = 5
+"""Matrices [d, d] of a cell in a linearisation: A, F, the inverse of D, C and E; number by number, [5 d d, n]."""
+
+LINEAR = 3
+"""Matrices of a cell whose bristle is `Bristle.linear`: A, F and the inverse."""
+
+A, F, INVERSE, C, E = range(MATRICES)
+
+
+class CellSlopes(NamedTuple):
+    """A step of a cell with its derivatives by the bristle and by the velocity of the cell, [d, d] row by row."""
+
+    new: tuple
+    traction: tuple
+    """Per unit load."""
+    new_z: tuple
+    new_u: tuple
+    traction_z: tuple
+    traction_u: tuple
+
+
+class Bristle(NamedTuple):
+    """Compiled functions of bristles of d components."""
+
+    size: int
+    """d"""
+    vector: Any
+    """`(row, first, stride)`: return d numbers."""
+    matrix: Any
+    """`(row, first, stride)`: return d^2 numbers."""
+    identity: tuple
+    """Identity matrix [d, d], row by row."""
+    inverse: Any
+    """`(shift, a)`: return the inverse of `shift I - A`."""
+    linear: bool
+    """True if the traction is `-(sigma_0 z + sigma_1 z' + sigma_2 u)`: C and E then follow from A and F."""
+
+
+def bristle(size: int, linear: bool) -> Bristle:
+    """Return the functions of a bristle of two or three components."""
+    identity = tuple(float(i % (size + 1) == 0) for i in range(size * size))
+    readers = reader_of(size), reader_of(size * size)
+    return Bristle(size, *readers, identity, inverse if size == 3 else _inverse_2, linear)
+
+
+def slopes_of(function: Any, size: int) -> Any:
+    """Return a function that returns two vectors with their derivatives by z and u, as `CellSlopes`."""
+    written = derive(function, ("z", "u"), ("z", "u"))
+    forth, rows_of = written.forth, _rows_of(written.back, size)
+
+    @kernel
+    def slopes(*arguments: Any) -> CellSlopes:
+        results, tape = forth(*arguments)
+        return CellSlopes(results[0], results[1], *rows_of(tape))
+
+    return slopes
+
+
+def _rows_of(back: Any, size: int) -> Any:
+    """Return a kernel of a tape that returns the derivatives of two vectors by z and u, row by row."""
+    lines = []
+    for m in range(2 * size):
+        bars = [float(m == j) for j in range(2 * size)]
+        lines.append(f"z{m}, u{m} = back(tape, ({tuple(bars[:size])}, {tuple(bars[size:])}))")
+    halves = range(size), range(size, 2 * size)
+    rows = [", ".join(f"*{by}{m}" for m in half) for half in halves for by in "zu"]
+    source = text_of("rows(tape)", [*lines, f"return {', '.join(f'({row})' for row in rows)}"])
+    return kernel(run_source("slopes", source, {"back": back})["rows"])
+
+
+@kernel
+def _inverse_2(shift: float, m: Vector) -> Vector:
+    a, b, c, d = shift - m[0], -m[1], -m[2], shift - m[3]
+    per = 1.0 / (a * d - b * c)
+    return per * d, -per * b, -per * c, per * a
+
+
+@kernel
+def _matrix(bristle: Bristle, lin: Doubles, which: int, i: int, n: int) -> Vector:
+    """Return a matrix of cell i."""
+    return bristle.matrix(lin, which * bristle.size * bristle.size * n + i, n)
+
+
+def factor(
+    contact: Place, z: Doubles, shift: float, lin: Doubles, stiffness: Doubles, *, lever: Lever, bristle: Bristle,
+    read: Any,
+) -> None:  # fmt: skip
+    """Invert D, write `sum w B' (C D^-1 F + E) B`."""
+    record, total = read(contact), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    n = record.count
+    for i in range(n):
+        inverse = bristle.inverse(shift, _matrix(bristle, lin, A, i, n))
+        scatter(lin, INVERSE * bristle.size * bristle.size * n + i, n, inverse)
+        driven = matrix_product(inverse, _matrix(bristle, lin, F, i, n))
+        if bristle.linear:
+            pull = record.law.sigma_0 + record.law.sigma_1 * shift
+            p = plus(times(-pull, driven), -record.law.sigma_2, bristle.identity)
+        else:
+            p = plus(matrix_product(_matrix(bristle, lin, C, i, n), driven), 1.0, _matrix(bristle, lin, E, i, n))
+        total = plus(total, record.weights[i], lever.around(lever.read(record.cells, i, n), p))
+    put_all(stiffness, total)
+
+
+def eliminate(
+    contact: Place, z: Doubles, shift: float, r: Doubles, lin: Doubles, w: Doubles, *, lever: Lever, bristle: Bristle,
+    read: Any,
+) -> None:  # fmt: skip
+    """Write `sum w B' C D^-1 r`."""
+    record, total = read(contact), (0.0, 0.0, 0.0)
+    n = record.count
+    for i in range(n):
+        residual = bristle.vector(r, i, n)
+        solved = matrix_applied(_matrix(bristle, lin, INVERSE, i, n), residual)
+        if bristle.linear:
+            t = plus(times(record.law.sigma_1, residual), -record.law.sigma_0 - record.law.sigma_1 * shift, solved)
+        else:
+            t = matrix_applied(_matrix(bristle, lin, C, i, n), solved)
+        total = plus(total, record.weights[i], lever.wrench(lever.read(record.cells, i, n), t))
+    put(w, total)
+
+
+def back_substitute(
+    contact: Place, z: Doubles, r: Doubles, dv: Doubles, lin: Doubles, out: Doubles, *, lever: Lever,
+    bristle: Bristle, read: Any,
+) -> None:  # fmt: skip
+    """Solve `D out = r + F B dV`."""
+    record, twist = read(contact), three(dv)
+    n = record.count
+    for i in range(n):
+        driven = matrix_applied(_matrix(bristle, lin, F, i, n), lever.seen(lever.read(record.cells, i, n), twist))
+        driven = plus(driven, 1.0, bristle.vector(r, i, n))
+        scatter(out, i, n, matrix_applied(_matrix(bristle, lin, INVERSE, i, n), driven))
+
+
+def change(
+    contact: Place, z: Doubles, zdot: Doubles, lin: Doubles, dz: Doubles, dzdot: Doubles, rows: Doubles,
+    friction: float, size: float, *, lever: Lever, bristle: Bristle, read: Any,
+) -> None:  # fmt: skip
+    """Write the changes of `z'` and of the wrench; bristles and their limits grow with friction."""
+    record, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
+    n, twist = record.count, (rows.d_twist[0], rows.d_twist[1], rows.d_twist[2] + size * rows.twist[2])
+    for i in range(n):
+        cell, dz_i = lever.read(record.cells, i, n), bristle.vector(dz, i, n)
+        grown = times(friction, bristle.vector(z, i, n))
+        u, a, by_z = lever.seen(cell, twist), plus(dz_i, -1.0, grown), _matrix(bristle, lin, A, i, n)
+        rate = plus(matrix_applied(by_z, a), 1.0, matrix_applied(_matrix(bristle, lin, F, i, n), u))
+        scatter(dzdot, i, n, rate)
+        if bristle.linear:
+            t = plus(traction(record.law, a, rate, u), -record.law.sigma_0, grown)
+        else:  # the traction sees the bristle as it is, and only its rate as that of a smaller one
+            t = plus(
+                matrix_applied(_matrix(bristle, lin, C, i, n), dz_i), record.law.sigma_1, matrix_applied(by_z, grown)
+            )
+            t = plus(t, 1.0, matrix_applied(_matrix(bristle, lin, E, i, n), u))
+        total = plus(total, record.weights[i], lever.wrench(cell, t))
+    put(rows.d_wrench, plus(total, size * rows.wrench[2], (0.0, 0.0, 1.0)))
+
+
+def solve_transposed(
+    contact: Place, z: Doubles, r: Doubles, lin: Doubles, out: Doubles, *, bristle: Bristle, read: Any
+) -> None:
+    """Solve `D' out = r`."""
+    n = read(contact).count
+    for i in range(n):
+        scatter(out, i, n, matrix_applied_back(_matrix(bristle, lin, INVERSE, i, n), bristle.vector(r, i, n)))
+
+
+def pull_back(
+    contact: Place, z: Doubles, lin: Doubles, dzdot: Doubles, rows: Doubles, out: Doubles, *, lever: Lever,
+    bristle: Bristle, read: Any,
+) -> None:  # fmt: skip
+    """Write the transpose of `change`."""
+    record, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
+    n, wrench = record.count, three(rows.d_wrench)
+    for i in range(n):
+        cell, rate = lever.read(record.cells, i, n), bristle.vector(dzdot, i, n)
+        t = times(record.weights[i], lever.seen(cell, wrench))
+        if bristle.linear:
+            rate = plus(rate, -record.law.sigma_1, t)
+            by_z, by_u = times(-record.law.sigma_0, t), times(-record.law.sigma_2, t)
+        else:
+            by_z = matrix_applied_back(_matrix(bristle, lin, C, i, n), t)
+            by_u = matrix_applied_back(_matrix(bristle, lin, E, i, n), t)
+        scatter(out, i, n, plus(by_z, 1.0, matrix_applied_back(_matrix(bristle, lin, A, i, n), rate)))
+        by_u = plus(by_u, 1.0, matrix_applied_back(_matrix(bristle, lin, F, i, n), rate))
+        total = plus(total, 1.0, lever.wrench(cell, by_u))
+    put(rows.d_twist, total)
+
+
+@kernel
+def _put_cell(
+    lever: Lever, bristle: Bristle, cell: Vector, weight: float, linear: CellSlopes, i: int, n: int, out: Doubles
+) -> None:
+    """Write the derivatives of cell i to its places in d new/dV [d, n, 3], dW/dz [3, d, n] and d new/dz [d, d, n]."""
+    d = bristle.size
+    for j in range(3):
+        unit = (1.0 if j == 0 else 0.0), (1.0 if j == 1 else 0.0), (1.0 if j == 2 else 0.0)
+        u = lever.seen(cell, unit)
+        scatter(out, 3 * i + j, 3 * n, matrix_applied(linear.new_u, u))
+        scatter(out, (3 + j) * d * n + i, n, times(weight, matrix_applied_back(linear.traction_z, u)))
+    scatter(out, 6 * d * n + i, n, linear.new_z)
+
+
+def slopes(
+    contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, lever: Lever, bristle: Bristle,
+    linearise: Any, read: Any, whole: bool,
+) -> None:  # fmt: skip
+    """Step with the slopes of the wrench, or with all derivatives."""
+    record, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
+    n, by_twist = record.count, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for i in range(n):
+        cell = lever.read(record.cells, i, n)
+        linear = linearise(lever.law(record, i), bristle.vector(z, i, n), lever.seen(cell, twist), dt)
+        scatter(new, i, n, linear.new)
+        total = plus(total, record.weights[i], lever.wrench(cell, linear.traction))
+        by_twist = plus(by_twist, record.weights[i], lever.around(cell, linear.traction_u))
+        if whole:
+            _put_cell(lever, bristle, cell, record.weights[i], linear, i, n, at(out, SLOPES))
+    put(out, total)
+    put_all(at(out, 3), by_twist)
+
+
+FUNCTIONS = factor, eliminate, back_substitute, change, solve_transposed, pull_back

@@ -1,0 +1,86 @@
+"""Decorators that compile functions with Numba and keep their machine code on disk, under a digest of all sources."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from pathlib import Path
+from typing import Any
+
+from numba import njit
+from numba.core.compiler import Compiler
+from numba.extending import register_jitable
+
+from planarfriction import formulas
+from planarfriction._engine.compiler import notice  # noqa: F401 (says when the first function is compiled)
+from planarfriction._engine.compiler.internals import part
+from planarfriction._engine.compiler.sources import Sources
+
+Inner: Any = part("planarfriction._engine.compiler.inner", "Inner", Compiler)
+"""Numba's compiler for inner functions, or its own for all."""
+
+kept: Any = part("planarfriction._engine.compiler.machine_code", "kept", lambda dispatcher, sources: dispatcher)
+"""Function that keeps the machine code of a dispatcher on disk, as far as Numba lets it."""
+
+missing: Any = part("planarfriction._engine.compiler.machine_code", "missing", lambda dispatcher, signature: False)
+"""Function that tells if something has yet to be compiled that can be kept on disk."""
+
+FOLDERS = (
+    "_engine/compiler",
+    "_engine/codegen",
+    "_engine/bristles",
+    "_engine/protocol",
+    "_engine/cells",
+    "_engine/published",
+    "_engine/coupled",
+    "_engine/body",
+    "limit_surface/loops",
+    "online/loops",
+    "joints/loops",
+    "adapters/mujoco/loops",
+)
+"""Folders and modules of the package with compiled code; a compiled function of the package stands in one of them."""
+
+
+def sources_of(package: Path) -> Sources:
+    """Return all sources of the machine code of the package in a folder: the formulas and the files of `FOLDERS`."""
+    compiled = [file for name in FOLDERS for end in (".py", "/*.py") for file in package.glob(name + end)]
+    return Sources(package, [package / "formulas.py", *compiled])
+
+
+SOURCES = sources_of(Path(__file__).parents[2])
+"""Sources of this package."""
+
+_OPTIONS = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz", "arcp"}}
+
+
+def jit(function: Any) -> Any:
+    """Compile an entry point, callable from Python and from several threads at once, and keep it on disk.
+
+    Sums over cells may be reordered, so that they vectorise.
+    """
+    return kept(njit(nogil=True, no_cfunc_wrapper=True, **_OPTIONS)(function), SOURCES)
+
+
+# Counting references to arrays is atomic: in a step of the reduced model it costs four times the physics. Inner
+# functions allocate nothing and keep no array, so they need no counting; they are called from compiled code only.
+_INNER = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+# Inlined everywhere: what stands alone is optimised by itself and again in the module of each caller, and rounds in
+# the process that compiles otherwise than from the cache. It is faster too, a third in the solver on three states.
+kernel: Any = functools.partial(njit, forceinline=True, pipeline_class=Inner, **_INNER, **_OPTIONS)
+"""Compile an inner function into each of its callers: no allocation, no closures, no array assignments that copy."""
+
+
+def entry(function: Any) -> Any:
+    """Compile a function that compiled code calls by its address (see `compiler.calls`), and keep it on disk."""
+    return kept(njit(**_INNER, **_OPTIONS)(function), SOURCES)
+
+
+def callback(function: Any) -> Any:
+    """Compile a function that C libraries call by its address (see `calls.c_address_of`), and keep it on disk."""
+    return kept(njit(_nrt=False, no_cpython_wrapper=True, **_OPTIONS)(function), SOURCES)
+
+
+for _name, _formula in inspect.getmembers(formulas, inspect.isfunction):
+    register_jitable(forceinline=True, pipeline_class=Inner, **_INNER, **_OPTIONS)(_formula)

@@ -1,0 +1,169 @@
+"""Problems of the step in contact space as rows of words (see `coupled.coupling`)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from planarfriction._engine.compiler.memory import Doubles, Integers, Layout, offsets_of, reader
+from planarfriction._engine.protocol import SLOPES
+
+ALONG = 1e-12
+"""Square of the sine of the angle between a frame's x axis and the normal below which its y axis takes its place."""
+
+FLAT = 0.25
+"""Square of that sine below which a patch that was in contact before keeps its x axis, carried along with its body."""
+
+
+class Problem(NamedTuple):
+    """A problem of k patches."""
+
+    dt: Doubles
+    """Length of the step [s], [1]."""
+    tolerance: Doubles
+    """Tolerance of the twists [m/s], [1]."""
+    most: Doubles
+    """Iterations of an attempt at most, [1]."""
+    again: Doubles
+    """1 if what does not converge is tried again, and restrained if that fails too, else 0, [1]."""
+    response: Doubles
+    """A, [3k, 3k]."""
+    load_response: Doubles
+    """B, [k, 3k]."""
+    free_twist: Doubles
+    """V_0, [3k]."""
+    free_load: Doubles
+    """N_0, [k]."""
+    guess: Doubles
+    """W_0, [3k]."""
+    moments: Doubles
+    """Moments of the normal forces at W_0, about the patches' origins, [2k] (see `following`)."""
+    support: Doubles
+    """Rectangle that bears each patch whose pressure follows: centre, cosine and sine of its first axis, half widths,
+    and width of the margin over which cells leave it, [7k]; half widths of 0 for all of it."""
+    follows: Doubles
+    """1 of patches whose pressure follows these, -1 of those that keep that of the last solution, else 0, [k]."""
+    state: Doubles
+    """State at the start of the step."""
+    records: Integers
+    """Addresses of the patches' records, [k]; 0 of one that carries nothing at its load."""
+    wrench: Doubles
+    """W, [3k]; comes in as a first guess."""
+    twist: Doubles
+    """V, [3k]."""
+    load: Doubles
+    """N, [k]."""
+    new: Doubles
+    """State at the end of the step."""
+    iterations: Doubles
+    """Number of iterations, [1]; `INVALID` where a number is out of range, or negative where it must not be."""
+    residual: Doubles
+    """Residual [m/s], [1]."""
+    converged: Doubles
+    """1 or 0, [1]."""
+    unit: Doubles
+    """Wrenches of the models per unit load, [3k]; this and all that follows is scratch."""
+    unit_loaded: Doubles
+    """Slopes of the wrenches by the loads, [3k]: `unit` but for a fixed stiffness."""
+    unit_slopes: Doubles
+    """Slopes of the wrenches per unit load, [k, 9]."""
+    slopes: Doubles
+    """P, [k, 9]."""
+    twist_0: Doubles
+    """V at W = 0, [3k]."""
+    load_0: Doubles
+    """N at W = 0, [k]."""
+    scale: Doubles
+    """Twists of unit energy, [3k]."""
+    gap: Doubles
+    """Difference between the twists that wrenches cause and V, [3k]."""
+    change: Doubles
+    """dW, [3k]."""
+    move: Doubles
+    """A dW, [3k]."""
+    start: Doubles
+    """W before a step, [3k]."""
+    best_twist: Doubles
+    """V of the least residual so far, [3k]."""
+    best_load: Doubles
+    """N of the least residual so far, [k]."""
+    kept_twist: Doubles
+    """V of the first attempt, [3k]."""
+    kept_load: Doubles
+    """N of the first attempt, [k]."""
+    matrix: Doubles
+    """Matrix of the Newton step, [3k, 3k]."""
+    step: Doubles
+    """Result of a patch's step (see `protocol.StepFunctions`)."""
+    seen: Doubles
+    """Twist that a patch sees, [3]."""
+    turned: Doubles
+    """Scratch of `leave_out_rising`, [2, 9]."""
+    acting: Integers
+    """Addresses of the records that act in this step, [k]."""
+    shift: Doubles
+    """Displacements of patches that follow as a whole, [2k]."""
+    weights: Doubles
+    """Weights of the points of all patches that can follow."""
+    copies: Integers
+    """Records of the patches among these whose points are cells."""
+
+
+Offsets = offsets_of(Problem)
+"""Places of the arrays of a problem in its row."""
+
+INVALID = -1.0
+"""Stands in place of a number of iterations."""
+
+
+def layout(patches: int, states: int, points: int, copies: int) -> Layout:
+    """Return the layout of rows for k patches, of so many `points` to share loads, and words of records to copy."""
+    k, n = patches, 3 * patches
+    shapes = dict.fromkeys(Problem._fields, n)
+    shapes |= dict.fromkeys(("dt", "tolerance", "most", "again", "iterations", "residual", "converged"), 1)
+    shapes |= dict.fromkeys(("free_load", "load", "load_0", "best_load", "kept_load"), k)
+    shapes |= dict.fromkeys(("follows", "records", "acting"), k)
+    shapes |= dict.fromkeys(("moments", "shift"), 2 * k) | {"weights": points, "copies": copies, "support": 7 * patches}
+    shapes |= dict.fromkeys(("state", "new"), states)
+    shapes |= dict.fromkeys(("unit_slopes", "slopes"), 9 * k) | dict.fromkeys(("response", "matrix"), n * n)
+    return Layout(Problem, **shapes | {"load_response": k * n, "step": SLOPES, "turned": 18, "seen": 3})
+
+
+class Followers(NamedTuple):
+    """Points of each patch that share its load: its cells, or its centre of pressure if it moves as a whole."""
+
+    x: Doubles
+    """Coordinates of the points of all patches [m]."""
+    y: Doubles
+    firsts: Integers
+    """First point of each patch, and behind the last the count of all, [k + 1]."""
+    words: Integers
+    """Words of the record of a patch whose points are cells, of which the last is the address of the weights; 0 of one
+    that moves as a whole, [k]."""
+
+
+class Patches(NamedTuple):
+    """Data that all problems of the same patches share."""
+
+    count: int
+    """Number k of patches."""
+    states: int
+    """Number of states."""
+    solve: int
+    """Address of `coupling.solve`."""
+    steps: Integers
+    """Addresses of the patches' steps (see `protocol.StepFunctions`), [k]."""
+    slopes: Integers
+    """Addresses of those that write slopes, [k]."""
+    firsts: Integers
+    """First state of each patch, and behind the last the number of all, [k + 1]."""
+    radius: Doubles
+    """Lever arms of the patches that turn spins into speeds [m], [k]."""
+    reference: Doubles
+    """Reference loads [N] of laws whose stiffness does not grow with the load; 0 of others, [k]."""
+    bristle: Integers
+    """Components of the bristles of patches with such laws, [k]."""
+    followers: Followers
+    row: Offsets
+
+
+read = reader(Patches)

@@ -1,0 +1,72 @@
+"""Steps of all patches at the twists and loads of a problem in contact space."""
+
+from __future__ import annotations
+
+from planarfriction._engine.bristles.settle import factor_at
+from planarfriction._engine.cells.fixed_stiffness import stepped
+from planarfriction._engine.codegen.vectors import clear
+from planarfriction._engine.compiler import kernel
+from planarfriction._engine.compiler.calls import call
+from planarfriction._engine.compiler.memory import Doubles, Integers, at
+from planarfriction._engine.coupled.coupling_rows import Patches, Problem
+
+LOAD_STEP = 1e-6
+"""Share of a load over which wrenches of a fixed stiffness are compared for their slope."""
+
+
+@kernel
+def _bring_back(step: Doubles, dx: float, dy: float) -> None:
+    """Bring the wrench of a shifted patch, and its slopes, to the twist and the wrench about the origin."""
+    for i in range(3):  # slopes by the spin: it moves the patch
+        row = at(step, 3 + 3 * i)
+        row[2] += dx * row[1] - dy * row[0]
+    step[2] += dx * step[1] - dy * step[0]
+    for j in range(3):
+        step[9 + j] += dx * step[6 + j] - dy * step[3 + j]
+
+
+@kernel
+def step_patch(patches: Patches, p: Problem, functions: Integers, k: int, load: float) -> None:
+    """Step patch k under a load, at the twist that it sees."""
+    first, reference = patches.firsts[k], patches.reference[k]
+    if reference > 0.0:
+        states, factor = patches.firsts[k + 1] - first, factor_at(reference, load)
+        bristles = patches.bristle[k], states, factor, at(p.state, first)
+        stepped(functions[k], p.acting[k], *bristles, p.seen, p.dt[0], at(p.new, first), p.step)
+    else:
+        call(functions[k], (p.acting[k], at(p.state, first), p.seen, p.dt[0], at(p.new, first), p.step))
+
+
+@kernel
+def write_load_slopes(patches: Patches, p: Problem) -> None:
+    """Write the slopes of the wrenches by the loads; where stiffness is fixed, by a step under another load."""
+    for k in range(patches.count):
+        one, load = 3 * k, p.load[k]
+        for i in range(3):
+            p.unit_loaded[one + i] = p.unit[one + i]
+        if patches.reference[k] > 0.0 and p.acting[k] != 0 and load > 0.0:
+            p.seen[0], p.seen[1], p.seen[2] = p.twist[one], p.twist[one + 1], p.twist[one + 2]
+            step_patch(patches, p, patches.steps, k, (1.0 + LOAD_STEP) * load)
+            for i in range(3):
+                p.unit_loaded[one + i] += (p.step[i] - p.unit[one + i]) / LOAD_STEP
+
+
+@kernel
+def step_all(patches: Patches, p: Problem, functions: Integers) -> None:
+    """Step all patches at the twists of a problem: write the new state and wrenches per unit load.
+
+    `functions` are those of `Patches`: its `steps`, or its `slopes`, which write the slopes of the wrenches as well.
+    """
+    for k in range(patches.count):
+        seen, dx, dy, spin = p.seen, p.shift[2 * k], p.shift[2 * k + 1], p.twist[3 * k + 2]
+        if p.acting[k] == 0:
+            clear(p.step, 12)
+        else:
+            seen[0], seen[1], seen[2] = p.twist[3 * k] - spin * dy, p.twist[3 * k + 1] + spin * dx, spin
+            step_patch(patches, p, functions, k, p.load[k])
+            if dx != 0.0 or dy != 0.0:
+                _bring_back(p.step, dx, dy)
+        for i in range(3):
+            p.unit[3 * k + i] = p.step[i]
+        for i in range(9):
+            p.unit_slopes[9 * k + i] = p.step[3 + i]

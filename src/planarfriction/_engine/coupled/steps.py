@@ -1,0 +1,246 @@
+"""Steps and rates of contacts as Python calls them: one contact, a batch, a sequence, and their derivatives.
+
+All contacts step by the same function, one of the `StepFunctions` of a model. It is called by its address: compiled
+into the code of one contact and into the code of a batch, a step would round differently in each.
+
+The entry points check their arguments and return False where these are not in order; for other types than they were
+compiled for they raise `UNFIT` at no cost. Without load a contact forgets its state.
+"""
+
+from __future__ import annotations
+
+import functools
+import threading
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+from numba.core.errors import NumbaError
+
+from planarfriction._engine.bristles.settle import factor_at
+from planarfriction._engine.cells.fixed_stiffness import stepped, unscale
+from planarfriction._engine.codegen.vectors import clear, copy, plus, put, three, times
+from planarfriction._engine.compiler import compiled_math as xp
+from planarfriction._engine.compiler import jit, kernel
+from planarfriction._engine.compiler.calls import call, pointer
+from planarfriction._engine.compiler.memory import Doubles, Place, at, reader
+from planarfriction._engine.protocol import SLOPES
+from planarfriction.formulas import LIGHTEST
+
+NUDGE = 1e-5
+"""Share of the load over which steps of a fixed stiffness are compared for their slopes."""
+
+
+class Stepped(NamedTuple):
+    """A contact at R loads, and the function that steps it."""
+
+    function: int
+    """Address of one of the `StepFunctions`."""
+    states: int
+    """Number S of states."""
+    square: int
+    """Numbers of d new/dz."""
+    loads: int
+    """Number R of loads: one for each contact of a batch, or 1."""
+    record: int
+    """Address of the first of the R records, which lie one behind the other."""
+    words: int
+    """Number of words of a record."""
+    reference: float = 0.0
+    """Reference load [N] of a law whose stiffness does not grow with the load; 0 of others."""
+    size: int = 2
+    """Components of a bristle, for such a law."""
+
+
+_read = reader(Stepped)
+
+
+@kernel
+def _record(table: Stepped, b: int) -> Place:
+    """Return the address of the record of contact b."""
+    return at(table.record, table.words * b if table.loads > 1 else 0)
+
+
+@kernel
+def _in_order(row: np.ndarray, n: int) -> bool:
+    valid = True
+    for i in range(n):
+        valid = valid and xp.in_range(row[i])
+    return valid
+
+
+@kernel
+def _positive(load: float, dt: float) -> bool:
+    return xp.in_range(load) and xp.in_range(dt) and load >= 0.0 and dt >= 0.0
+
+
+@kernel
+def _step(
+    table: Stepped, b: int, z: Doubles, twist: Doubles, load: float, dt: float, new: Doubles, wrench: Doubles,
+    unit: Doubles,
+) -> None:  # fmt: skip
+    """Step contact b; `unit` [3] is scratch."""
+    if table.reference > 0.0:
+        factor = factor_at(table.reference, load)
+        stepped(table.function, _record(table, b), table.size, table.states, factor, z, twist, dt, new, unit)
+    else:
+        call(table.function, (_record(table, b), z, twist, dt, new, unit))
+    if load > 0.0:
+        put(wrench, times(load, three(unit)))
+    else:
+        put(wrench, (0.0, 0.0, 0.0))
+        clear(new, table.states)
+
+
+@jit
+def step_one(
+    stepped: np.ndarray, z: np.ndarray, vx: float, vy: float, omega: float, load: float, dt: float, result: np.ndarray
+) -> bool:
+    """Step one contact; `stepped` are the words of `Stepped`, `z` [S].
+
+    New state and wrench go into the first of `result` [S + 9], whose last six are scratch. Called from Python: every
+    argument costs a quarter of a microsecond on the way in.
+    """
+    table, out = _read(stepped), pointer(result)
+    n = table.states
+    valid = z.shape[0] == n and xp.in_range(vx) and xp.in_range(vy) and xp.in_range(omega) and _positive(load, dt)
+    if not (valid and _in_order(z, n)):
+        return False
+    wrench, twist = at(out, n), at(out, n + 3)
+    put(twist, (vx, vy, omega))
+    _step(table, 0, pointer(z), twist, load, dt, out, wrench, at(out, n + 6))
+    return True
+
+
+@jit
+def step_many(
+    stepped: np.ndarray, z: np.ndarray, twist: np.ndarray, load: np.ndarray, dt: np.ndarray, new: np.ndarray,
+    wrench: np.ndarray, scratch: np.ndarray,
+) -> bool:  # fmt: skip
+    """Step B contacts: `z`, `new` [B, S], `twist`, `wrench` [B, 3], `load`, `dt` [B or 1]; `scratch` [3]."""
+    table, (count, n) = _read(stepped), z.shape
+    loads, steps = load.shape[0], dt.shape[0]
+    valid = n == table.states and twist.shape[0] == count and twist.shape[1] == 3
+    valid = valid and (loads == 1 or loads == count) and (steps == 1 or steps == count)
+    for b in range(count if valid else 0):
+        valid = valid and _positive(load[b if loads > 1 else 0], dt[b if steps > 1 else 0])
+        valid = valid and _in_order(z[b], n) and _in_order(twist[b], 3)
+    if not valid:
+        return False
+    states, twists, ends, wrenches = pointer(z), pointer(twist), pointer(new), pointer(wrench)
+    for b in range(count):
+        load_b, dt_b = load[b if loads > 1 else 0], dt[b if steps > 1 else 0]
+        into = at(ends, n * b), at(wrenches, 3 * b)
+        _step(table, b, at(states, n * b), at(twists, 3 * b), load_b, dt_b, *into, pointer(scratch))
+    return True
+
+
+@kernel
+def _step_fixed(
+    table: Stepped, b: int, z: Doubles, inputs: Doubles, new: Doubles, by_load: Doubles, wrench_load: Doubles
+) -> None:
+    """Step contact b with a fixed stiffness: slopes behind `new` as for other laws, and slopes by the load.
+
+    Slopes by the load are central differences.
+    """
+    s, load, dt, record = table.states, inputs[3], inputs[4], _record(table, b)
+    unit, more, less = at(new, s), factor_at(table.reference, load * (1.0 + NUDGE)), load * (1.0 - NUDGE)
+    stepped(table.function, record, table.size, s, more, z, inputs, dt, new, unit)
+    above = three(unit)
+    copy(new, by_load, s)
+    stepped(table.function, record, table.size, s, factor_at(table.reference, less), z, inputs, dt, new, unit)
+    change = times(0.5 / NUDGE, plus(above, -1.0, three(unit)))
+    for i in range(s):
+        by_load[i] = (by_load[i] - new[i]) * (0.5 / NUDGE) / xp.maximum(load, table.reference * LIGHTEST)
+    factor = factor_at(table.reference, load)
+    stepped(table.function, record, table.size, s, factor, z, inputs, dt, new, unit)
+    put(wrench_load, plus(three(unit), 1.0, change))
+    by_twist = at(unit, SLOPES)
+    unscale(record, table.size, z, factor, by_twist, at(by_twist, 3 * s), at(by_twist, 6 * s))
+
+
+@kernel
+def _jacobians(table: Stepped, b: int, z: Doubles, inputs: Doubles, out: Doubles, new: Doubles) -> None:
+    """Write the derivatives of a step of contact b to `out`; `new` [S] and all behind it are scratch."""
+    s, load, dt = table.states, inputs[3], inputs[4]
+    unit, loaded, by_twist = at(new, s), 1.0 if load > 0.0 else 0.0, at(out, table.square)
+    by_load, of_wrench, wrench_twist = at(by_twist, 3 * s), at(by_twist, 4 * s), at(by_twist, 7 * s)
+    if table.reference > 0.0:
+        _step_fixed(table, b, z, inputs, new, by_load, at(wrench_twist, 9))
+    else:
+        call(table.function, (_record(table, b), z, inputs, dt, new, unit))
+        clear(by_load, s)
+        copy(unit, at(wrench_twist, 9), 3)
+    for m in range(9):
+        wrench_twist[m] = load * unit[3 + m]
+    for m in range(3 * s):
+        by_twist[m] = loaded * unit[SLOPES + m]
+        of_wrench[m] = load * unit[SLOPES + 3 * s + m]
+    for m in range(table.square):
+        out[m] = loaded * unit[SLOPES + 6 * s + m]
+
+
+@jit
+def jacobians(stepped: np.ndarray, z: np.ndarray, inputs: np.ndarray, result: np.ndarray) -> bool:
+    """Write derivatives of steps of B contacts: `z` [B S]; `inputs` [B 5]: twist, load and dt; all arrays are flat.
+
+    Into `result` go, for one contact after the other: new state by state [square], by twist [S, 3] and by load [S],
+    wrench by state [3, S], by twist [3, 3] and by load [3]. Scratch for one contact follows at the end.
+    """
+    table, states, rows, out = _read(stepped), pointer(z), pointer(inputs), pointer(result)
+    n, count = table.states, inputs.shape[0] // 5
+    if z.shape[0] != count * n or not (_in_order(z, z.shape[0]) and _in_order(inputs, inputs.shape[0])):
+        return False
+    for b in range(count):
+        if not (inputs[5 * b + 3] >= 0.0 and inputs[5 * b + 4] >= 0.0):
+            return False
+    size = table.square + 7 * n + 12
+    for b in range(count):
+        _jacobians(table, b, at(states, n * b), at(rows, 5 * b), at(out, size * b), at(out, size * count))
+    return True
+
+
+@jit
+def rates_many(
+    function: Place, records: np.ndarray, state: np.ndarray, twist: np.ndarray, rate: np.ndarray, wrench: np.ndarray
+) -> None:
+    """Call `ModelFunctions.evaluate` of B contacts: `state`, `rate` [B, S], `twist`, `wrench` [B, 3] (per unit load).
+
+    `function` is its address; `records` [B or 1, words] has a row for each contact, or one for all.
+    """
+    for b in range(state.shape[0]):
+        record = at(pointer(records), b * records.shape[1] if records.shape[0] > 1 else 0)
+        call(function, (record, state[b], twist[b], rate[b], wrench[b]))
+
+
+@jit
+def linearise_many(function: Place, records: np.ndarray, state: np.ndarray, twist: np.ndarray, lin: np.ndarray) -> None:
+    """Call `ModelFunctions.linearise` of B contacts into `lin` [B, workspace]; the rest as in `rates_many`."""
+    for b in range(state.shape[0]):
+        record = at(pointer(records), b * records.shape[1] if records.shape[0] > 1 else 0)
+        call(function, (record, state[b], twist[b], lin[b]))
+
+
+UNFIT = (TypeError, ValueError, NumbaError)
+"""Exceptions that the entry points raise for arguments of other types."""
+
+_NUMBER, _VECTOR, _ROWS = types.float64, types.float64[::1], types.float64[:, ::1]
+_SIGNATURES: dict[Any, tuple] = {
+    step_one: (_VECTOR, _VECTOR, *(_NUMBER,) * 5, _VECTOR),
+    step_many: (_VECTOR, _ROWS, _ROWS, _VECTOR, _VECTOR, _ROWS, _ROWS, _VECTOR),
+    jacobians: (_VECTOR, _VECTOR, _VECTOR, _VECTOR),
+}
+_COMPILING = threading.Lock()
+
+
+@functools.cache
+def ready(function: Any) -> Any:
+    """Compile an entry point for plain numbers and arrays, and for nothing else; return it.
+
+    For other types it then raises at once, where it would be compiled anew in the middle of a step.
+    """
+    with _COMPILING:
+        if not function.signatures:
+            function.compile(_SIGNATURES[function])
+            function.disable_compile()
+    return function

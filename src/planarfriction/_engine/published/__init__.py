@@ -1,0 +1,1 @@
+"""The reduced model as published, and the limit surfaces that it reads."""

@@ -1,0 +1,152 @@
+"""Machine form of `DistributedModel`: cells that are points or small discs, and their share of the load."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from planarfriction._engine.bristles.discs import KAPPA
+from planarfriction._engine.cells.cell_steps import fixed_rates_of, functions_of_cells
+from planarfriction._engine.cells.cells import CellsContact
+from planarfriction._engine.cells.general_cells import LINEAR, MATRICES, A, C, E, F
+from planarfriction._engine.cells.rollouts import ShapesByLoad
+from planarfriction._engine.cells.tilt import tilted
+from planarfriction._engine.compiler.memory import places_of, rows_of, size_of
+from planarfriction._engine.protocol import ModelFunctions, StepFunctions
+from planarfriction._engine.records import packed
+from planarfriction._engine.records.base import CompiledModel
+from planarfriction._engine.records.packed import PackedModel, cells_by_load, driven, linearised
+
+LOAD_STEP = 1e-5
+"""Step of the central differences of weights by the load, as a share of the load [-]; their relative error is 1e-10."""
+
+
+class CompiledDistributed(CompiledModel):
+    """Machine form of a `DistributedModel` with a law on a patch."""
+
+    def __init__(self, law: Any, patch: Any) -> None:
+        self.law, self.patch, self.depends_on_load = law, patch, patch.depends_on_load
+        self.size = patch.bristles
+        """Number of bristles of a cell: two of a point, three of a disc."""
+        self.reference = 0.0 if law.reference_load is None else law.reference_load
+        """Load [N] of `reference_load`, or 0."""
+        self._contact, functions = self._functions()
+        if self.reference > 0.0:
+            self._contact = fixed_rates_of(self.size, patch.anisotropic, patch.asymmetric)
+        cells = len(patch.positions)
+        super().__init__(functions, (self.size, cells), (self.size, self.size, cells))
+
+    def _functions(self) -> tuple[ModelFunctions, StepFunctions]:
+        return functions_of_cells(self.size, self.patch.anisotropic, self.patch.asymmetric)
+
+    def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
+        """Return the record of a contact, and how many numbers of a linearisation each cell has."""
+        matrices = MATRICES if self.reference > 0.0 else LINEAR
+        lean = numbers[-2 if self.patch.asymmetric else len(numbers) :]
+        return CellsContact(self.law.numbers, numbers.shape[1], numbers, lean, weights), matrices * self.size**2
+
+    # ------------------------------------------------------------------ at given loads
+
+    def pressed(
+        self, load: np.ndarray, centre: np.ndarray | None = None
+    ) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
+        """See `CompiledModel`; all rows at once, each with its own weights."""
+        contact = self.fixed if centre is None else None
+        if contact is None:
+            weights = self.patch.weights(load.reshape(-1))
+            moved = weights if centre is None else tilted(self.patch.positions, weights, centre.reshape(-1, 2))
+            contact = self._packed(moved)
+        yield slice(None), contact, None
+
+    def points(self) -> tuple[np.ndarray, int]:
+        """See `CompiledModel`."""
+        size = size_of(type(self.record(np.zeros((2, 1)), np.zeros(1))[0]))
+        return self.patch.positions[: 0 if self.reference > 0.0 else None], size
+
+    def linearisation(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
+        """Return linearisations `[..., L, N]` of `cells.general_cells`."""
+        ((_, contact, _),) = self.pressed(load)
+        cells = state.shape[-1]
+        seen = driven(contact, twist.reshape(-1, 3), load.reshape(-1))
+        lin = linearised(contact, state.reshape(load.size, self.size * cells), seen)
+        return lin.reshape(*load.shape, lin.shape[-1] // cells, cells)
+
+    def slopes(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> Any:
+        """Return the derivatives of the rates of cells, and of their tractions per unit load, by state and velocity.
+
+        Four arrays `[..., d, d, N]` of d bristles a cell; the velocity is that which a cell sees.
+        """
+        law, d, lin = self.law.numbers, self.size, self.linearisation(state, twist, load)
+        matrices = np.moveaxis(lin.reshape(*load.shape, lin.shape[-2] // d**2, d, d, lin.shape[-1]), -4, 0)
+        by_state, by_velocity, identity = matrices[A], matrices[F], np.eye(d)[:, :, None]
+        if len(matrices) == MATRICES:
+            return by_state, by_velocity, matrices[C], matrices[E]
+        pull_state, pull_velocity = law.sigma_0 * identity + law.sigma_1 * by_state, law.sigma_2 * identity
+        return by_state, by_velocity, -pull_state, -(pull_velocity + law.sigma_1 * by_velocity)
+
+    # ------------------------------------------------------------------ for the loops of others
+
+    def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
+        """See `CompiledModel`; only cells that carry load at one of the loads have bristles."""
+        if len(loads) == 1 and loads[0] is None:
+            return self._at_any_load
+        if between is None:
+            weights = np.atleast_2d([self.patch.weights(load) for load in loads])
+            chosen = weights.max(axis=0) > 0.0
+            return self._packed(weights[:, chosen], chosen)
+        chosen = self.patch.pressure.ever_loaded(self.patch.positions, between)
+        most = max(int(packed.MAX_PACK_BYTES / (8.0 * chosen.sum())), 1)
+        return self._packed(np.array([self.patch.weights(load)[chosen] for load in loads[:most]]), chosen)
+
+    @functools.cached_property
+    def _at_any_load(self) -> PackedModel:
+        """The cells that carry load, on a patch that ignores how much."""
+        weights = self.patch.weights()
+        return self._packed(weights[None, weights > 0.0], weights > 0.0)
+
+    def with_all_states(self, loads: Sequence[float | None]) -> PackedModel:
+        """See `CompiledModel`."""
+        return self._packed(np.array([self.patch.weights(load) for load in loads]))
+
+    def at_loads(self, loads: np.ndarray, slopes: bool) -> ShapesByLoad:
+        """Pack the cells at different loads > 0 `[L]` [N], with the `slopes` of their weights by the load or zeros.
+
+        Slopes are central differences.
+        """
+        by_load, step = None, LOAD_STEP * loads
+        if slopes:
+            above, below = (self.patch.weights(loads + change) for change in (step, -step))
+            by_load = (above - below) / (2.0 * step)[:, None]
+        return cells_by_load(self.numbers(), self.patch.weights(loads), by_load)
+
+    def _packed(self, weights: np.ndarray, chosen: np.ndarray | None = None) -> PackedModel:
+        """Pack the chosen cells, or all, with R rows of their weights `[R, n]`."""
+        chosen = np.ones(weights.shape[1], bool) if chosen is None else chosen
+        weights, positions = np.ascontiguousarray(weights), self.patch.positions[chosen]
+        count, numbers = len(positions), self.numbers(chosen)
+        (record, per_cell), states = self.record(numbers, weights), self.size * count
+        distances = np.hypot(*(positions - positions.mean(axis=0)).T)
+        radius = float(np.hypot(distances, KAPPA * self.patch.lever_radii[chosen]).mean())
+        rows, scale = rows_of(record, len(weights), weights=places_of(weights)), self.law.largest_deflection
+        return PackedModel(
+            self._contact, rows, states, per_cell * count, np.full(states, scale), radius, (weights, numbers), chosen,
+            reference=self.reference, bristle=self.size,
+        )  # fmt: skip
+
+    def numbers(self, chosen: Any = slice(None)) -> np.ndarray:
+        """Return the numbers `[numbers, n]` of cells, chosen or all, as levers (see `cells.cells`) read them."""
+        levers = self.patch.levers()[chosen]
+        spin = levers[:, 2:, 2].T
+        if not self.patch.anisotropic:
+            return np.ascontiguousarray(np.vstack([self.patch.positions[chosen].T, spin]))
+        asymmetry = self.patch.asymmetries()[chosen]
+        turned = [levers[:, i, j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2))]
+        return np.array([*turned, *spin, *asymmetry.T])
+
+    @functools.cached_property
+    def lever(self) -> np.ndarray:
+        """P `[3, d, N]`: the velocity of a cell (`u_i`) is `P' V`, the wrench of a force on it `P f`."""
+        return np.ascontiguousarray(self.patch.levers().T)

@@ -1,1 +1,0 @@
-"""Compiled loops over the formulas: steps, rates, their derivatives, and the solver of scenes."""

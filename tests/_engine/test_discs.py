@@ -1,0 +1,140 @@
+"""Discs: closed forms of their surface, their limits, and the loops that are written from their step."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planarfriction import ContactPatch, DistributedModel, LuGre, formulas
+from planarfriction._engine.bristles import discs, points
+from planarfriction._engine.cells import cell_passes, cells
+from planarfriction._engine.cells.cell_blocks import LANES
+from planarfriction._engine.codegen.twins import twin
+
+LAW = LuGre(mu_c=1.0, mu_s=1.2, v_s=1e-3, sigma_0=1e6, sigma_1=8e2, sigma_2=0.2, elasto_plastic=0.9).numbers
+PLAIN = LuGre(mu_c=0.4, mu_s=0.6, v_s=1e-3, sigma_0=1e5, sigma_1=3e2, sigma_2=0.1).numbers
+KAPPA = math.sqrt(0.5)
+SPEEDS = st.floats(-1.0, 1.0).map(lambda x: 0.05 * x)
+
+sliding, evaluate, step, point_step = map(twin, (discs.sliding, discs.evaluate, discs.step, points.step))
+
+
+def _mean_speed(q):
+    """Return the mean speed of a disc of radius 1 that spins at 1 and slides at q, by quadrature."""
+    radius = np.sqrt((np.arange(600) + 0.5) / 600)  # rings of equal area
+    angle = 2.0 * np.pi * (np.arange(720) + 0.5) / 720
+    x, y = radius[:, None] * np.cos(angle), radius[:, None] * np.sin(angle)
+    return np.hypot(q - y, x).mean()
+
+
+def _surface(q):
+    """Return mean speed, force and own torque of a disc of radius 1 that spins at 1 and slides at q."""
+    _, _, speed, (along, _, spin) = sliding((q, 0.0, KAPPA))
+    return speed, along / speed, KAPPA * spin / speed
+
+
+@pytest.mark.parametrize("q", [0.0, 0.1, 0.3, 0.5, 0.8, 1.0, 1.3, 2.0, 5.0, 20.0])
+def test_the_surface_is_that_of_a_disc_within_its_error(q):
+    """The rational function is stated to err by 0.0085 in force and torque; quadrature adds 1e-4."""
+    h = 1e-4
+    mean, above, below = (_mean_speed(abs(x)) for x in (q, q + h, q - h))
+    force = (above - below) / (2.0 * h) if q > 0.0 else 0.0
+    speed, along, torque = _surface(q)
+    assert speed == pytest.approx(mean, abs=3e-3)
+    assert along == pytest.approx(force, abs=9e-3)
+    assert torque == pytest.approx(mean - q * force, abs=9e-3)
+
+
+def test_slopes_at_pure_spin_and_far_from_the_disc_are_exact():
+    assert _surface(0.0) == pytest.approx((2.0 / 3.0, 0.0, 2.0 / 3.0), rel=1e-12)
+    assert _surface(1e-5)[1] == pytest.approx(1e-5, rel=1e-8)  # F' = 1
+    q = 300.0  # the terms that follow are smaller by 1/q^2
+    _, force, torque = _surface(q)
+    assert 1.0 - force == pytest.approx(1.0 / (8.0 * q * q), rel=1e-3)
+    assert torque == pytest.approx(1.0 / (4.0 * q), rel=1e-3)
+
+
+@given(SPEEDS, SPEEDS, SPEEDS)
+def test_friction_is_the_gradient_of_the_mean_speed(x, y, s):
+    u, h = np.array([x, y, s]), 1e-7
+    size = np.abs(u).max()
+    if size < 1e-4:  # differences of numbers near rounding
+        return
+    _, _, speed, pull = sliding(tuple(u))
+    for k, unit in enumerate(np.eye(3)):
+        above, below = (sliding(tuple(u + sign * h * size * unit))[2] for sign in (1.0, -1.0))
+        assert (above - below) / (2.0 * h * size) == pytest.approx(pull[k] / speed, abs=1e-6)
+    assert np.dot(pull, u) == pytest.approx(speed * speed, rel=1e-13)
+
+
+@pytest.mark.parametrize("law", [LAW, PLAIN])
+def test_a_disc_without_a_radius_is_a_point(law):
+    z, u = (3e-7, -5e-7), (2e-3, 1e-3)
+    flat = (*z, 0.0), (*u, 0.0)
+    point, pull = point_step(law, z, u, 1e-4)
+    new, traction = step(law, *flat, 1e-4)
+    assert new == pytest.approx((*point, 0.0), rel=1e-13)
+    assert traction == pytest.approx((*pull, 0.0), rel=1e-13)
+
+
+@pytest.mark.parametrize("law", [LAW, PLAIN])
+def test_bristles_settle_where_sliding_is_steady(law):
+    u = (2e-3, -1e-3, 1.5e-3)
+    _, _, speed, pull = sliding(u)
+    new, _ = step(law, (0.0, 0.0, 0.0), u, 1e3)
+    size = formulas.stribeck(np, speed, law) / law.sigma_0 / speed
+    assert new == pytest.approx([size * each for each in pull], rel=1e-9)
+    assert evaluate(law, new, u)[0] == pytest.approx((0.0, 0.0, 0.0), abs=1e-9 * speed)
+
+
+def test_a_step_is_of_second_order_in_dt():
+    """From z half bent: errors of 40, 80 and 160 steps beside 5120 fall by four at each doubling."""
+    u, ends = (1e-3, 4e-4, 8e-4), {}
+    for count in (40, 80, 160, 5120):
+        z = (2e-7, 0.0, -3e-7)
+        for _ in range(count):
+            z, _ = step(LAW, z, u, 8e-4 / count)
+        ends[count] = np.array(z)
+    errors = [np.abs(ends[count] - ends[5120]).max() for count in (40, 80, 160)]
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.25)
+    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.25)
+
+
+@pytest.mark.parametrize("speed", [0.0, 1e-150, 1e-30, 1e-12, 1e-6, 1e6, 1e40])
+def test_numbers_stay_finite_at_any_speed(speed):
+    for u in ((speed, 0.0, 0.0), (0.0, 0.0, speed), (speed, speed, speed)):
+        for z in ((0.0, 0.0, 0.0), (1e-7, 0.0, 1e-7)):
+            for function, more in ((evaluate, ()), (step, (1e-3,))):
+                assert np.isfinite(function(LAW, z, u, *more)).all()
+
+
+@pytest.mark.parametrize("count", [1, 7, 8, 23, 24, 64, 65, 150])
+def test_passes_step_as_the_function_they_come_from(count):
+    """Sums run in another order, and functions are polynomials: 1e-12 of the largest term."""
+    rng = np.random.default_rng(count)
+    law = LuGre(mu_c=1.0, mu_s=1.2, v_s=1e-3, sigma_0=1e6, sigma_1=8e2, sigma_2=0.2, elasto_plastic=0.9)
+    places, radii, pressure = (
+        rng.normal(size=(count, 2)) * 5e-3,
+        rng.uniform(size=count) * 3e-3,
+        rng.uniform(size=count),
+    )
+    patch = ContactPatch(places, np.full(count, 1e-6), pressure, radii=radii)
+    twist, z = tuple(rng.normal(size=3) * (1e-3, 1e-3, 0.2)), rng.normal(size=(3, count)) * 5e-7
+    new, wrench = DistributedModel(patch, law).step(z, twist, 2.0, 1e-4)
+    total = np.zeros(3)
+    for i, (x, y) in enumerate(places):
+        cell = x, y, KAPPA * radii[i]
+        expected, traction = step(LAW, tuple(z[:, i]), twin(cells.DISC_POSITIONS.seen)(cell, twist), 1e-4)
+        assert new[:, i] == pytest.approx(expected, rel=1e-11, abs=1e-18)
+        total += 2.0 * patch.weights()[i] * np.array(twin(cells.DISC_POSITIONS.wrench)(cell, traction))
+    assert wrench == pytest.approx(total, rel=1e-11, abs=1e-13)
+
+
+def test_passes_hand_little_on():
+    """A pass that handed on everything would leave the nearest cache: 64 lanes of 12 rows are 6 kB."""
+    written = cell_passes.forward_passes(cell_passes.KINDS[3, False, False])
+    assert written.rows <= 24
+    assert written.source.count("def pass_") == cell_passes.DISC.forward[0]
+    assert LANES * written.rows * 8 <= 16384
