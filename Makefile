@@ -37,23 +37,23 @@ test: $(VENV)/.test
 	$(PYTEST) $(ARGS)
 
 # What compiled loops and BLAS may round differently elsewhere: surfaces, models, steps, solver, derivatives.
-NUMERIC := compiler derivatives kernels limit_surface models solvers test_coupling.py test_formulas.py
+NUMERIC := _engine derivatives limit_surface models solvers test_coupling.py test_formulas.py
 
 # The share of these that compiles least and rounds most.
-QUICKEST := kernels limit_surface solvers test_coupling.py test_formulas.py
+QUICKEST := _engine limit_surface solvers test_coupling.py test_formulas.py
 
 test-generic: $(VENV)/.test
 	NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES= $(PYTEST) $(NUMERIC:%=tests/%) $(ARGS)
 
 # Loops whose indices are checked compile into their own machine code, of which the whole half takes an hour; pointers
 # have no bounds to check.
-BOUNDED := tests/kernels tests/test_coupling_hard.py
+BOUNDED := tests/_engine tests/test_coupling_hard.py
 
 test-bounds: $(VENV)/.test
 	NUMBA_BOUNDSCHECK=1 $(PYTEST) $(BOUNDED) $(ARGS)
 
 # Memory that is used after it was freed, or written beyond its end, shows as other numbers or ends the run.
-MEMORY := fuzz derivatives models solvers kernels scenes planning online limit_surface identify tensors test_coupling.py
+MEMORY := fuzz derivatives models solvers _engine scenes planning online limit_surface identify tensors test_coupling.py
 
 test-memory: $(VENV)/.test
 	LD_PRELOAD=libc_malloc_debug.so.0 MALLOC_CHECK_=3 MALLOC_PERTURB_=165 $(PYTEST) $(MEMORY:%=tests/%) studies/tests/test_gripper.py $(ARGS)

@@ -15,7 +15,7 @@ import matplotlib.pyplot as plt
 
 ROOT = Path(__file__).resolve().parents[1]
 COLOURS = {"front": "#dbe9f6", "scene": "#e3f1df", "model": "#fdf0d5", "code": "#f6dede", "base": "#ececec"}
-GROUPS = {"__main__": "front", "scenes": "scene", "models": "model", "kernels": "code", "geometry": "base"}
+GROUPS = {"__main__": "front", "scenes": "scene", "models": "model", "extend": "code", "geometry": "base"}
 """First floor, from the top, of each group of floors."""
 
 

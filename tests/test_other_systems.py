@@ -60,7 +60,7 @@ def test_modules_load_without_those_of_posix():
 import importlib, pkgutil, sys
 sys.modules.update(dict.fromkeys({POSIX}))
 import planarfriction
-for name in ("cli", "compiler", "scenes", "solvers", "sweeps", "export", "online", "planning", "identify"):
+for name in ("cli", "_engine.compiler", "scenes", "solvers", "sweeps", "export", "online", "planning", "identify"):
     package = importlib.import_module("planarfriction." + name)
     for module in pkgutil.iter_modules(package.__path__, package.__name__ + "."):
         importlib.import_module(module.name)

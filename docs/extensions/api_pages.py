@@ -24,14 +24,15 @@ from planarfriction.described import HEADING
 OPTIONAL = ("torch", "jax", "warp", "adapters.mujoco", "adapters.mjx", "adapters.mujoco_warp", "adapters.drake")
 """Public modules that load a package of an extra, and so stand in no list of the package."""
 
-COMPILED = ("compiler", "kernels", "limit_surface.loops")
+ROOMS = ("bristles", "cells", "published", "coupled", "body", "compiler")
+COMPILED = (*(f"_engine.{room}" for room in ROOMS), "limit_surface.loops")
 """Packages of compiled code that the pages name."""
 
 SUBJECTS = {
     "Describe": (
         "A contact is a patch, a friction law, and a model of both.",
         "patch = pf.ContactPatch.disc(radius=0.01)\nmodel = pf.ReducedModel(patch, pf.LuGre(mu_c=0.8, mu_s=1.0))",
-        ("patch", "laws", "limit_surface", "models", "formulas", "families", "geometry", "errors"),
+        ("patch", "laws", "limit_surface", "models", "extend", "formulas", "families", "geometry", "errors"),
     ),
     "Simulate": (
         "A scene is a body with contacts; a solution has its motion.",

@@ -101,7 +101,7 @@ def called(node: ast.expr, code: Any, owner: type | None) -> Any:
 
 def raises(code: Any, owner: type | None = None, seen: frozenset = frozenset()) -> set[str]:
     """Names of the errors that a function raises, itself or in what it calls of this package but compiled loops."""
-    plain = r"planarfriction\.(?!kernels|compiler|[\w.]+\.loops)"
+    plain = r"planarfriction\.(?!_engine\.(?!records)|[\w.]+\.loops)"
     if not inspect.isfunction(code) or code in seen or not re.match(plain, code.__module__):
         return set()
     found, seen = set(), seen | {code}

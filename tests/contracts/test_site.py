@@ -52,7 +52,7 @@ def test_equations_are_set_and_names_are_links(site):
 
 
 def test_every_formula_and_loop_that_a_page_names_is_a_link(site):
-    compiled = r"(?:formulas|kernels|compiler|limit_surface\.loops)\.(?!py<)[\w.]+"
+    compiled = r"(?:formulas|_engine|limit_surface\.loops)\.(?!py<)[\w.]+"
     named = rf'(<a [^>]*>)?<code[^>]*><span class="pre">({compiled})</span></code>'
     found = 0
     for page in site.glob("*.html"):

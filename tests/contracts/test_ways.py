@@ -23,17 +23,16 @@ HOME = Path(pf.__file__).parent
 PAGE = Path(__file__).parents[2] / "docs" / "maintaining.md"
 ROOMS = {
     *(
+        "_engine",
         "adapters",
         "cli",
-        "compiled",
         "coupling",
         "derivatives",
         "export",
         "identify",
         "jax",
-        "kernels",
     ),
-    *("models", "online", "planning", "plots", "scenes", "solvers", "sweeps", "tensors", "torch", "warp"),
+    *("models", "online", "planning", "plots", "records", "scenes", "solvers", "sweeps", "tensors", "torch", "warp"),
 }
 """Layers that a call goes through; what describes (patches, surfaces, laws) may be asked from everywhere."""
 
@@ -119,7 +118,7 @@ def _rooms(frame: FrameType | None) -> list[str]:
     while frame is not None:
         file = Path(frame.f_code.co_filename)
         inside = file.relative_to(HOME) if file.is_relative_to(HOME) else Path("elsewhere")
-        room = inside.parts[0].removesuffix(".py")
+        room = "records" if "records" in inside.parts else inside.parts[0].removesuffix(".py")
         if inside.name in READERS:
             found.clear()
         elif room in ROOMS and inside.name != "namespace.py" and found[-1:] != [room]:

@@ -9,7 +9,7 @@ def test_a_change_of_any_source_makes_another_version(monkeypatch):
     """Every source counts, also those outside of `sweeps`."""
     read, kept = Path.read_bytes, library_version.__wrapped__()
     assert kept == library_version.__wrapped__()
-    for changed in ("formulas.py", "kernels/steps.py", "sweeps/keys.py"):
+    for changed in ("formulas.py", "_engine/coupled/steps.py", "sweeps/keys.py"):
         more = lambda file, changed=changed: read(file) + b"#" * file.as_posix().endswith(f"planarfriction/{changed}")  # noqa: E731
         monkeypatch.setattr(Path, "read_bytes", more)
         assert library_version.__wrapped__() != kept

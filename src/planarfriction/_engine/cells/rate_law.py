@@ -20,7 +20,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from planarfriction._engine.body import contacts
+from planarfriction._engine.bristles.law import traction as traction_of
 from planarfriction._engine.cells.cell_passes import CellKind, Element
 from planarfriction._engine.cells.cell_steps import rates_of, steps_of
 from planarfriction._engine.cells.cells import LEVERS, Lever
@@ -44,7 +44,7 @@ _LEAST = 0.1
 @kernel
 def traction(xp: Any, law: Any, z: Vector, zdot: Vector, u: Vector) -> Vector:
     """Compute `-(sigma_0 z + sigma_1 z' + sigma_2 u)`, the traction per unit load of a law without one."""
-    return contacts.traction(law, z, zdot, u)
+    return traction_of(law, z, zdot, u)
 
 
 @kernel

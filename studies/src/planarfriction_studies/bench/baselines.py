@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction._engine.body.body import System
-from planarfriction._engine.body.integration import Method, Output
+from planarfriction.extend import Method, Output, System
 from planarfriction.scenes import Scene
 from planarfriction.scenes.packing import MOST_PIECES, SegmentBatches
 from planarfriction.solvers import RODAS4, Statistics, integrate
@@ -91,7 +90,7 @@ class Window:
         """Solve with a method of SciPy's `solve_ivp`, restarted at every jump; `atol` in the units of the states."""
         from scipy.integrate import solve_ivp
 
-        from planarfriction._engine.body.body import right_hand_side
+        from planarfriction.extend import right_hand_side
 
         system, y = self.packed.system, self.packed.state.copy()
 

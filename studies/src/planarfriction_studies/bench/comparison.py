@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from planarfriction._engine.compiler.threads import processors
 from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.extend import processors
 from planarfriction.reading import read_text
 from planarfriction_studies.bench.measurement import Measurement
 

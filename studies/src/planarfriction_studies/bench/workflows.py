@@ -10,8 +10,8 @@ import time
 import numpy as np
 
 from planarfriction import planning, sweeps
-from planarfriction._engine.compiler.threads import processors
 from planarfriction.derivatives import rollout
+from planarfriction.extend import processors
 from planarfriction.identify import FitOptions, Log, identify_lugre
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceExact

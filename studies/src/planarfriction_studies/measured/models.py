@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction._engine.published.surfaces import sliding_batch
+from planarfriction.extend import sliding_batch
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceExact, LimitSurfaceQuartic
 from planarfriction.limit_surface.base import scaling

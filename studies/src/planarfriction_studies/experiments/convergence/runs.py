@@ -174,7 +174,7 @@ def _euler(case: Case, counts: Sequence[int], label: str, work: Work) -> dict[st
 
 def _euler_part(contacts: Sequence[Contact], part: int, state: np.ndarray | None) -> dict[str, np.ndarray]:
     """Return one of `_EULER_PARTS` equal parts: wrenches `[T, contacts, 3]` before each sample, and the state."""
-    from planarfriction._engine.body.body import right_hand_side
+    from planarfriction.extend import right_hand_side
     from planarfriction.scenes.packing import MOST_PIECES, SegmentBatches
 
     packed = SegmentBatches(scene(contacts), T_END, most=MOST_PIECES)

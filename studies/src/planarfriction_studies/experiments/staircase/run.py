@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction._engine.published import spin_sums
+from planarfriction.extend import smoothed_spin_sum
 from planarfriction.limit_surface import LimitSurfaceCells
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction.plots.style import LINE_STYLES, PlotFigure
@@ -76,7 +76,7 @@ def smoothed_wrench(twist: np.ndarray, patch: ContactPatch) -> np.ndarray:
     wrench = LimitSurfaceCells(patch).wrench(twist)
     for i in np.flatnonzero(twist[:, 2] > 0.0):
         vx, vy, omega = twist[i]
-        wrench[i] = -np.array(spin_sums.smoothed_spin_sum(corners, place, x, y, weights, -vy / omega, vx / omega))
+        wrench[i] = -np.array(smoothed_spin_sum(corners, place, x, y, weights, -vy / omega, vx / omega))
     return wrench
 
 
