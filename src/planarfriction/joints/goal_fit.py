@@ -80,10 +80,6 @@ class Trial:
         scatter = t.ppf(0.95, len(falls) - 1) * falls.std(ddof=1) / np.sqrt(len(falls))
         return float(falls.mean()), float(scatter), [float(each.mean()) for each in halves]
 
-    def shifts(self, others: Sequence[Mapping[str, float]]) -> dict[str, float]:
-        """Compute the largest shift of each estimate to those of other fits, which missing terms move differently."""
-        return {name: max(abs(each[name] - value) for each in others) for name, value in self.values.items()}
-
     @property
     def jackknife(self) -> dict[str, float]:
         """Standard error of each estimate by leaving out groups."""
@@ -247,12 +243,11 @@ def fit_goals(base: Problem, chosen: Sequence[str], auto: bool, progress: Callab
 def result_of(kept: Trial, first: Trial, pairs: Mapping[str, tuple[Trial, Trial]]) -> JointFit:
     """Return the result of the trial that was kept: its intervals, and verdicts.
 
-    Estimates also move with each term that was tried besides: intervals count the largest shift.
+    Estimates also move if runs begin again at the measured motion: intervals count that shift.
     """
     problem, values = kept.problem, kept.values
     _check_related(problem, kept)
-    more = [trial.values for trial, _ in pairs.values() if {*kept.terms} < {*trial.terms}]
-    shifts = kept.shifts([kept.again, *more])
+    shifts = {name: abs(kept.again[name] - value) for name, value in values.items()}
     jackknife = kept.jackknife
     runs = (trial.problem.simulated(trial.values, problem.logs) for trial in (kept, first))
     series = tuple(
