@@ -181,8 +181,9 @@ def scales(logs: Sequence[EvenLog], width: float) -> Scales:
     def sure(width: float) -> float:
         return max(3.0 * float(np.sqrt(speed_noise(power, width))), 0.2 * resolution / width, 1e-9)
 
-    speed, acceleration = (np.concatenate([derivatives(log, width)[k] for log in logs]).std() for k in (1, 2))
-    longest = SLOW_SHARE * speed / max(acceleration, 1e-300)
+    speed, acceleration = (np.concatenate([derivatives(log, width)[k] for log in logs]).var() for k in (1, 2))
+    moved = max(acceleration - acceleration_noise(power, width), 1e-300)
+    longest = SLOW_SHARE * float(np.sqrt(speed / moved))
     slow_width = float(np.clip(SLOW_FACTOR * width, width, max(longest, width)))
     return Scales(width, sure(width), slow_width, sure(slow_width))
 
