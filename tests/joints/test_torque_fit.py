@@ -200,17 +200,21 @@ def likelihood_ratio(logs, joint, term):
 
 @pytest.mark.slow
 def test_joints_of_another_simulation():
-    """A hundred drawn joints: no false terms but three, few that show are lost, intervals hold the truth.
+    """A hundred drawn joints: few false terms, few that show are lost, intervals hold the truth.
 
     Bristles of "rigid" joints bend by 3e-5 rad in the simulation: found, they are no false term. Backlash is no term of
-    the model: where it moves a number out of its interval, the fit says that it does not explain the friction. The
-    rules were set with joints 0 to 99 in view, and these are the next hundred.
+    the model: where it moves a number out of its interval, the fit is refused or says that it does not explain the
+    friction. The rules were set with joints 0 to 99 in view, and these are the next hundred.
     """
     false, lost, silent, held = [], [], [], []
     for seed in range(100, 200):
         joint = draw(seed)
         logs = [JointLog(t, q, torque=torque, name=f"log {i}") for i, (t, q, torque) in enumerate(joint.logs)]
-        fit = identify_joint(logs, Plant())
+        try:
+            fit = identify_joint(logs, Plant())
+        except InvalidValueError:
+            assert joint.about["gap"], seed
+            continue
         bends = fit.values["mu_c"] / fit.values["sigma_0"] if "bristles" in fit.terms else np.inf
         false += [(seed, each) for each in set(fit.terms) - joint.terms - ({"bristles"} if bends < 3e-4 else set())]
         lost += [(seed, each) for each in joint.terms - set(fit.terms) if likelihood_ratio(logs, joint, each) >= 18.0]
