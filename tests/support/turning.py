@@ -108,6 +108,7 @@ def in_mujoco(scene: Turning, time: float) -> tuple[np.ndarray, np.ndarray]:
     """Return times and positions after each step."""
     from planarfriction.adapters.mujoco import Friction
 
+    scene.m.opt.tolerance = 1e-14  # beside a heavy table, MuJoCo's solver would let 1e-7 m/s pass
     d, friction, path = mujoco.MjData(scene.m), Friction(scene.m, scene.patches), []
     d.qpos[:], d.qvel[:], d.ctrl[:] = scene.qpos, scene.qvel, scene.ctrl
     for _ in range(round(time / scene.m.opt.timestep)):
