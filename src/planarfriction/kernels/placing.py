@@ -59,7 +59,7 @@ def onto_plane(place: Any, middle: Any, normal: Any) -> Any:
     return place[0] + height * normal[0], place[1] + height * normal[1], place[2] + height * normal[2]
 
 
-def bend(over: Any, tilt: Any, apart: Any, both: Any, normal: Any, dt: Any) -> Any:
+def bend(over: Any, tilt: Any, both: Any, normal: Any, apart: Any, dt: Any) -> Any:
     """Return what the velocity of a patch gains in half a step as its contact moves on and its normal turns `[3]`.
 
         dt/2 (b + u_n n x (w_a + w_b)),    b = (v - (n . v) n) x (w_a - w_b),    u_n = u_n0 + dt/2 n . b

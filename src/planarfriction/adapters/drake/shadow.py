@@ -154,7 +154,9 @@ class Shadow:
         ends, begins = (self._carriers[p].CalcPoseInWorld(each) @ placed.middle for each in (self._end, self._begin))
         over = (own if placed.goes else other)[3:] - (ends - begins)
         bend = 0.5 * (away + own_back - other_back)
-        bend[3:] += placing.bend(over, away[:3], normal @ away[3:], (own + other)[:3], normal, 1.0)
+        both, apart = (own + other)[:3], float(normal @ away[3:])
+        given = (each.tolist() for each in (over, away[:3], both, normal))
+        bend[3:] += placing.bend(*given, apart, 1.0)
         return seen @ bend / self.dt
 
     def _place(self, frame: Any, place: Sequence[float]) -> Any:

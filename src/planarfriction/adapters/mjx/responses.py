@@ -237,7 +237,7 @@ def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Ar
         across = jnp.where(touching, jnp.stack([x, y]), 0.0)
         over = jnp.where(place.carrier == place.own, own.over, other.over)
         both, dt = own.spin + other.spin, m.opt.timestep
-        drift += jnp.stack(placing.bend(over, spin, normal @ (part + drift), both, normal, dt))
+        drift += jnp.stack(placing.bend(over, spin, both, normal, normal @ (part + drift), dt))
         drift = jnp.append(across @ drift, jnp.where(touching, normal @ drift_spin, 0.0))
         jacobian, away = jnp.stack([moves @ x, moves @ y, turns @ normal]), contact.pos - centre
         own = jnp.where(chosen, jnp.stack([jnp.ones(len(away)), away @ y, -away @ x]), 0.0)

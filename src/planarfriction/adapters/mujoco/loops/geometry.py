@@ -250,7 +250,7 @@ def _rows(own, m, d, s, nefc, p, kept):
     apart = dot(normal, plus(move, -1.0, below)) + 0.5 * dt * dot(normal, plus(gain, -1.0, bent))
     goes = integers(own.carrier)[p] == integers(own.own)[p]
     over = plus(move if goes else below, -1.0, three(at(s.block, 3)))
-    _add_drift(s, p, 1.0, bend(over, tilt, apart, plus(turn, 1.0, spin), normal, dt), zeros(tilt))
+    _add_drift(s, p, 1.0, bend(over, tilt, plus(turn, 1.0, spin), normal, apart, dt), zeros(tilt))
     s.tilts[p] = math.sqrt(dot(x, tilt) ** 2 + dot(y, tilt) ** 2)
 
 

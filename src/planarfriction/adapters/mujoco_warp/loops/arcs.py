@@ -62,7 +62,7 @@ def bend(patches: Patches, host: Host, frames: Frames):
         over = over_centre(host, w, wp.spatial_top(own), patches.owner[p], patches.own[p])
         if patches.carrier[p] != patches.own[p]:
             over = over_centre(host, w, wp.spatial_top(other), patches.support[p], patches.other[p])
-        x, y, z = gained(over, wp.spatial_bottom(own - other), apart, wp.spatial_bottom(own + other), normal, dt)
+        x, y, z = gained(over, wp.spatial_bottom(own - other), wp.spatial_bottom(own + other), normal, apart, dt)
         move = axes * (wp.spatial_top(rate) + wp.vec3(x, y, z))
         turn = wp.dot(normal, wp.spatial_bottom(rate))
         frames.drift[w, p] = frames.drift[w, p] + wp.vec3(move[0], move[1], turn)
