@@ -77,7 +77,7 @@ def test_held_boxes_keep_their_places_for_long(support, w, dt, integrator):
 @pytest.mark.mjx
 @pytest.mark.parametrize("support", SUPPORTS)
 def test_held_boxes_keep_their_places_for_long_in_single_precision(support):
-    """MJX rounds poses: 1e-5 of a radius and 1e-4 rad in 10,000 steps; more the angle of a hinge that has turned far."""
+    """MJX rounds poses: 1e-5 of a radius and 1e-4 rad in 10,000 steps; more the angle of a hinge that turned far."""
     pytest.importorskip("mujoco.mjx")
     speeds = SPEEDS[-1:] if support == "surface" else SPEEDS
     scenes = [turning(support, w, dt) for w in speeds for dt in STEPS]
