@@ -156,7 +156,7 @@ def _add_drift(s, p, factor, move, turn):
 
 @kernel
 def _add_side(own, m, d, s, p, body, geom, sign):
-    """Add the surface of a geom on a body to rows and drift of patch p; return its velocity, its spin, and the first's rate."""
+    """Add the surface of a geom on a body to rows and drift of patch p; return velocity, spin and acceleration."""
     nv, rows, point = own.nv, at(s.jacobian, 3 * own.nv * p), at(s.frames, 6 * p + 3)
     half, velocity = 0.5 * doubles(m + own.model.timestep)[0], doubles(integers(d + own.data.qvel)[0])
     x, y, normal = axes(s, p)

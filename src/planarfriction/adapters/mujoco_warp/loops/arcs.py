@@ -44,8 +44,8 @@ def over_centre(host: Host, w: int, move: wp.vec3, body: int, geom: int) -> wp.v
 def bend(patches: Patches, host: Host, frames: Frames):
     """Add to the drifts what patches move in the step, per dt, beyond their twists at its velocities.
 
-    Points of what turns go along arcs: to second order, `x_1 - x_0 = dt J v + dt^2 / 2 Jdot v`. The contact moves on, and
-    its normal turns (see `placing.bend`).
+    Points of what turns go along arcs: to second order, `x_1 - x_0 = dt J v + dt^2 / 2 Jdot v`. The contact moves on,
+    and its normal turns (see `placing.bend`).
     """
     w = wp.tid()
     dt = host.timestep[w % host.timestep.shape[0]]
