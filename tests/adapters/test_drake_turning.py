@@ -206,6 +206,25 @@ def test_pads_that_close_while_they_turn_do_not_turn_what_they_hold():
     assert np.ptp(arm(3.0, 4e-3, reach=0.02).path(0.2)[:, 3]) < 2e-4
 
 
+def test_a_ball_that_spins_rolls_straight():
+    """Its contact moves along with it: the material below turns aside, by half of 10 rad/s in 4 ms, 4 mm in 0.2 m."""
+    builder, plant, scene_graph = bare(4e-3)
+    ball = plant.AddRigidBody("ball", SpatialInertia(0.2, [0, 0, 0], UnitInertia.SolidSphere(0.05)))
+    plant.RegisterCollisionGeometry(ball, RigidTransform(), Sphere(0.05), "ball", material("point"))
+    floor = material("point", rigid=True)
+    plant.RegisterCollisionGeometry(plant.world_body(), RigidTransform(), HalfSpace(), "floor", floor)
+    plant.Finalize()
+    patches = [PatchContact(PAD, frame="ball", geometries=("floor", "ball"))]
+    prepare(plant, scene_graph, patches)
+    run = running(builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches))
+    plant.SetFreeBodyPose(run.context, ball, RigidTransform([0.0, 0.0, 0.0499]))
+    plant.SetFreeBodySpatialVelocity(run.context, ball, SpatialVelocity([0.0, 20.0, 10.0], [1.0, 0.0, 0.0]))
+    run.to(0.2)
+    x, y, _ = plant.GetFreeBodyPose(run.context, ball).translation()
+    assert x == pytest.approx(0.2, abs=2e-3)
+    assert abs(y) < 1e-6
+
+
 @pytest.mark.parametrize("options", [{"use_sampled_output_ports": False}, {"discrete_contact_approximation": "sap"}])
 def test_all_kinds_of_discrete_plants_keep_places(options):
     _check(table(3.0, 4e-3, **options), 3.0, 4e-3, 0.4, 0.2)

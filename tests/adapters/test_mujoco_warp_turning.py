@@ -16,6 +16,7 @@ pytest.importorskip("mujoco_warp", reason="needs the extra [mujoco-warp]")
 
 from planarfriction.adapters.mujoco_warp import Friction, PatchContact, prepare  # noqa: E402
 from planarfriction_studies.bench.mujoco_scenes import shaken  # noqa: E402
+from tests.support.turning import rounding  # noqa: E402
 
 pytestmark = pytest.mark.mujoco_warp
 
@@ -31,24 +32,27 @@ POSES = 1e-5, 1e-4
 MODEL = shaken().model
 """Pads of mu = 1, whose kernels other tests compile too."""
 
+STEPS = 5000
+"""Number of steps of long runs, which take a processor two or three minutes."""
+
 _BOX = """<body name="{0}" pos="0 0 {1}"><freejoint/><geom name="{0}" type="box" size="0.03 0.03 0.01" mass="0.1"
-  contype="0" conaffinity="1"/><site name="{0}" pos="0 0 -0.01"/></body>"""
+  contype="0" conaffinity="{2}"/><site name="{0}" pos="0 0 -0.01"/></body>"""
 
 _DECK = """<geom name="{}" type="box" size="1 1 0.05" pos="0 0 -0.05" mass="10" contype="1" conaffinity="0"/>"""
 
 
-def plane(spin: float, height: float) -> str:
-    """Return a plane whose surface turns, with a box on it."""
+def plane(spin: float, height: float, bit: int = 1) -> str:
+    """Return a plane whose surface turns, with a box on it, which touch others of the same bit only."""
     name = f"plane {spin:g}"
     return f"""<geom name="{name}" type="plane" size="2 2 .1" pos="0 0 {height}" surfacevel="0 0 0 0 0 {spin}"
-      contype="1" conaffinity="0"/>{_BOX.format(f"box {spin:g}", height + 0.01)}"""
+      contype="{bit}" conaffinity="0"/>{_BOX.format(f"box {spin:g}", height + 0.01, bit)}"""
 
 
-TABLE = f"""<body><joint name="table" axis="0 0 1"/>{_DECK.format("table")}</body>{_BOX.format("part", 0.01)}"""
+TABLE = f"""<body><joint name="table" axis="0 0 1"/>{_DECK.format("table")}</body>{_BOX.format("part", 0.01, 1)}"""
 """A hinged table with a box on it."""
 
 CAR = f"""<body pos="0 0 -4"><joint name="x" type="slide" axis="1 0 0"/><joint name="y" type="slide" axis="0 1 0"/>
-  <joint name="car" axis="0 0 1"/>{_DECK.format("car")}</body>{_BOX.format("parcel", -3.99)}"""
+  <joint name="car" axis="0 0 1"/>{_DECK.format("car")}</body>{_BOX.format("parcel", -3.99, 1)}"""
 """A car that drives in a circle, with a box on it."""
 
 PLACE = 0.5
@@ -113,15 +117,26 @@ class Worlds:
         return np.hypot(dx, dy), around, own
 
 
-def _check(found: tuple[Any, ...], times: np.ndarray, spins: np.ndarray, dt: float, start: float) -> None:
-    """Compare with what the second order of steps leaves, the deflection of the bristles, and single precision."""
+def _check(
+    found: tuple[Any, ...],
+    times: np.ndarray,
+    spins: np.ndarray,
+    dt: float,
+    start: float,
+    hinge: Any = 0.0,
+    factor: float = 1.5,
+) -> None:
+    """Compare with what the second order of steps leaves, the deflection of the bristles, and single precision.
+
+    The angle of a hinge is rounded by `hinge` more [rad].
+    """
     chosen = times > start - 1e-9
     lasts = np.ptp(times[chosen])
     radius, around, own = (np.ptp(each[chosen], axis=0) for each in found)
     size = found[0][0]
     elastic = 4e-7  # m: bristles of the third of a millionth of a metre, stretched by a fifth
-    assert (radius < size * (1.5 * spins**4 * dt**3 * lasts / 8.0 + POSES[0]) + elastic).all()
-    angle = 1.5 * spins**3 * dt**2 * lasts / 6.0 + POSES[1]
+    assert (radius < size * (factor * spins**4 * dt**3 * lasts / 8.0 + POSES[0]) + elastic).all()
+    angle = 1.5 * spins**3 * dt**2 * lasts / 6.0 + POSES[1] + hinge
     assert (around < angle + elastic / size).all() and (own < angle + elastic / size).all()
 
 
@@ -138,14 +153,27 @@ def test_parts_on_a_table_and_a_plane_keep_their_places():
     _check(worlds.around(q, "box 3", times[:, None] * spins), times, spins, dt, 0.1)
 
 
+BALL = """<geom name="floor" type="plane" size="5 5 1"/><body name="ball" pos="0 0 0.04999"><freejoint/>
+  <geom name="ball" type="sphere" size="0.05" mass="0.2"/><site name="ball"/></body>"""
+
+
+def test_a_ball_that_spins_rolls_straight():
+    """Its contact moves along with it: the material below turns aside, by half of 10 rad/s in 4 ms, 4 mm in 0.2 m."""
+    worlds = Worlds(BALL, {"ball": ("floor", "ball")}, 4e-3, 1)
+    worlds.v[:] = 1.0, 0.0, 0.0, 0.0, 20.0, 10.0
+    x, y = worlds.run(0.2)[1][-1, 0, :2]
+    assert x == pytest.approx(0.2, abs=2e-3)
+    assert abs(y) < 1e-5
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("dt", [2e-3, 4e-3])
 def test_parts_on_planes_keep_their_places_for_long(dt):
     sites = {f"box {spin:g}": (f"plane {spin:g}", f"box {spin:g}") for spin in SPINS}
-    worlds = Worlds("".join(plane(spin, -float(i)) for i, spin in enumerate(SPINS)), sites, dt, 1)
+    worlds = Worlds("".join(plane(spin, -float(i), 2**i) for i, spin in enumerate(SPINS)), sites, dt, 1)
     for name, spin, radius in zip(sites, SPINS, RADII, strict=True):
         worlds.throw(name, spin, radius)
-    times, q = worlds.run(20.0)
+    times, q = worlds.run(STEPS * dt)
     for name, spin in zip(sites, SPINS, strict=True):
         _check(worlds.around(q, name, times[:, None] * spin), times, np.array([spin]), dt, 1.0)
 
@@ -169,8 +197,10 @@ def test_parts_on_a_table_a_car_and_an_arm_keep_their_places_for_long(dt):
         """Press with 30 N, and pull the car towards the middle of its circle."""
         return np.stack([np.full(len(q), 30.0), *(-10.0 * SPINS**2 * q[:, place] for place in (x, y))], axis=1)
 
-    times, q = worlds.run(20.0, control)
+    times, q = worlds.run(STEPS * dt, control)
+    hinge = np.array([rounding(spin, dt, STEPS * dt) for spin in SPINS])
     table = np.unwrap(q[..., worlds.m.joint("table").qposadr[0]], axis=0)
-    _check(worlds.around(q, "part", table), times, SPINS, dt, 1.0)
-    _check(worlds.around(q, "parcel", q[..., car], q[..., x], q[..., y]), times, SPINS, dt, 1.0)
-    _check(worlds.around(q, "block", q[..., arm]), times, SPINS, dt, 1.0)
+    _check(worlds.around(q, "part", table), times, SPINS, dt, 1.0, hinge)
+    _check(worlds.around(q, "parcel", q[..., car], q[..., x], q[..., y]), times, SPINS, dt, 1.0, hinge)
+    # pads leave 1.6 to 2.1 times the second order at 10 rad/s, and pull at the hinge, whose rounding they change
+    _check(worlds.around(q, "block", q[..., arm]), times, SPINS, dt, 1.0, 1.5 * hinge, factor=2.5)

@@ -17,7 +17,7 @@ mujoco = pytest.importorskip("mujoco")
 
 from planarfriction.adapters.mujoco import Friction, PatchContact, prepare  # noqa: E402
 from planarfriction.formulas import turning_mean  # noqa: E402
-from tests.support.turning import SPEEDS, STEPS, G, in_mjx, in_mujoco, turning  # noqa: E402
+from tests.support.turning import SPEEDS, STEPS, G, in_mjx, in_mujoco, rounding, turning  # noqa: E402
 
 pytestmark = pytest.mark.mujoco
 
@@ -77,21 +77,13 @@ def test_held_boxes_keep_their_places_for_long(support, w, dt, integrator):
 @pytest.mark.mjx
 @pytest.mark.parametrize("support", SUPPORTS)
 def test_held_boxes_keep_their_places_for_long_in_single_precision(support):
-    """MJX rounds poses: 1e-5 of a radius and 1e-4 rad in 10,000 steps; more the angle of a hinge that has turned far.
-
-    By how much is known from the sum of its steps, each rounded.
-    """
+    """MJX rounds poses: 1e-5 of a radius and 1e-4 rad in 10,000 steps; more the angle of a hinge that turned far."""
     pytest.importorskip("mujoco.mjx")
-    compiled = {}
-    for w in SPEEDS:
-        for dt in STEPS:
-            scene = turning(support, w, dt)
-            rounding = 1e-4
-            if support == "table":
-                steps = np.full(round(20.0 / dt), np.float32(dt) * np.float32(w), np.float32)
-                missing = np.cumsum(steps, dtype=np.float32) - w * dt * np.arange(1, len(steps) + 1)
-                rounding += np.ptp(missing[round(1.0 / dt) - 1 :])
-            check(scene, *in_mjx(scene, 20.0, compiled), share=1e-5, angle=rounding)
+    speeds = SPEEDS[-1:] if support == "surface" else SPEEDS
+    scenes = [turning(support, w, dt) for w in speeds for dt in STEPS]
+    for scene, path in zip(scenes, in_mjx(scenes, 20.0), strict=True):
+        hinged = support in ("table", "arm")
+        check(scene, *path, share=1e-5, angle=1e-4 + hinged * rounding(scene.w, scene.m.opt.timestep, 20.0))
 
 
 WRIST = """<mujoco><option timestep="0.004" gravity="0 0 0"/><worldbody>
@@ -118,6 +110,20 @@ def test_a_grip_that_turns_about_two_axes_keeps_its_angle():
         hand, box = (d.body(name).xmat.reshape(3, 3) for name in ("hand", "box"))
         turns.append(0.5 * (hand.T @ box - box.T @ hand)[[2, 0, 1], [1, 2, 0]])
     assert abs(turns[-1] - turns[249]).max() < 2e-4  # of 16 mrad
+
+
+def test_pads_that_close_while_they_turn_do_not_turn_what_they_hold():
+    """Along the normal, which turns with them: along one that stands still, 2 mm would turn the box by 1.3 mrad."""
+    scene = turning("arm", 3.0, 4e-3)
+    assert np.ptp(scene.places(*in_mujoco(scene, 0.4))[:, 2]) < 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.mjx
+def test_pads_that_close_while_they_turn_do_not_turn_what_they_hold_in_mjx():
+    pytest.importorskip("mujoco.mjx")
+    scene = turning("arm", 3.0, 4e-3)
+    assert np.ptp(scene.places(*in_mjx([scene], 0.4, every=5)[0])[:, 2]) < 1e-4
 
 
 BALL = """<mujoco><option timestep="0.004"/><worldbody><geom name="floor" type="plane" size="5 5 1" {floor}/>

@@ -119,7 +119,8 @@ def test_spreads_intervals_and_words_have_their_numbers(monkeypatch):
     pair = dataclasses.replace(wide, halves=halves), dataclasses.replace(kept, halves=halves)
     fit = result_of(kept, kept, {"load": pair})
     assert fit.spread["sigma_2"] == pytest.approx(0.001, rel=1e-9)
-    assert fit.spread["mu_c"] == pytest.approx(np.hypot(0.02 / np.sqrt(3.0), 0.03), rel=1e-12)  # by one term more
+    # the load was rejected: the other level that it goes with says nothing about this one
+    assert fit.spread["mu_c"] == pytest.approx(0.02 / np.sqrt(3.0), rel=1e-12)
     said = words(fit)
     assert "kt/R = 0.1 N m/V; with the drive off: kt = 0.3 N m/A, R = 3 Ohm" in said  # 0.03/0.1 and 0.03/0.1^2
     assert "all torques grow by 1.2 % for each 10 g" in said  # half of 10 g over 400 g
@@ -159,8 +160,24 @@ def test_goals_of_other_units_or_signs_are_refused_in_one_line(name):
 def test_logs_that_no_run_from_their_goals_resembles_are_refused():
     logs = servo_logs(SERVO)
     mixed = [dataclasses.replace(one, q=other.q) for one, other in zip(logs, logs[1:] + logs[:1], strict=True)]
-    with pytest.raises(InvalidValueError, match=r"q of the logs must follow|flip the sign"):
+    with pytest.raises(InvalidValueError, match=r"q of .* must follow|flip the sign"):
         identify_joint(mixed, PENDULUM, terms=())
+
+
+def test_logs_with_the_gains_of_others_are_refused_or_named():
+    logs = servo_logs(SERVO)
+    kept = identify_joint(logs, PENDULUM, terms=())
+    assert not any("contradicts" in str(each) for each in kept.verdicts)
+    gains = [log.drive.kp for log in logs]
+    mixed = [
+        dataclasses.replace(log, drive=dataclasses.replace(log.drive, kp=kp))
+        for log, kp in zip(logs, gains[::-1], strict=True)
+    ]
+    try:
+        said = words(identify_joint(mixed, PENDULUM, terms=()))
+    except InvalidValueError as error:
+        said = str(error)
+    assert "this log contradicts the others; check its gains" in said or "check units, signs, gains" in said
 
 
 @pytest.mark.parametrize("offset", [1.5, -2.5])

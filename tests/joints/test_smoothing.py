@@ -10,7 +10,9 @@ from planarfriction.joints.smoothing import (
     encoder_step,
     evenly,
     kernel_width,
+    rows_of,
     runs,
+    scales,
     speed_noise,
     white_noise,
 )
@@ -66,6 +68,23 @@ def test_a_coarse_encoder_gets_a_wider_kernel():
     q = 0.5 * np.sin(3.0 * t) + 0.1 * np.sin(11.0 * t)
     widths = [kernel_width([even(np.round(q / step) * step)]) for step in 2.0 * np.pi / 2.0 ** np.array([10, 13, 16])]
     assert widths[0] > widths[1] > widths[2]
+
+
+def test_slow_motion_is_smoothed_longer_and_turns_round_at_the_same_time():
+    """Behind 11 bits, the direction of a slow part is right far below the noise of the kernel for all motion."""
+    t = 1e-3 * np.arange(16_000)
+    fast = np.maximum(t - 12.0, 0.0)
+    step, speed = 2.0 * np.pi / 2**11, 0.05 * np.cos(0.7 * t) + 0.6 * np.sin(3.0 * fast)
+    log = even(np.round((0.05 / 0.7 * np.sin(0.7 * t) + 0.2 * (1.0 - np.cos(3.0 * fast))) / step) * step)
+    limits = scales([log], 0.012)
+    assert 3.0 * limits.width < limits.slow_width <= 4.0 * limits.width
+    assert limits.slow < 0.4 * limits.noisy
+    rows = rows_of(log, limits)
+    inner = rows.fitted
+    true = np.interp(rows.time, t, speed)
+    sure = inner[np.abs(true[inner]) > limits.slow]
+    assert np.mean(np.abs(true[sure]) < limits.noisy) > 0.6  # what the first kernel alone would not know
+    assert np.mean(np.sign(rows.speed[sure]) == np.sign(true[sure])) > 0.99
 
 
 def test_runs_are_given_by_their_ends():

@@ -1,12 +1,15 @@
 """Fits of joints to torques: numbers and terms that another simulation made, and the sets of terms that are kept."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from planarfriction.errors import InvalidValueError
 from planarfriction.joints import JointFriction, JointLog, Plant, identify_joint
+from planarfriction.joints.balance import TERMS, refine
+from planarfriction.joints.torque_fit import doubt, prepare
 from tests.support.torque_joints import Numbers, Sensors, draw, recorded
 
 LUGRE = JointFriction(0.8, 0.3, 0.0, 0.0, 1.2, 0.05, 400.0, 2.0)
@@ -140,24 +143,86 @@ def test_a_late_start_of_time_changes_nothing():
     assert one == pytest.approx(other, rel=1e-5, abs=1e-6)
 
 
+def test_a_slow_fall_of_friction_is_seen_behind_a_coarse_encoder():
+    """Stribeck speed 0.04 rad/s; 11 bits at 1 kHz leave noise of 0.02 rad/s on the speed."""
+    falls = Numbers(inertia=0.038, mu_c=0.74, sigma_2=0.095, rise=0.24, v_s=0.04, sigma_0=2.5e4)
+    fit = identify_joint(logs_of(falls, Sensors(rate=1000, bits=11)), Plant())
+    assert "stribeck" in fit.terms
+    assert holds(fit, "rise", 0.24) and holds(fit, "v_s", 0.04) and holds(fit, "mu_c", 0.74)
+
+
+def test_a_fall_of_friction_is_seen_behind_bristles_that_bend_far():
+    """Bristles of 17 mrad blur the fall: the search over bends, a factor of 3 apart, takes it for another bend."""
+    bent = Numbers(inertia=0.038, mu_c=0.25, sigma_2=0.088, rise=0.19, v_s=0.058, sigma_0=15.0, sigma_1=0.075)
+    fit = identify_joint(logs_of(bent, Sensors(rate=1000, bits=20), ("sines", "levels", "sines", "ripples")), Plant())
+    assert fit.terms == ("stribeck", "bristles")
+    assert [fit.values[name] for name in ("rise", "v_s", "sigma_0")] == pytest.approx([0.19, 0.058, 15.0], rel=0.03)
+
+
+@pytest.mark.parametrize(("middle", "shown"), [((0.3, 0.5), True), ((0.02, 0.02), False)])
+def test_a_level_at_rest_of_many_times_the_coulomb_level_needs_speeds_between(middle, shown):
+    """Speeds of 0.02 and 1 rad/s alone do not show how friction falls between them."""
+    t = 1e-3 * np.arange(16_000)
+    side = np.sign(np.sin(np.pi * t))
+    speed = side * np.select([t < 4.0, t < 8.0, t < 12.0], [0.02, *middle], 1.0)
+    q = np.cumsum(np.convolve(speed, np.ones(5) / 5.0, mode="same")) * 1e-3
+    data = prepare([JointLog(t, q, torque=np.sin(t))])
+    fit = SimpleNamespace(values={"mu_c": 0.1, "rise": 0.5, "v_s": 0.6}, spread={"rise": 0.01, "v_s": 0.1})
+    assert doubt(data, fit, "stribeck").startswith("mu_s would be 6 mu_c") != shown
+    fit.values["rise"] = 0.15
+    assert not doubt(data, fit, "stribeck")
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.004])
+def test_backlash_is_said(gap):
+    """Motor and link of 0.02 and 0.04 kg m^2 with a gap of 4 mrad either way are no joint of one inertia."""
+    rng = np.random.default_rng(3)
+    made = [recorded(Numbers(inertia=0.06), kind, Sensors(), rng, gap) for kind in ("sines", "levels", "sines")]
+    fit = identify_joint([JointLog(t, q, torque=torque) for t, q, torque in made], Plant())
+    assert any("backlash" in str(each) for each in fit.verdicts) == (gap > 0.0)
+
+
+INDEPENDENT = 2.0 * np.sqrt(np.pi)
+"""Widths of a Gaussian kernel after which white noise counts anew: rows lie one width apart."""
+
+
+def likelihood_ratio(logs, joint, term):
+    """Return twice the logarithm of the likelihood with a term over that without it, from the true numbers."""
+    rows = prepare(logs).rows
+    start = dict.fromkeys(["torque_offset", "delay", "asymmetry", "sigma_1"], 0.0) | joint.truth
+    start |= {"delay": joint.about["late"] + joint.about["filtered"], "gravity_sin": joint.truth.get("gravity", 0.0)}
+    start |= {"gravity_cos": -start["gravity_sin"] * np.sin(joint.truth.get("offset", 0.0))}
+    rest = joint.terms - {term}
+    whole, less = (refine(rows, start, [each for each in TERMS if each in terms]) for terms in (joint.terms, rest))
+    gain = np.log(np.square(less.error).sum() / np.square(whole.error).sum())
+    return len(whole.error) / INDEPENDENT * gain
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("first", range(0, 100, 10))
-def test_joints_of_another_simulation(first):
-    """Ten of a hundred drawn joints: no false term but one, intervals that hold the truth (93 % over all).
+def test_joints_of_another_simulation():
+    """A hundred drawn joints: few false terms, few that show are lost, intervals hold the truth.
 
     Bristles of "rigid" joints bend by 3e-5 rad in the simulation: found, they are no false term. Backlash is no term of
-    the model: it is said, or does not move the numbers.
+    the model: where it moves a number out of its interval, the fit is refused or says that it does not explain the
+    friction. The rules were set with joints 0 to 99 in view, and these are the next hundred.
     """
-    false, held = [], []
-    for seed in range(first, first + 10):
+    false, lost, silent, held = [], [], [], []
+    for seed in range(100, 200):
         joint = draw(seed)
         logs = [JointLog(t, q, torque=torque, name=f"log {i}") for i, (t, q, torque) in enumerate(joint.logs)]
-        fit = identify_joint(logs, Plant())
-        bent = {"bristles"} if "bristles" in fit.terms and holds(fit, "sigma_0", joint.truth["sigma_0"]) else set()
-        false += [(seed, each) for each in set(fit.terms) - joint.terms - bent]
-        incomplete = any("not explained" in str(each) for each in fit.verdicts)
-        if not (joint.about["gap"] and incomplete):
-            named = [name for name in joint.truth if fit.intervals.get(name)]
-            held += [holds(fit, name, joint.truth[name]) for name in named]
-    assert len(false) <= 1, false
-    assert np.mean(held) > 0.85
+        try:
+            fit = identify_joint(logs, Plant())
+        except InvalidValueError:
+            assert joint.about["gap"], seed
+            continue
+        bends = fit.values["mu_c"] / fit.values["sigma_0"] if "bristles" in fit.terms else np.inf
+        false += [(seed, each) for each in set(fit.terms) - joint.terms - ({"bristles"} if bends < 3e-4 else set())]
+        lost += [(seed, each) for each in joint.terms - set(fit.terms) if likelihood_ratio(logs, joint, each) >= 18.0]
+        outside = [name for name in joint.truth if fit.intervals.get(name) and not holds(fit, name, joint.truth[name])]
+        if joint.about["gap"]:
+            silent += [seed] if outside and not any("backlash" in str(each) for each in fit.verdicts) else []
+        else:
+            held += [name not in outside for name in joint.truth if fit.intervals.get(name)]
+    print(f"false {false}, lost {lost}, silent {silent}, {np.mean(held):.3f} of {len(held)} intervals hold")
+    assert len(false) <= 3 and len(lost) <= 5 and not silent
+    assert 0.93 <= np.mean(held) <= 0.99

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import mujoco
@@ -104,10 +103,21 @@ def turning(support: str, w: float, dt: float, integrator: str = "Euler") -> Tur
     return Turning(m, patches, qpos, qvel, 30.0 * grip, w, support)
 
 
+def rounding(w: float, dt: float, time: float) -> float:
+    """Return how far the angle of a hinge in single precision [rad] moves against its exact one, from the first second.
+
+    Each of its steps is rounded, the more the further it has turned.
+    """
+    steps = np.full(round(time / dt), np.float32(dt) * np.float32(w), np.float32)
+    missing = np.cumsum(steps, dtype=np.float32) - w * dt * np.arange(1, len(steps) + 1)
+    return float(np.ptp(missing[round(1.0 / dt) - 1 :]))
+
+
 def in_mujoco(scene: Turning, time: float) -> tuple[np.ndarray, np.ndarray]:
     """Return times and positions after each step."""
     from planarfriction.adapters.mujoco import Friction
 
+    scene.m.opt.tolerance = 1e-14  # beside a heavy table, MuJoCo's solver would let 1e-7 m/s pass
     d, friction, path = mujoco.MjData(scene.m), Friction(scene.m, scene.patches), []
     d.qpos[:], d.qvel[:], d.ctrl[:] = scene.qpos, scene.qvel, scene.ctrl
     for _ in range(round(time / scene.m.opt.timestep)):
@@ -117,26 +127,38 @@ def in_mujoco(scene: Turning, time: float) -> tuple[np.ndarray, np.ndarray]:
     return scene.m.opt.timestep * np.arange(1, len(path) + 1), np.array(path)
 
 
-def in_mjx(scene: Turning, time: float, compiled: dict[str, Callable] | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return times and positions every 50 steps; scenes on one support share what is `compiled`, but for surfaces."""
+def in_mjx(scenes: list[Turning], time: float, every: int = 50) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return times and positions of scenes on one support, side by side, every so many steps.
+
+    They may have different speeds, but for those of surfaces, and time steps.
+    """
     import jax
     import jax.numpy as jnp
     from mujoco import mjx
 
     from planarfriction.adapters.mjx import Friction
 
-    def many(mx, w, d):
+    first, steps = scenes[0], [scene.m.opt.timestep for scene in scenes]
+    friction, mx = Friction(first.m, first.patches), mjx.put_model(first.m)
+
+    def many(dt, w, d):
+        own = mx.tree_replace({"opt.timestep": dt})
+
         def step(d, _):
-            return friction.step(mx, d.replace(qvel=scene.driven(jnp, d.qpos, d.qvel, w, mx.opt.timestep))), None
+            return friction.step(own, d.replace(qvel=first.driven(jnp, d.qpos, d.qvel, w, dt))), None
 
-        return jax.lax.scan(step, d, None, length=50)[0]
+        return jax.lax.scan(step, d, None, length=every)[0]
 
-    friction, compiled = Friction(scene.m, scene.patches), {} if compiled is None else compiled
-    run = compiled.setdefault(f"{scene.support} {scene.w if scene.support == 'surface' else ''}", jax.jit(many))
-    mx, start = mjx.put_model(scene.m), mujoco.MjData(scene.m)
-    start.qpos[:], start.qvel[:], start.ctrl[:] = scene.qpos, scene.qvel, scene.ctrl
-    d, path, dt = mjx.put_data(scene.m, start), [], scene.m.opt.timestep
-    for _ in range(round(time / (50 * dt))):
-        d = run(mx, scene.w, d)
+    def begun(scene):
+        start = mujoco.MjData(scene.m)
+        start.qpos[:], start.qvel[:], start.ctrl[:] = scene.qpos, scene.qvel, scene.ctrl
+        return mjx.put_data(scene.m, start)
+
+    run, path = jax.jit(jax.vmap(many)), []
+    d = jax.tree.map(lambda *each: jnp.stack(each), *map(begun, scenes))
+    dt, w = jnp.array(steps), jnp.array([scene.w for scene in scenes])
+    for _ in range(round(time / (every * min(steps)))):
+        d = run(dt, w, d)
         path.append(np.asarray(d.qpos))
-    return 50 * dt * np.arange(1, len(path) + 1), np.array(path)
+    taken, ends = np.array(path), [round(time / (every * each)) for each in steps]
+    return [(every * steps[i] * np.arange(1, end + 1), taken[:end, i]) for i, end in enumerate(ends)]

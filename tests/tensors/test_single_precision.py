@@ -112,6 +112,23 @@ def test_steps_of_jax(name):
     assert wrench < LIMIT and slope < BENDING
 
 
+@pytest.mark.jax
+def test_rollouts_of_jax_side_by_side():
+    """`jax.vmap` traces rollouts again, out of the context in which a step was traced in double precision."""
+    jax = pytest.importorskip("jax", reason="needs the extra [jax]")
+    from planarfriction.jax import DistributedModel
+
+    patch = single.PATCHES["feet on a line"]
+    model, inputs = DistributedModel(patch, single.LAW), single.drawn(pf.DistributedModel(patch, single.LAW), 200, 3)
+
+    def rollout(state, twist, load, dt, moments):
+        return jax.lax.scan(lambda z, _: model.step(z, twist, load, dt, moments=moments), state, None, length=1)[1][0]
+
+    wrenches = np.asarray(jax.jit(jax.vmap(rollout))(*(each.astype(np.float32) for each in inputs)))
+    assert wrenches.dtype == np.float32
+    assert single.error(pf.DistributedModel(patch, single.LAW), inputs, wrenches) < LIMIT
+
+
 FRONTS = [pytest.param(in_torch, marks=pytest.mark.torch), pytest.param(in_jax, marks=pytest.mark.jax)]
 
 

@@ -16,7 +16,11 @@ from planarfriction.tensors.namespace import Namespace
 
 
 class _Tilt(NamedTuple):
-    """Cells in scaled coordinates about their centre of pressure, as `cells.tilt.Scaled`."""
+    """Cells in scaled coordinates about their centre of pressure, as `cells.tilt.Scaled`.
+
+    Sums are written out: where JAX traces a step again, as under `jax.vmap` of a rollout, it does so in single
+    precision, and products of matrices are the only operations that do not keep double precision then.
+    """
 
     corners: jax.Array
     """`(1, u, v)` of each cell `[N, 3]`."""
@@ -29,20 +33,24 @@ class _Tilt(NamedTuple):
         """Return the plane `[3]` with total and centre by the cells that press."""
         share = jnp.where(pressing, self.share, 0.0)
         own = share.sum()
-        mean = share @ self.corners[:, 1:] / own
-        away = self.corners[:, 1:] - mean
-        spread = (share[:, None] * away).T @ away + soft * jnp.eye(2)
-        right, one = self.asked[1:] - mean, spread[0, 0] * spread[1, 1] - spread[0, 1] ** 2
-        a = (spread[1, 1] * right[0] - spread[0, 1] * right[1]) / one
-        b = (spread[0, 0] * right[1] - spread[0, 1] * right[0]) / one
-        return jnp.stack([1.0 / own - a * mean[0] - b * mean[1], a, b])
+        _, u, v = self.corners.T
+        mean_u, mean_v = (share * u).sum() / own, (share * v).sum() / own
+        u, v = u - mean_u, v - mean_v
+        uu, uv, vv = (share * u * u).sum() + soft, (share * u * v).sum(), (share * v * v).sum() + soft
+        right, up, one = self.asked[1] - mean_u, self.asked[2] - mean_v, uu * vv - uv * uv
+        a, b = (vv * right - uv * up) / one, (uu * up - uv * right) / one
+        return jnp.stack([1.0 / own - a * mean_u - b * mean_v, a, b])
+
+    def pressure(self, plane: jax.Array) -> jax.Array:
+        """Return the pressure of a plane on the cells `[N]`; < 0 where these lift."""
+        return (self.corners * plane).sum(-1)
 
     def slopes(self, plane: jax.Array, step: jax.Array) -> tuple[jax.Array, jax.Array]:
         """Return the slope of the dual along a step, and how it rises."""
-        here, along = self.corners @ plane, self.corners @ step
+        here, along = self.pressure(plane), self.pressure(step)
         share = jnp.where(here > 0.0, self.share * along, 0.0)
-        slope = SOFTNESS * (plane[1:] @ step[1:]) - step @ self.asked + share @ here
-        return slope, SOFTNESS * (step[1:] @ step[1:]) + share @ along
+        slope = SOFTNESS * (plane[1:] * step[1:]).sum() - (step * self.asked).sum() + (share * here).sum()
+        return slope, SOFTNESS * (step[1:] * step[1:]).sum() + (share * along).sum()
 
     def share_of(self, plane: jax.Array, step: jax.Array) -> jax.Array:
         """Return the share of a step to go."""
@@ -69,15 +77,15 @@ class _Tilt(NamedTuple):
         def body(last):
             plane, _, count = last
             soft = jnp.where((count > 0) | narrow, SOFTNESS, 0.0)
-            before = self.corners @ plane > 0.0
+            before = self.pressure(plane) > 0.0
             whole = self.fitted(before, soft)
-            done = ((self.corners @ whole > 0.0) == before).all()
+            done = ((self.pressure(whole) > 0.0) == before).all()
             far = jax.lax.cond(done, lambda step: jnp.ones(()), lambda step: self.share_of(plane, step), whole - plane)
             return plane + far * (whole - plane), done, count + 1
 
         first = jnp.array([1.0, 0.0, 0.0]), jnp.asarray(False), jnp.asarray(0)
         plane, _, _ = jax.lax.while_loop(lambda last: ~last[1] & (last[2] < STEPS), body, first)
-        return self.corners @ plane > 0.0
+        return self.pressure(plane) > 0.0
 
 
 def pressing(u, v, share, x, y, narrow) -> jax.Array:

@@ -50,6 +50,17 @@ def predict(rows: Sequence[Rows], values: Values, terms: Sequence[str]) -> list[
     return [_predict(each, values, terms) for each in rows]
 
 
+def errors(rows: Sequence[Rows], values: Values, terms: Sequence[str]) -> np.ndarray:
+    """Compute modelled less measured torque at the fitted rows of all logs [N m]."""
+    pairs = zip(predict(rows, values, terms), rows, strict=True)
+    return np.concatenate([torque[log.fitted] - log.measured(values.get("delay", 0.0)) for torque, log in pairs])
+
+
+def miss(rows: Sequence[Rows], values: Values, terms: Sequence[str]) -> float:
+    """Compute the mean absolute error of the model [N m]."""
+    return float(np.abs(errors(rows, values, terms)).mean())
+
+
 def _predict(rows: Rows, values: Values, terms: Sequence[str]) -> np.ndarray:
     speed, direction = rows.speed, rows.direction
     gravity = np.zeros_like(speed)
@@ -169,18 +180,15 @@ def refine(
     scaled = _Scaled(rows, start, names_of(terms, late))
     reversing = np.concatenate([each.reversing for each in rows])
 
-    def errors(x: np.ndarray) -> np.ndarray:
-        values = scaled.values(x)
-        found = predict(rows, values, terms)
-        pairs = zip(found, rows, strict=True)
-        return np.concatenate([torque[log.fitted] - log.measured(values.get("delay", 0.0)) for torque, log in pairs])
+    def at(x: np.ndarray) -> np.ndarray:
+        return errors(rows, scaled.values(x), terms)
 
     x = scaled.start
     for _ in range(2 if scatter is None else 1):
-        sizes = _scatter(errors(x), reversing) if scatter is None else scatter
-        weighted: Callable[[np.ndarray], Any] = lambda x: errors(x) / sizes[reversing]  # noqa: B023, E731
+        sizes = _scatter(at(x), reversing) if scatter is None else scatter
+        weighted: Callable[[np.ndarray], Any] = lambda x: at(x) / sizes[reversing]  # noqa: B023, E731
         x = least_squares(weighted, x, diff_step=1e-5, max_nfev=12, loss="huber", f_scale=HUBER).x
-    return _judged(scaled, x, errors, sizes, rows, tuple(terms))
+    return _judged(scaled, x, at, sizes, rows, tuple(terms))
 
 
 def _scatter(error: np.ndarray, reversing: np.ndarray) -> np.ndarray:

@@ -87,11 +87,8 @@ def _fit_torques(
     plain = {"delay": 0.0} | {name: value for name, value in fit.values.items() if name not in FACTORS}
     baseline = balance.refine(data.rows, plain, (), fit.scatter)
     scores = {each.terms: each.score for each in (*ranked, baseline)}
-    gains = {
-        term: scores[rest_terms] / fit.score
-        for term in fit.terms
-        if (rest_terms := tuple(each for each in fit.terms if each != term)) in scores
-    }
+    without = {term: tuple(each for each in fit.terms if each != term) for term in fit.terms}
+    gains = {term: scores[terms] / fit.score for term, terms in without.items() if terms in scores}
     unclear = {} if auto else {term: why for term in fit.terms if (why := torque_fit.doubt(data, fit, term))}
     verdicts = torque_verdicts.judge(data, fit, rest, logs, plant, values, intervals, gains)
     doubts = [torque_verdicts.Verdict(term, False, f"not shown by these logs: {why}") for term, why in unclear.items()]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -79,10 +79,6 @@ class Trial:
         falls, *halves = (np.log(np.maximum(one, 1e-300) / np.maximum(other, 1e-300)) for one, other in pairs)
         scatter = t.ppf(0.95, len(falls) - 1) * falls.std(ddof=1) / np.sqrt(len(falls))
         return float(falls.mean()), float(scatter), [float(each.mean()) for each in halves]
-
-    def shifts(self, others: Sequence[Mapping[str, float]]) -> dict[str, float]:
-        """Compute the largest shift of each estimate to those of other fits, which missing terms move differently."""
-        return {name: max(abs(each[name] - value) for each in others) for name, value in self.values.items()}
 
     @property
     def jackknife(self) -> dict[str, float]:
@@ -195,16 +191,22 @@ VAGUE = 0.5
 """Standard error over the value from which on the number of a term is not known."""
 
 
-def _check_related(problem: Problem, kept: Trial) -> None:
-    """Raise InvalidValueError if runs from the goals resemble none of the logs."""
-    runs = zip(problem.simulated(kept.values, problem.logs), problem.logs, strict=True)
-    error, deviation = np.median(
-        [[np.abs(run[:, 0] - log.q).mean(), np.abs(log.q - log.q.mean()).mean()] for run, log in runs], axis=0
-    )
-    if error > UNRELATED * deviation:
+def _check_related(problem: Problem, runs: Sequence[np.ndarray]) -> Iterator[Verdict]:
+    """Yield a verdict on a log that the run from its goal does not resemble, though others do.
+
+    Raises InvalidValueError for several such logs, or one alone.
+    """
+    missed = {}
+    for run, log in zip(runs, problem.logs, strict=True):
+        error, swing = np.abs(run[:, 0] - log.q).mean(), np.abs(log.q - log.q.mean()).mean()
+        if error > UNRELATED * swing:
+            missed[log.name] = f"{error:.2g} rad left of a mean swing of {swing:.2g} rad about its mean"
+    if len(missed) > 1 or len(missed) == len(problem.logs):
         rule = "follow from goal or voltage: check units, signs, gains, and that all belong to one joint"
-        found = f"{error:.2g} rad left of a mean swing of {deviation:.2g} rad about its mean"
-        raise InvalidValueError("q of the logs", rule, found)
+        raise InvalidValueError(f"q of {', '.join(missed)}", rule, next(iter(missed.values())))
+    for name, found in missed.items():
+        text = f"{name}: {found}: this log contradicts the others; check its gains and units, or leave it out"
+        yield Verdict("fit", False, text)
 
 
 def _is_vague(
@@ -247,14 +249,13 @@ def fit_goals(base: Problem, chosen: Sequence[str], auto: bool, progress: Callab
 def result_of(kept: Trial, first: Trial, pairs: Mapping[str, tuple[Trial, Trial]]) -> JointFit:
     """Return the result of the trial that was kept: its intervals, and verdicts.
 
-    Estimates also move with each term that was tried besides: intervals count the largest shift.
+    Estimates also move if runs begin again at the measured motion: intervals count that shift.
     """
     problem, values = kept.problem, kept.values
-    _check_related(problem, kept)
-    more = [trial.values for trial, _ in pairs.values() if {*kept.terms} < {*trial.terms}]
-    shifts = kept.shifts([kept.again, *more])
+    runs = [trial.problem.simulated(trial.values, problem.logs) for trial in (kept, first)]
+    doubts = [*_check_related(problem, runs[0])]
+    shifts = {name: abs(kept.again[name] - value) for name, value in values.items()}
     jackknife = kept.jackknife
-    runs = (trial.problem.simulated(trial.values, problem.logs) for trial in (kept, first))
     series = tuple(
         Series(log.name, log.time, log.q, fitted[:, 0], rest[:, 0])
         for log, fitted, rest in zip(problem.logs, *runs, strict=True)
@@ -267,7 +268,7 @@ def result_of(kept: Trial, first: Trial, pairs: Mapping[str, tuple[Trial, Trial]
         if vague:
             unclear[term] = f"{vague[0]} = {values[vague[0]]:.2g}, spread {spread[vague[0]]:.2g} between fits"
     verdicts = judge(kept, pairs)
-    doubts = tuple(Verdict(term, False, f"not shown by these logs ({words})") for term, words in unclear.items())
+    doubts += [Verdict(term, False, f"not shown by these logs ({words})") for term, words in unclear.items()]
     return JointFit(
         problem.logs, problem.settled(values), values.get("torque_gain", problem.torque_gain), kept.terms, values,
         spread, intervals, tuple(problem.groups), kept.errors, first.errors, series, unclear, (*verdicts, *doubts),

@@ -30,6 +30,12 @@ REACH = 5.0
 WIDEST = 0.04
 """Largest width of the kernel [s]."""
 
+SLOW_FACTOR = 4.0
+"""Width of the kernel for slow motion over that for all else: slow motion changes slowly."""
+
+SLOW_SHARE = 0.5
+"""Largest width of the kernel for slow motion, as a share of the motion's root mean square speed over acceleration."""
+
 ATTENUATED = 5e-4
 """Largest share of noise in the variance of the acceleration: more would make the inertia look too small."""
 
@@ -155,15 +161,31 @@ class Scales(NamedTuple):
 
     width: float
     """Standard deviation of the kernel [s]."""
+    noisy: float
+    """Speed below which the kernel for slow motion takes over [rad/s]."""
+    slow_width: float
+    """Standard deviation of the kernel for slow motion [s]."""
     slow: float
     """Speed below which the direction of motion is not sure [rad/s]."""
 
 
 def scales(logs: Sequence[EvenLog], width: float) -> Scales:
-    """Compute the limits of logs: three standard deviations of the speed, or a fifth of an encoder step each width."""
+    """Compute the limits of logs: three standard deviations of the speed, or a fifth of an encoder step each width.
+
+    A Gaussian keeps the instant at which a steadily accelerated joint turns round, so the speed of slow motion may go
+    through a wider kernel, whose noise is smaller.
+    """
     power = float(np.mean([log.noise**2 * log.dt for log in logs]))
-    sure = 3.0 * max(np.sqrt(speed_noise(power, width)), 1e-9)
-    return Scales(width, max(sure, 0.2 * max(log.resolution for log in logs) / width))
+    resolution = max(log.resolution for log in logs)
+
+    def sure(width: float) -> float:
+        return max(3.0 * float(np.sqrt(speed_noise(power, width))), 0.2 * resolution / width, 1e-9)
+
+    speed, acceleration = (np.concatenate([derivatives(log, width)[k] for log in logs]).var() for k in (1, 2))
+    moved = max(acceleration - acceleration_noise(power, width), 1e-300)
+    longest = SLOW_SHARE * float(np.sqrt(speed / moved))
+    slow_width = float(np.clip(SLOW_FACTOR * width, width, max(longest, width)))
+    return Scales(width, sure(width), slow_width, sure(slow_width))
 
 
 @dataclass(frozen=True)
@@ -181,7 +203,7 @@ class Rows:
     angle: np.ndarray
     """Angle [rad], `[R]`."""
     speed: np.ndarray
-    """Speed [rad/s], `[R]`."""
+    """Speed [rad/s], of slow motion through the wider kernel, `[R]`."""
     acceleration: np.ndarray
     """Acceleration [rad/s^2], `[R]`."""
     external: np.ndarray
@@ -239,9 +261,13 @@ def rows_of(log: EvenLog, limits: Scales) -> Rows:
     torque, external = (gaussian_filter1d(each, **smooth) for each in (log.torque, log.external))
     spacing = max(width / PER_WIDTH, log.dt)
     time = np.arange(log.time[0], log.time[-1], spacing)
-    motion = derivatives(log, width)
-    angle, speed, acceleration, external = (np.interp(time, log.time, each) for each in (*motion, external))
-    margin = REACH * width + np.abs(DELAYS).max()
+    angle, speed, acceleration = derivatives(log, width)
+    slow_speed = derivatives(log, limits.slow_width)[1]
+    sharp = np.clip(np.abs(speed) / limits.noisy - 1.0, 0.0, 1.0)
+    speed = slow_speed + sharp * (speed - slow_speed)
+    columns = (angle, speed, acceleration, external)
+    angle, speed, acceleration, external = (np.interp(time, log.time, each) for each in columns)
+    margin = max(REACH * width, 3.0 * limits.slow_width) + np.abs(DELAYS).max()
     usable = (time > time[0] + margin) & (time < time[-1] - margin)
     for first, last in runs(np.abs(speed) < limits.slow):
         if (last - first) * spacing > STANDS:

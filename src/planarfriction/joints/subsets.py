@@ -93,22 +93,25 @@ def _scored(
 
 
 def _sums(rows: Sequence[Rows], grid: Grid, loads: list[np.ndarray]) -> np.ndarray:
-    """Compute the sums of squares of each block, `[1 + bends, speeds, blocks, C + D, C + D]`.
+    """Compute the sums of products of each block, `[1 + bends, speeds, blocks, C + 1, C + D]`.
 
-    Columns are those of `COLUMNS`, then the torques with each delay; the first bend is none.
+    Rows are those of `COLUMNS`, columns these and the torques with each delay; the last row holds the squares of the
+    torques. The first bend is none.
     """
     tables = [_columns(each, grid, load) for each, load in zip(rows, loads, strict=True)]
     linear, sliding, torques = (np.concatenate(each, axis=-2) for each in zip(*tables, strict=True))
-    masks = blocks_of(rows)
-    speeds = len(grid.v_s)
+    parts = [slice(each[0], each[-1] + 1) for each in map(np.flatnonzero, blocks_of(rows))]
+    speeds, count = len(grid.v_s), len(COLUMNS)
     sums = []
     for bent in sliding:
         level, falls, load = bent[:, :1], bent[:, 1 : 1 + speeds], bent[:, 1 + speeds :]
         for i in range(speeds):
             table = np.column_stack([linear[:, :3], level, linear[:, 3:5], falls[:, i], load, linear[:, 5:], torques])
-            sums.append([table[mask].T @ table[mask] for mask in masks])
-    size = len(COLUMNS) + len(DELAYS)
-    return np.array(sums).reshape(len(sliding), speeds, len(masks), size, size)
+            sums.append([table[part, :count].T @ table[part] for part in parts])
+    products = np.array(sums).reshape(len(sliding), speeds, len(parts), count, count + len(DELAYS))
+    squares = np.zeros((*products.shape[:3], 1, products.shape[4]))
+    squares[..., 0, count:] = [np.square(torques[part]).sum(axis=0) for part in parts]
+    return np.concatenate([products, squares], axis=3)
 
 
 def _columns(rows: Rows, grid: Grid, load: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -167,7 +170,7 @@ def _solve(sums: np.ndarray, columns: list[int], positive: list[int]) -> _Soluti
     size = np.sqrt(np.maximum(np.diag(among), 1e-300))
     numbers = np.linalg.solve(among / np.outer(size, size) + RIDGE * np.eye(len(size)), across / size[:, None])
     numbers /= size[:, None]
-    costs = np.diag(sums)[count:] - (numbers * across).sum(axis=0)
+    costs = sums[count, count:] - (numbers * across).sum(axis=0)
     for row in positive:
         costs = np.where(numbers[row] > 0.0, costs, np.inf)
     delay = int(np.argmin(costs))
@@ -178,10 +181,10 @@ def _error(sums: np.ndarray, columns: list[int], solution: _Solution) -> float:
     """Compute the squared error of a solution on blocks that it was not fitted to."""
     if not np.isfinite(solution.cost):
         return np.inf
-    row = len(COLUMNS) + solution.delay
-    numbers = solution.numbers
+    count, numbers = len(COLUMNS), solution.numbers
+    torque = count + solution.delay
     among = sums[np.ix_(columns, columns)]
-    return float(sums[row, row] - 2.0 * sums[row, columns] @ numbers + numbers @ among @ numbers)
+    return float(sums[count, torque] - 2.0 * sums[columns, torque] @ numbers + numbers @ among @ numbers)
 
 
 def _through(rows: Rows, values: dict[str, float]) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from planarfriction.errors import InvalidValueError
 from planarfriction.joints import subsets
-from planarfriction.joints.balance import FACTORS, MOST_LOAD, TERMS, Refined, predict, refine
+from planarfriction.joints.balance import FACTORS, MOST_LOAD, TERMS, Refined, miss, predict, refine
 from planarfriction.joints.log import JointLog
 from planarfriction.joints.smoothing import EvenLog, Rows, Scales, evenly, kernel_width, rows_of, scales
 
@@ -35,6 +35,12 @@ EXACT = 0.0025
 REFINED = 4
 """Number of sets of terms, the best ones by their sums, that are refined."""
 
+RISES = (0.3, 0.8)
+"""Rises of the level towards rest, over the Coulomb level, from which a fall of friction is searched."""
+
+FAR = 10.0
+"""Factor on the best score by the sums above which a set of terms is not refined."""
+
 REVERSALS = 4
 """Number of reversals from which on bristles can be seen."""
 
@@ -43,6 +49,12 @@ LATEST = 7e-4
 
 WIDER = 1.6
 """Factor on the width of the kernel by which estimates are tried again."""
+
+MOST_RISE = 2.0
+"""Rise of the level towards rest, over the Coulomb level, above which `BANDS` bands of speed must show it."""
+
+BANDS = 3
+"""Number of equal bands of speed below the Stribeck speed, each with `LEAST_ROWS` rows, that show a large rise."""
 
 GRID = 9
 """Number of Stribeck speeds, and of bends, that are searched."""
@@ -147,24 +159,29 @@ def choose(data: Data, told: Sequence[str], auto: bool, progress: Callable[[str]
     """
     progress("Coulomb and viscous friction, and all sets of terms")
     grid = data.grid
-    candidates = subsets.search(data.rows, grid, told, data.allowed if auto else told)
-    starts = {each.terms: each for each in candidates}
     largest = float(np.abs(data.torque).max())
+    allowed = data.allowed if auto else told
+    candidates = subsets.search(data.rows, grid, told, allowed)
     first = candidates[0]
-    best = refine(data.rows, subsets.started(first, largest), first.terms)
-    values = ", ".join(f"{name} = {best.values[name]:.3g}" for name in ("mu_c", "sigma_2"))
-    progress(f"first estimate, {_words(best.terms)}: {values}")
+    progress(f"first estimate, {_words(first.terms)}: {_level(first.values)}")
+    rough: dict[str, float] = {}
+    if "bristles" in first.terms and "stribeck" in allowed:
+        terms = first.terms if "stribeck" in told else tuple(each for each in first.terms if each != "stribeck")
+        rough = refine(data.rows, subsets.started(_named(candidates, terms), largest), terms).values
+    best = refine(data.rows, _start(data, first, rough, largest), first.terms)
+    progress(f"second estimate, {_words(best.terms)}: {_level(best.values)}")
     fits = {best.terms: best}
 
     def refined(terms: tuple[str, ...]) -> Refined:
         if terms not in fits:
-            start = subsets.started(starts[terms], largest)
-            known = {name: value for name, value in best.values.items() if name in start}
             progress(_words(terms))
+            start = _start(data, _named(candidates, terms), rough, largest)
+            known = {name: value for name, value in best.values.items() if name in start}
             fits[terms] = refine(data.rows, start | known, terms, best.scatter)
         return fits[terms]
 
     near = [each.terms for each in candidates if len({*each.terms} ^ {*first.terms}) == 1]
+    near = [each for each in near if _named(candidates, each).score < FAR * first.score]
     good: dict[tuple[str, ...], Refined] = {}
     for terms in dict.fromkeys([*(each.terms for each in candidates[:REFINED]), *near, tuple(told)]):
         fit = refined(terms)
@@ -175,6 +192,29 @@ def choose(data: Data, told: Sequence[str], auto: bool, progress: Callable[[str]
     close = [each for each in ranked if _as_good(each, ranked[0])]
     smallest = min(close, key=lambda each: (len(each.terms), each.score))
     return [smallest, *(each for each in ranked if each is not smallest)]
+
+
+def _start(data: Data, candidate: subsets.Candidate, rough: Mapping[str, float], largest: float) -> dict[str, float]:
+    """Return the numbers from which a set of terms is refined.
+
+    Bristles lag by the level itself, which the sums do not know: with them, a fall of friction is searched once more
+    by the model, around the `rough` numbers of a fit without it.
+    """
+    start = subsets.started(candidate, largest)
+    if not ("stribeck" in candidate.terms and rough):
+        return start
+    known = start | {name: value for name, value in rough.items() if name in start}
+    falls = [known | {"rise": rise * known["mu_c"], "v_s": speed} for rise in RISES for speed in data.grid.v_s.tolist()]
+    return min([start, *falls], key=lambda values: miss(data.rows, values, candidate.terms))
+
+
+def _named(candidates: Sequence[subsets.Candidate], terms: tuple[str, ...]) -> subsets.Candidate:
+    """Return the candidate with some terms."""
+    return next(each for each in candidates if each.terms == terms)
+
+
+def _level(values: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} = {values[name]:.3g}" for name in ("mu_c", "sigma_2"))
 
 
 def _words(terms: Sequence[str]) -> str:
@@ -227,6 +267,9 @@ def _doubt_of_fall(data: Data, values: dict[str, float], spread: dict[str, float
         return f"its speed of {speed:.2g} rad/s lies outside of those that these logs show, {reach}"
     if spread["v_s"] >= SURE_FACTOR:
         return f"v_s is only known within a factor of {np.exp(min(2.0 * spread['v_s'], 700.0)):.2g}"
+    bands = np.histogram(np.abs(data.speed), np.linspace(min(data.limits.slow, speed), speed, BANDS + 1))[0]
+    if rise > MOST_RISE * values["mu_c"] and bands.min() < LEAST_ROWS:
+        return f"mu_s would be {1.0 + rise / values['mu_c']:.2g} mu_c, and too few samples are slow enough to show it"
     clear = rise > max(SURE * spread["rise"], MATTERS * level)
     return "" if clear else f"mu_s exceeds mu_c by {rise:.2g} N m, which is not clear of zero, or does not matter"
 

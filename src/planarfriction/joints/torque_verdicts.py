@@ -21,8 +21,11 @@ FOLLOWS = 0.3
 SPOILED = 0.5
 """Share of friction that is left unexplained from which on no number is to be trusted."""
 
-INCOMPLETE = 0.1
+INCOMPLETE = 0.08
 """Share of friction that is left unexplained from which on intervals need not hold."""
+
+ABOVE_NOISE = 1.25
+"""Median error far from reversals over the noise from which on intervals need not hold: backlash shows there."""
 
 LATE = 1e-3
 """Delay of the torque [s] from which on it is named."""
@@ -49,6 +52,8 @@ class Rest(NamedTuple):
     """Share of it that the noise of the logs explains [N m]."""
     friction: float
     """Root mean square of friction [N m]."""
+    steady: float
+    """Median error far from reversals over the noise."""
 
     @property
     def share(self) -> float:
@@ -70,7 +75,8 @@ def rest_of(data: Data, fit: Refined) -> Rest:
             for rows in data.rows
         ]
     )
-    return Rest(*(float(np.sqrt(np.mean(each))) for each in (fit.error**2, variances, friction**2)))
+    error, noise, level = (float(np.sqrt(np.mean(each))) for each in (fit.error**2, variances, friction**2))
+    return Rest(error, noise, level, float(fit.scatter[0]) / max(noise, 1e-12))
 
 
 def refuse(data: Data, fit: Refined, rest: Rest, intervals: Mapping[str, Interval]) -> None:
@@ -135,10 +141,9 @@ def judge(
 
 
 def _on_terms(data: Data, fit: Refined, gains: Mapping[str, float]) -> Iterator[Verdict]:
-    for term, gain in gains.items():
-        numbers = f"squared errors without it are {gain:.3g} times as large"
-        if term in fit.terms:
-            yield Verdict(term, True, f"{WORDS[term]} ({numbers})")
+    for term in fit.terms:
+        numbers = f"{gains[term]:.3g}" if term in gains else "many"
+        yield Verdict(term, True, f"{WORDS[term]} (squared errors without it are {numbers} times as large)")
     if "stribeck" not in fit.terms:
         text = f"no fall of friction with speed is seen from {data.slowest_fall:.2g} rad/s on; slower ones cannot be"
         yield Verdict("stribeck", True, text)
@@ -148,7 +153,7 @@ def _on_terms(data: Data, fit: Refined, gains: Mapping[str, float]) -> Iterator[
 
 
 def _on_rest(rest: Rest) -> Iterator[Verdict]:
-    if rest.share > INCOMPLETE:
+    if rest.share > INCOMPLETE or rest.steady > ABOVE_NOISE:
         text = (
             f"{rest.share:.0%} of friction is not explained, {rest.error / max(rest.noise, 1e-12):.0f} times the noise"
         )

@@ -59,6 +59,31 @@ def onto_plane(place: Any, middle: Any, normal: Any) -> Any:
     return place[0] + height * normal[0], place[1] + height * normal[1], place[2] + height * normal[2]
 
 
+def bend(over: Any, tilt: Any, both: Any, normal: Any, apart: Any, dt: Any) -> Any:
+    """Return what the velocity of a patch gains in half a step as its contact moves on and its normal turns `[3]`.
+
+        dt/2 (b + u_n n x (w_a + w_b)),    b = (v - (n . v) n) x (w_a - w_b),    u_n = u_n0 + dt/2 n . b
+
+    v (`over`) is the velocity of the smaller body's surface less that of this body's centre, and `tilt` the difference
+    of the two spins: the contact goes along with the centre, over material that turns. u_n0 (`apart`) is the mean speed
+    at which the two points that touch leave each other, u_n that of the surfaces, and `both` the sum of the spins: what
+    leaves, leaves along the normal, which turns too.
+    """
+    half = 0.5 * dt
+    along = normal[0] * over[0] + normal[1] * over[1] + normal[2] * over[2]
+    x = over[0] - along * normal[0]
+    y = over[1] - along * normal[1]
+    z = over[2] - along * normal[2]
+    first = y * tilt[2] - z * tilt[1]
+    second = z * tilt[0] - x * tilt[2]
+    third = x * tilt[1] - y * tilt[0]
+    leaves = apart + half * (normal[0] * first + normal[1] * second + normal[2] * third)
+    first += leaves * (normal[1] * both[2] - normal[2] * both[1])
+    second += leaves * (normal[2] * both[0] - normal[0] * both[2])
+    third += leaves * (normal[0] * both[1] - normal[1] * both[0])
+    return half * first, half * second, half * third
+
+
 def across(axis: Any, normal: Any) -> Any:
     """Return the square of the sine of the angle between an axis and the normal, both of length 1."""
     along = axis[0] * normal[0] + axis[1] * normal[1] + axis[2] * normal[2]

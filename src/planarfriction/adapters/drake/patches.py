@@ -96,6 +96,13 @@ class Placed:
         ]
         """Frames of bodies that are single cylinders, and the axes of these in them."""
 
+        smaller = min((own, 1 - own), key=lambda side: _size(inspector, sides[side]))
+        self.goes = smaller == own
+        """True if the patch goes along with the own side over the other, which is larger."""
+        self.carrier = bodies[smaller].body_frame()
+        self.middle = np.mean([inspector.GetPoseInFrame(each).translation() for each in sides[smaller]], axis=0)
+        """Middle of the smaller side in this frame [m]."""
+
     def misplaced_line(self, fault: int) -> str:
         """Return a line about a patch that does not lie in its contact."""
         return placing.fault_line("frame", self.patch.frame, self.patch.geometries, fault)
@@ -181,6 +188,12 @@ def _one(what: str, kind: str, named: dict[str, Any], name: str) -> Any:
 def _ending(named: dict[str, Any], name: str) -> list[str]:
     """Return the full names, with that of the model before, that a name may mean."""
     return [full for full in named if full == name or full.endswith(f"::{name}")]
+
+
+def _size(inspector: Any, side: list[GeometryId]) -> float:
+    """Return the size of a side: half the diagonal of the box around its largest geometry [m]."""
+    boxes = [inspector.GetObbInGeometryFrame(each) for each in side]
+    return max(np.inf if box is None else float(np.linalg.norm(box.half_width())) for box in boxes)
 
 
 def _body_of(plant: Any, scene_graph: Any, geometry: GeometryId) -> Any:

@@ -44,6 +44,7 @@ class Shadow:
         self._damping = self.dt * _damping(self.plant)
         self._frames = [self.plant.get_frame(each.frame.index()) for each in placed]
         self._others = [self.plant.get_frame(each.other.index()) for each in placed]
+        self._carriers = [self.plant.get_frame(each.carrier.index()) for each in placed]
         self._placed, self.follows = placed, [each.follows for each in placed]
         self._reaches = [placing.reach_of(each.patch.model.patch) for each in placed]
         self._cylinders = [
@@ -140,7 +141,7 @@ class Shadow:
 
             x_1 - x_0 = dt J v + (x(q_0 + dt N v) + x(q_0 - dt N v) - 2 x(q_0)) / 2
 
-        What comes nearer along the normal, or leaves, does so along the normal that turns with the two.
+        The contact moves on, and its normal turns (see `placing.bend`).
         """
         now = self.plant.GetPositions(self._begin)
         self.plant.SetPositions(self._backwards, 2.0 * now - self.plant.GetPositions(self._end))
@@ -149,9 +150,13 @@ class Shadow:
     def _bend(self, p: int) -> np.ndarray:
         seen, places = self._seen[p]
         (own, own_back), (other, other_back) = map(self._moves, places)
-        away, turn, normal = own - other, 0.5 * (own + other)[:3], seen[2, :3]
+        away, normal, placed = own - other, seen[2, :3], self._placed[p]
+        ends, begins = (self._carriers[p].CalcPoseInWorld(each) @ placed.middle for each in (self._end, self._begin))
+        over = (own if placed.goes else other)[3:] - (ends - begins)
         bend = 0.5 * (away + own_back - other_back)
-        bend[3:] -= away[3:] @ normal * np.array(_cross(turn, normal))
+        both, apart = (own + other)[:3], float(normal @ away[3:])
+        given = (each.tolist() for each in (over, away[:3], both, normal))
+        bend[3:] += placing.bend(*given, apart, 1.0)
         return seen @ bend / self.dt
 
     def _place(self, frame: Any, place: Sequence[float]) -> Any:

@@ -234,10 +234,10 @@ def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Ar
         sides = zip((place.owner, place.support), (place.own, place.other), place.surface, strict=True)
         own, other = (_side(m, d, centre, *side) for side in sides)
         moves, turns, drift, drift_spin, part, spin, _ = jax.tree.map(jnp.subtract, own, other)
-        goes, across = place.carrier == place.own, jnp.where(touching, jnp.stack([x, y]), 0.0)
-        over = jnp.where(goes, own.over, other.over)
-        over += (jnp.where(goes, 1.0, -1.0) * (part @ normal) - over @ normal) * normal
-        drift += 0.5 * m.opt.timestep * jnp.cross(over, spin)
+        across = jnp.where(touching, jnp.stack([x, y]), 0.0)
+        over = jnp.where(place.carrier == place.own, own.over, other.over)
+        both, dt = own.spin + other.spin, m.opt.timestep
+        drift += jnp.stack(placing.bend(over, spin, both, normal, normal @ (part + drift), dt))
         drift = jnp.append(across @ drift, jnp.where(touching, normal @ drift_spin, 0.0))
         jacobian, away = jnp.stack([moves @ x, moves @ y, turns @ normal]), contact.pos - centre
         own = jnp.where(chosen, jnp.stack([jnp.ones(len(away)), away @ y, -away @ x]), 0.0)
@@ -266,10 +266,11 @@ class _Side(NamedTuple):
     """Velocity and spin `[3]` that no wrench changes: of the surface on the body, and half of what both gain."""
     drift_spin: jax.Array
     velocity: jax.Array
-    """Velocity and spin `[3]` of the surface where the step begins."""
+    """Velocity of the body `[3]` where the step begins."""
     spin: jax.Array
+    """Spin of the surface `[3]`."""
     over: jax.Array
-    """This velocity less that of the centre of the geom `[3]`."""
+    """Velocity of the surface less that of the centre of the geom `[3]`."""
 
 
 def _side(m: Any, d: Any, point: jax.Array, body: Any, geom: Any, surface: jax.Array) -> _Side:
@@ -286,7 +287,7 @@ def _side(m: Any, d: Any, point: jax.Array, body: Any, geom: Any, surface: jax.A
     mean = move + dt * first * across + dt**2 * second * jnp.cross(turn, across) + dt * jnp.cross(spin, move)
     drift = mean + 0.5 * dt * (gain + jnp.cross(spin, velocity))
     drift_spin = turn + 0.5 * dt * (gained + jnp.cross(spin, turn))
-    return _Side(moves, turns, drift, drift_spin, velocity + move, spin + turn, move + jnp.cross(spin, away))
+    return _Side(moves, turns, drift, drift_spin, velocity, spin + turn, move + jnp.cross(spin, away))
 
 
 def _unit(vector: jax.Array, given: jax.Array) -> jax.Array:

@@ -245,7 +245,7 @@ class Friction:
     def _numbers(self) -> Any:
         """Return the numbers of the patches for kernels."""
         shapes = [each.model.state_shape for each in self.patches]
-        names = "site", "own", "other", "owner", "support", "centre", "curved"
+        names = "site", "own", "other", "owner", "support", "centre", "curved", "carrier"
         found = {name: [int(getattr(each, name)) for each in self.placed] for name in names}
         found |= {"bristles": [math.prod(shape[1:]) for shape in shapes]}
         found |= {"first": np.cumsum([0, *map(math.prod, shapes)])[:-1].tolist()}

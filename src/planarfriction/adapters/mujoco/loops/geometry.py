@@ -4,11 +4,10 @@ MuJoCo takes free bodies along the tangent and hinges along their arc. What is h
 *place* if the twist of a step is its mean over the step: what V is where the step begins, at the velocities of its end,
 and half of what it gains while all joints keep their speeds. That is, for surfaces at the origin of the patch,
 
-    V = J v + dt/2 (dJ/dt v - w x u)
+    V = J v + dt/2 dJ/dt v + b
 
-where w is the spin of their bodies on each other, 0 of those that hold each other. The contact goes along with the
-smaller geom: u is the velocity of this one's surface at the origin, less that of its centre in the plane of the
-contact, and that of the other surface across it. Wheels roll straight by it, and boxes rock about their edges.
+where b is what V gains as the contact goes along with the smaller geom and as its normal turns (see `placing.bend`):
+wheels roll straight by it, and pads that close while they turn do not turn what they hold.
 """
 
 from __future__ import annotations
@@ -26,6 +25,7 @@ from planarfriction.formulas import turning_mean
 
 onto_plane = kernel(placing.onto_plane)
 across = kernel(placing.across)
+bend = kernel(placing.bend)
 
 
 @kernel
@@ -156,7 +156,7 @@ def _add_drift(s, p, factor, move, turn):
 
 @kernel
 def _add_side(own, m, d, s, p, body, geom, sign):
-    """Add the surface of a geom on a body to rows and drift of patch p; return its velocity, and its spin."""
+    """Add the surface of a geom on a body to rows and drift of patch p; return velocity, spin and acceleration."""
     nv, rows, point = own.nv, at(s.jacobian, 3 * own.nv * p), at(s.frames, 6 * p + 3)
     half, velocity = 0.5 * doubles(m + own.model.timestep)[0], doubles(integers(d + own.data.qvel)[0])
     x, y, normal = axes(s, p)
@@ -177,7 +177,7 @@ def _add_side(own, m, d, s, p, body, geom, sign):
     if own.model.geom_surfacevel >= 0:
         slide, spin = _add_surface(own, m, d, s, p, geom, turn, sign)
         move, turn = plus(move, 1.0, slide), plus(turn, 1.0, spin)
-    return move, turn
+    return move, turn, gain
 
 
 @kernel
@@ -243,15 +243,14 @@ def _rows(own, m, d, s, nefc, p, kept):
     _put_origin(own, d, s, p, normal, at(kept.held, 3 * p))
     _put_places(own, d, s, nefc, p, centre, x, y)
     clear(rows, 3 * own.nv)
-    move, turn = _add_side(own, m, d, s, p, integers(own.owner)[p], integers(own.own)[p], 1.0)
-    below, spin = _add_side(own, m, d, s, p, integers(own.support)[p], integers(own.other)[p], -1.0)
+    move, turn, gain = _add_side(own, m, d, s, p, integers(own.owner)[p], integers(own.own)[p], 1.0)
+    below, spin, bent = _add_side(own, m, d, s, p, integers(own.support)[p], integers(own.other)[p], -1.0)
     call_c(own.functions.mj_objectVelocity, (m, d, own.constants.GEOM, integers(own.carrier)[p], s.block, 0))
-    tilt = plus(turn, -1.0, spin)
-    apart = dot(normal, plus(move, -1.0, below))
+    tilt, dt = plus(turn, -1.0, spin), doubles(m + own.model.timestep)[0]
+    apart = dot(normal, plus(move, -1.0, below)) + 0.5 * dt * dot(normal, plus(gain, -1.0, bent))
     goes = integers(own.carrier)[p] == integers(own.own)[p]
     over = plus(move if goes else below, -1.0, three(at(s.block, 3)))
-    over = plus(over, (apart if goes else -apart) - dot(normal, over), normal)
-    _add_drift(s, p, 0.5 * doubles(m + own.model.timestep)[0], cross(over, tilt), zeros(tilt))
+    _add_drift(s, p, 1.0, bend(over, tilt, plus(turn, 1.0, spin), normal, apart, dt), zeros(tilt))
     s.tilts[p] = math.sqrt(dot(x, tilt) ** 2 + dot(y, tilt) ** 2)
 
 

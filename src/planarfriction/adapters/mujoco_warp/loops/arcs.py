@@ -5,6 +5,9 @@
 import warp as wp
 
 from planarfriction.adapters.mujoco_warp.loops.geometry import Frames, Host, Patches
+from planarfriction.kernels import placing
+
+gained = wp.func(placing.bend)
 
 
 @wp.func
@@ -29,15 +32,23 @@ def motion_of(host: Host, w: int, point: wp.vec3, body: int, geom: int, surface:
     return wp.spatial_vector(v + u, spin + turn), rate
 
 
+@wp.func
+def over_centre(host: Host, w: int, move: wp.vec3, body: int, geom: int) -> wp.vec3:
+    """Return a velocity less that of the centre of a geom on a body."""
+    velocity = host.velocity[w, body]
+    away = host.geom_xpos[w, geom] - host.centre[w, host.root[body]]
+    return move - wp.spatial_bottom(velocity) - wp.cross(wp.spatial_top(velocity), away)
+
+
 @wp.kernel(enable_backward=False)
 def bend(patches: Patches, host: Host, frames: Frames):
     """Add to the drifts what patches move in the step, per dt, beyond their twists at its velocities.
 
-    Points of what turns go along arcs: to second order, `x_1 - x_0 = dt J v + dt^2 / 2 Jdot v`. What comes nearer along
-    the normal, or leaves, does so along the normal that turns with the two.
+    Points of what turns go along arcs: to second order, `x_1 - x_0 = dt J v + dt^2 / 2 Jdot v`. The contact moves on,
+    and its normal turns (see `placing.bend`).
     """
     w = wp.tid()
-    half = 0.5 * host.timestep[w % host.timestep.shape[0]]
+    dt = host.timestep[w % host.timestep.shape[0]]
     for p in range(patches.count):
         if frames.touching[w, p] == 0:
             continue
@@ -45,9 +56,13 @@ def bend(patches: Patches, host: Host, frames: Frames):
         axes = frames.axes[w, p]
         own, own_rate = motion_of(host, w, point, patches.owner[p], patches.own[p], patches.surface[p, 0])
         other, other_rate = motion_of(host, w, point, patches.support[p], patches.other[p], patches.surface[p, 1])
-        rate = half * (own_rate - other_rate)
+        rate = 0.5 * dt * (own_rate - other_rate)
         normal = wp.vec3(axes[2, 0], axes[2, 1], axes[2, 2])
-        nears = wp.dot(normal, wp.spatial_top(own - other) + wp.spatial_top(rate))
-        move = axes * (wp.spatial_top(rate) - half * nears * wp.cross(wp.spatial_bottom(own + other), normal))
+        apart = wp.dot(normal, wp.spatial_top(own - other) + wp.spatial_top(rate))
+        over = over_centre(host, w, wp.spatial_top(own), patches.owner[p], patches.own[p])
+        if patches.carrier[p] != patches.own[p]:
+            over = over_centre(host, w, wp.spatial_top(other), patches.support[p], patches.other[p])
+        x, y, z = gained(over, wp.spatial_bottom(own - other), wp.spatial_bottom(own + other), normal, apart, dt)
+        move = axes * (wp.spatial_top(rate) + wp.vec3(x, y, z))
         turn = wp.dot(normal, wp.spatial_bottom(rate))
         frames.drift[w, p] = frames.drift[w, p] + wp.vec3(move[0], move[1], turn)

@@ -33,6 +33,8 @@ class Patches:
     """Origins, as those of `placing`."""
     curved: wp.array(dtype=int)
     """Bits of their curved sides, as those of `placing`."""
+    carrier: wp.array(dtype=int)
+    """The smaller geoms, along with which patches go over the others."""
     reach: wp.array(dtype=wp.vec4)
     """Reaches of the patches (see `placing`) [m]."""
     scale: wp.array(dtype=int)
