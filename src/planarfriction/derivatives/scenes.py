@@ -51,8 +51,8 @@ def scene_sensitivities(
     The scene is simulated with tight tolerances (`options`; 1e-9 by default). Along the accepted steps the variational
     equation `s' = J s + df/dp` is solved with the solver's own analytic Jacobian, by an L-stable method of order 4
     whose steps span several steps of the motion, each accurate to `0.1 rtol^(2/3)` of the derivatives. At the default
-    tolerance the derivatives agree with central differences of tight simulations to 5e-6 of the largest, and to 2e-5
-    with tables, whose Jacobian jumps from cell to cell.
+    tolerance the derivatives agree with central differences of tight simulations to 1e-5 of the largest, to 5e-5 with
+    tables, whose Jacobian jumps from cell to cell, and to 5e-4 with elasto-plastic bristles that begin to yield.
 
     A bristle that begins to slip or to stick bends the right-hand side but does not make it jump: the derivative
     continues through such a transition, and describes a motion that makes the same transitions slightly earlier or
