@@ -4,8 +4,8 @@
 
 import warp as wp
 
+from planarfriction._engine.coupled import placing
 from planarfriction.adapters.mujoco_warp.loops.geometry import Frames, Host, Patches
-from planarfriction.kernels import placing
 
 gained = wp.func(placing.bend)
 
