@@ -40,14 +40,14 @@ test: $(VENV)/.test
 NUMERIC := _engine derivatives limit_surface models solvers test_coupling.py test_formulas.py
 
 # The share of these that compiles least and rounds most.
-QUICKEST := _engine limit_surface solvers test_coupling.py test_formulas.py
+QUICKEST := _engine/test_*.py limit_surface solvers test_coupling.py test_formulas.py
 
 test-generic: $(VENV)/.test
 	NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES= $(PYTEST) $(NUMERIC:%=tests/%) $(ARGS)
 
 # Loops whose indices are checked compile into their own machine code, of which the whole half takes an hour; pointers
 # have no bounds to check.
-BOUNDED := tests/_engine tests/test_coupling_hard.py
+BOUNDED := tests/_engine/test_*.py tests/test_coupling_hard.py
 
 test-bounds: $(VENV)/.test
 	NUMBA_BOUNDSCHECK=1 $(PYTEST) $(BOUNDED) $(ARGS)
