@@ -121,17 +121,17 @@ def _upward_imports(sources: list[tuple[str, ast.AST]]) -> list[str]:
     floors = _floors()
     found = []
     for module, tree in sources:
-        package, own = module.split(".")[0], _floor(module)
+        package = module.split(".")[0]
         for target in _imports(tree, nested=True):
-            goal, seen = target.split(".")[0], _floor(target)
+            goal = target.split(".")[0]
             if goal not in (LIBRARY, STUDIES, EXPLORER):
                 continue
             if goal != package:
                 wrong = floors[goal] >= floors[package]
             else:
                 # a package itself, and an explorer without floors, may see all of its own
-                if own == seen == ENGINE:
-                    own, seen = _floor(module, 3), _floor(target, 3)
+                words = 3 if _floor(module) == _floor(target) == ENGINE else 2
+                own, seen = _floor(module, words), _floor(target, words)
                 wrong = own != seen and own in floors and seen in floors and floors[seen] >= floors[own]
             if wrong:
                 found.append(f"{module} -> {target}")
