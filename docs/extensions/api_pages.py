@@ -31,7 +31,7 @@ OPTIONAL = (
     "adapters.mujoco_warp",
     "adapters.drake",
 )
-"""Public modules that load a package of an extra, or are for those who extend the library, and so stand in no list of the package."""
+"""Public modules that stand in no list of the package: they load a package of an extra, or are for extending it."""
 
 ROOMS = ("bristles", "cells", "published", "coupled", "body", "compiler")
 COMPILED = (*(f"_engine.{room}" for room in ROOMS), "limit_surface.loops")
