@@ -21,8 +21,17 @@ from sphinx.pycode import ModuleAnalyzer
 import planarfriction
 from planarfriction.described import HEADING
 
-OPTIONAL = ("torch", "jax", "warp", "adapters.mujoco", "adapters.mjx", "adapters.mujoco_warp", "adapters.drake")
-"""Public modules that load a package of an extra, and so stand in no list of the package."""
+OPTIONAL = (
+    "extend",
+    "torch",
+    "jax",
+    "warp",
+    "adapters.mujoco",
+    "adapters.mjx",
+    "adapters.mujoco_warp",
+    "adapters.drake",
+)
+"""Public modules that stand in no list of the package: they load a package of an extra, or are for extending it."""
 
 ROOMS = ("bristles", "cells", "published", "coupled", "body", "compiler")
 COMPILED = (*(f"_engine.{room}" for room in ROOMS), "limit_surface.loops")

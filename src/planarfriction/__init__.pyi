@@ -3,7 +3,6 @@
 from . import coupling as coupling
 from . import derivatives as derivatives
 from . import errors as errors
-from . import extend as extend
 from . import families as families
 from . import formulas as formulas
 from . import geometry as geometry

@@ -1,4 +1,4 @@
-"""What models of your own are compiled with, and the loops that a study of the method calls itself.
+"""Decorators, records and loops for models of your own, and for studies of the method.
 
 `PackedModel` of `planarfriction.models` takes a model's `ModelFunctions`; docs/write-your-own.md leads through them.
 """

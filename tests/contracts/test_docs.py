@@ -197,6 +197,16 @@ def test_names_exist(page):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=ids)
+def test_files_of_ours_that_a_page_names_exist(page):
+    """`models/base`, `tests/support` and the like, also a function of a file: `_engine/published/surfaces.place`."""
+    homes = [ROOT, ROOT / "src" / "planarfriction"]
+    for name in re.findall(r"`(\w+(?:/[\w.]+)+)`", prose(page)):
+        ends = (name, f"{name}.py", f"{name.rpartition('.')[0]}.py")
+        ours = any((home / name.partition("/")[0]).is_dir() for home in homes)
+        assert not ours or any((home / end).exists() for home in homes for end in ends), f"{page.name}: {name}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=ids)
 def test_code_of_a_page_is_not_cut_off(page):
     """A line of the site holds 88 characters of code."""
     long = [line for block in blocks(page) for line in block.text.splitlines() if len(line) > 88]

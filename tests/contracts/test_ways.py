@@ -118,7 +118,9 @@ def _rooms(frame: FrameType | None) -> list[str]:
     while frame is not None:
         file = Path(frame.f_code.co_filename)
         inside = file.relative_to(HOME) if file.is_relative_to(HOME) else Path("elsewhere")
-        room = "records" if "records" in inside.parts else inside.parts[0].removesuffix(".py")
+        room = inside.parts[0].removesuffix(".py")
+        if inside.parts[:2] in (("_engine", "records"), ("_engine", "compiler")):  # the latter is no room of a call
+            room = inside.parts[1]
         if inside.name in READERS:
             found.clear()
         elif room in ROOMS and inside.name != "namespace.py" and found[-1:] != [room]:
