@@ -25,7 +25,7 @@ def twists_and_loads(friction, d, before) -> tuple[np.ndarray, np.ndarray]:
         shift = friction.parameters(d.model)
         went += shift["centre_x"][p] * axes[0] + shift["centre_y"][p] * axes[1]
         went -= (axes[2] @ went) * axes[2]
-        begin, velocities, spins, gain = centre - went, [], [], np.zeros(3)
+        begin, velocities, spins, gain, apart = centre - went, [], [], np.zeros(3), 0.0
         for side, body in zip((1.0, -1.0), (placed.owner, placed.support), strict=True):
             moves, turns, gains, gained = np.zeros((4, 3, m.nv))
             mujoco.mj_jac(m, d, moves, turns, centre, body)
@@ -35,13 +35,18 @@ def twists_and_loads(friction, d, before) -> tuple[np.ndarray, np.ndarray]:
             velocities.append(moves @ before)
             spins.append(turns @ before)
             gain += side * np.array([*(axes[:2] @ gains @ before), axes[2] @ gained @ before])
+            apart += side * axes[2] @ (moves + 0.5 * dt * gains) @ before
         # the contact goes along with the smaller geom: over its surface, and away from it
         goes = 0 if placed.carrier == placed.own else 1
         body, spin = (placed.owner, placed.support)[goes], spins[0] - spins[1]
         mujoco.mj_jac(m, d, moves, None, d.geom_xpos[placed.carrier], body)
         over = velocities[goes] - moves @ before
-        over += (axes[2] @ (velocities[goes] - velocities[1 - goes] - over)) * axes[2]
-        gain[:2] += axes[:2] @ (np.cross(gain[2] * axes[2], went) - np.cross(spin, over))
+        over -= (axes[2] @ over) * axes[2]
+        moved = np.cross(over, spin)
+        # what leaves, leaves along the normal, which turns with both bodies
+        apart += 0.5 * dt * axes[2] @ moved
+        moved += apart * np.cross(axes[2], spins[0] + spins[1])
+        gain[:2] += axes[:2] @ (np.cross(gain[2] * axes[2], went) + moved)
         twists[p] += 0.5 * dt * gain
     return twists, loads
 
