@@ -203,7 +203,8 @@ def _start(data: Data, candidate: subsets.Candidate, rough: Mapping[str, float],
     start = subsets.started(candidate, largest)
     if not ("stribeck" in candidate.terms and rough):
         return start
-    known = start | {name: value for name, value in rough.items() if name in start}
+    # a delay that ended at its bound without a fall of friction would stay there
+    known = start | {name: value for name, value in rough.items() if name in start and name != "delay"}
     falls = [known | {"rise": rise * known["mu_c"], "v_s": speed} for rise in RISES for speed in data.grid.v_s.tolist()]
     return min([start, *falls], key=lambda values: miss(data.rows, values, candidate.terms))
 
