@@ -41,6 +41,9 @@ MOST_LOAD = 0.95
 ROUNDS = 3
 """Rounds in which a level that grows with the model's own torque converges."""
 
+FINE = 1e-5
+"""Share of the squared errors that a step of the search must gain."""
+
 HUBER = 3.0
 """Error, in standard deviations, from which on it counts linearly."""
 
@@ -187,7 +190,7 @@ def refine(
     for _ in range(2 if scatter is None else 1):
         sizes = _scatter(at(x), reversing) if scatter is None else scatter
         weighted: Callable[[np.ndarray], Any] = lambda x: at(x) / sizes[reversing]  # noqa: B023, E731
-        x = least_squares(weighted, x, diff_step=1e-5, max_nfev=12, loss="huber", f_scale=HUBER).x
+        x = least_squares(weighted, x, diff_step=1e-5, max_nfev=12, ftol=FINE, loss="huber", f_scale=HUBER).x
     return _judged(scaled, x, at, sizes, rows, tuple(terms))
 
 
@@ -214,7 +217,7 @@ def _judged(
     size = np.abs(weighted)
     pull = np.minimum(1.0, HUBER / np.maximum(size, 1e-9))
     steps = 1e-4 * np.eye(len(x))
-    jacobian = np.stack([(errors(x + h) - errors(x - h)) / 2e-4 / sizes[reversing] for h in steps], axis=1)
+    jacobian = np.stack([(errors(x + h) - error) / 1e-4 / sizes[reversing] for h in steps], axis=1)
     inverse = np.linalg.pinv(jacobian.T @ (pull[:, None] * jacobian), rcond=1e-13)
     parts = blocks_of(rows)
     gradients = np.array([(jacobian[part] * (pull * weighted)[part, None]).sum(axis=0) for part in parts])

@@ -157,13 +157,15 @@ def choose(data: Data, told: Sequence[str], auto: bool, progress: Callable[[str]
     A set is kept if its score, over blocks, lies within one standard error or `FLAT` of the best. Terms that a set does
     not show are left out of it. Without `auto`, only the set that was told is refined.
     """
-    progress("Coulomb and viscous friction, and all sets of terms")
+    progress("Coulomb and viscous friction")
+    start = {"inertia": 0.0, "mu_c": float(data.torque.std()), "sigma_2": 0.0, "torque_offset": 0.0, "delay": 0.0}
+    progress(f"first estimate, Coulomb and viscous friction: {_level(refine(data.rows, start, ()).values)}; all sets")
     grid = data.grid
     largest = float(np.abs(data.torque).max())
     allowed = data.allowed if auto else told
     candidates = subsets.search(data.rows, grid, told, allowed)
     first = candidates[0]
-    progress(f"first estimate, {_words(first.terms)}: {_level(first.values)}")
+    progress(f"best set by sums, {_words(first.terms)}: {_level(first.values)}")
     rough: dict[str, float] = {}
     if "bristles" in first.terms and "stribeck" in allowed:
         terms = first.terms if "stribeck" in told else tuple(each for each in first.terms if each != "stribeck")
