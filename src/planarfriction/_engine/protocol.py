@@ -1,4 +1,4 @@
-"""What the solver and steps ask of a model: compiled functions of one contact, called by address."""
+"""Compiled functions of one contact, which the solver and steps call by address: all that they ask of a model."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ ROUNDS = 3
 """Rounds in which a level that grows with the model's own torque converges."""
 
 FINE = 1e-5
-"""Share of the squared errors that a step of the search must gain."""
+"""Share of the squared errors that a step of a search must gain, far below what one log more or less changes."""
 
 HUBER = 3.0
 """Error, in standard deviations, from which on it counts linearly."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.verdicts import Verdict
+from planarfriction.joints.balance import FINE
 from planarfriction.joints.goal_verdicts import judge
 from planarfriction.joints.problem import NEEDS, PARAMETERS, SHORT, TERMS, Problem
 from planarfriction.joints.result import JointFit, Series
@@ -24,9 +25,6 @@ GROUPS = 4
 LEAST = 0.15
 """Least fall of the logarithm of left-out errors that a term must make: on synthetic joints whose friction and voltage
 differ between logs, terms that are not there take up some of that and gain less than this in 95 % of them."""
-
-FINE = 1e-5
-"""Share of the squared errors that a step of the search must gain, far below what one log more or less changes."""
 
 MOST = 40
 """Most steps of a search."""

@@ -142,8 +142,8 @@ def judge(
 
 def _on_terms(data: Data, fit: Refined, gains: Mapping[str, float]) -> Iterator[Verdict]:
     for term in fit.terms:
-        numbers = f"{gains[term]:.3g}" if term in gains else "many"
-        yield Verdict(term, True, f"{WORDS[term]} (squared errors without it are {numbers} times as large)")
+        gain = f" (squared errors without it are {gains[term]:.3g} times as large)" if term in gains else ""
+        yield Verdict(term, True, f"{WORDS[term]}{gain}")
     if "stribeck" not in fit.terms:
         text = f"no fall of friction with speed is seen from {data.slowest_fall:.2g} rad/s on; slower ones cannot be"
         yield Verdict("stribeck", True, text)
